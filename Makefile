@@ -1,0 +1,41 @@
+# Everything runs in .venv, which any target that needs it makes first: Python 3.11 or later and make are enough.
+#   make PYTHON=/path/to/python3.12 ...   choose the Python        make JOBS=8 test   test processes (2)
+
+JOBS ?= 2
+BIN := .venv/bin
+
+export PYTHON
+unexport PYTHONHOME PYTHONPATH
+MAKEFLAGS += --no-print-directory
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint soak bench clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+setup: ## make .venv, or bring it up to date
+	@.make/setup
+
+demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, verify its log
+	@.make/demo
+
+test: setup ## run every test, on the checkout and on the wheel; decision, wire and evidence covered in full
+	$(BIN)/pytest -n $(JOBS) --dist loadfile --cov --cov-report term
+
+lint: setup ## check style, format, types and layers
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+soak: setup ## run the long campaigns
+	$(BIN)/pytest -n $(JOBS) -m soak --hypothesis-profile soak
+
+bench: setup ## run every benchmark; each prints a ratio against a peer or a limit
+	@status=0; for file in bench/*.py; do $(BIN)/python "$$file" || { echo "$$file: limit not met" >&2; status=1; }; done; \
+	exit $$status
+
+clean: ## remove set-up, builds and caches; runs/ and keys stay
+	rm -rf .venv build dist .coverage .coverage.* .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find rtshcua tests bench -name __pycache__ -type d -prune -exec rm -rf {} +

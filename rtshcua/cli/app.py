@@ -1,0 +1,112 @@
+"""The front door: `rtshcua COMMAND ...`. Reads the table, imports the one command that is asked for, and guards it.
+
+`rtshcua`, `rtshcua --help` and `rtshcua --version` import neither typer nor rich (bench/startup.py measures it).
+"""
+
+import io
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import cast
+
+from rtshcua import __version__
+from rtshcua.cli.faults import barrier, fail, say
+from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
+from rtshcua.diagnostics.exits import ExitCode
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command and gives its exit code back, for `sys.exit`; nothing but SystemExit rises from it."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a poor terminal must not turn a degree sign into a fault
+    return int(barrier(lambda: _dispatch(words)))
+
+
+def _dispatch(words: list[str]) -> int:
+    first, rest = (words[0], words[1:]) if words else ("--help", [])
+    if first in ("--version", "-V"):
+        print(f"rtshcua {__version__}")
+        return ExitCode.OK
+    if first == "help" and rest:
+        first, rest = rest[0], ["--help"]
+    if first in ("--help", "-h", "help"):
+        print(overview(bold=_wants_colour()))
+        return ExitCode.OK
+    row = find(first)
+    return _unknown(first) if row is None else _call(row, rest)
+
+
+def _unknown(word: str) -> ExitCode:
+    from rtshcua.diagnostics.suggest import nearest
+
+    kind = "option" if word.startswith("-") else "command"
+    near = nearest(word, [row.name for row in COMMANDS] + ["--help", "--version"])
+    help = f"did you mean `rtshcua {near}`?" if near else "`rtshcua --help` lists the commands"
+    return fail(ExitCode.USAGE, f"no such {kind}: `{word}`", help)
+
+
+def _call(row: Row, words: list[str]) -> int:
+    """Imports the command of `row` and runs it through typer, whose own way of reporting errors is left out."""
+    import typer
+    from typer.main import get_command
+
+    command = get_command(import_module(row.module).app)
+    try:
+        with command.make_context(f"rtshcua {row.name}", words, help_option_names=["-h", "--help"]) as context:
+            return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
+    except typer.Exit as end:
+        return end.exit_code
+    except (typer.Abort, EOFError):  # Ctrl-C, or the end of the input, at a question
+        return fail(ExitCode.INTERRUPTED, "stopped at a question that was not answered")
+    except typer.TyperException as error:
+        return _misused(row, error)
+
+
+def _misused(row: Row, error: Exception) -> ExitCode:
+    """Says what is wrong with the command line as every other error is said."""
+    words = cast("str", error.format_message()).rstrip(".")  # type: ignore[attr-defined]
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else f"rtshcua {row.name}"
+    code = fail(ExitCode.USAGE, words[:1].lower() + words[1:])
+    if context is not None:
+        say(f"usage: {context.get_usage().removeprefix('Usage: ')}")
+    say(f" help: `{path} --help` explains it")
+    return code
+
+
+def overview(*, bold: bool) -> str:
+    """What `rtshcua --help` prints, from the table alone."""
+    width = max(len(row.name) for row in COMMANDS)
+    example_width = max(len(line) for line, _ in EXAMPLES)
+
+    def head(text: str) -> str:
+        return f"\033[1m{text}\033[0m" if bold else text
+
+    lines = [
+        f"{head('rtshcua')} {__version__}: an agent may propose what a drone does, and can never make the drone do it",
+        "",
+        f"{head('usage')}  rtshcua COMMAND [OPTIONS] ...",
+    ]
+    for group, title in GROUPS.items():
+        lines += ["", head(title)]
+        lines += [f"  {row.name:<{width}}  {row.help}" for row in COMMANDS if row.group == group]
+    lines += ["", head("For example")]
+    lines += [f"  {line:<{example_width}}  {what}" for line, what in EXAMPLES]
+    lines += [
+        "",
+        head("Options"),
+        f"  {'-h, --help':<{width + 3}}  this page; `rtshcua COMMAND --help` for one command",
+        f"  {'-V, --version':<{width + 3}}  the version",
+    ]
+    return "\n".join(lines)
+
+
+def _wants_colour() -> bool:
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    return terminal and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,53 @@
+"""The static table of commands: all that `rtshcua --help` reads, so that start-up stays fast as commands grow.
+
+The door to a command, for whoever writes one:
+
+- the command `verify-log` lives in `rtshcua/cli/verify_log.py`, and nothing of it is imported before it is called for;
+- the module has `app = typer.Typer(add_completion=False)`. One `@app.command()` makes `rtshcua NAME ...`; for
+  `rtshcua NAME VERB ...` give the app an `@app.callback()` too, over a function that does nothing, else a single verb
+  would be swallowed;
+- the function returns an `ExitCode`. It reports what it refuses itself, in one way for all: `return
+  fail(ExitCode.INPUT, "...")` from `rtshcua.cli.faults`; OSError, Ctrl-C and faults simply rise to the barrier there.
+"""
+
+from typing import NamedTuple
+
+
+class Row(NamedTuple):
+    """One command: its name on the command line, the group it is shown in, and one line of help."""
+
+    name: str
+    group: str
+    help: str
+
+    @property
+    def module(self) -> str:
+        """The module that holds the command's `app`."""
+        return f"rtshcua.cli.{self.name.replace('-', '_')}"
+
+
+COMMANDS = (
+    Row("check", "write", "report everything that is wrong with sources or a mission specification"),
+    Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
+    Row("explain", "write", "print the page of a diagnostic code"),
+    Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),
+    Row("keys", "fly", "make and list signing keys and the trust root"),
+    Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
+    Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station"),
+    Row("verify-log", "audit", "prove that a flight's log is whole, signed, and decides the same again"),
+    Row("show", "audit", "print a bundle, a key, a trust root or a log for a person"),
+)
+
+GROUPS = {"write": "Write a mission", "fly": "Fly it", "audit": "Audit it"}
+
+EXAMPLES = (
+    ("rtshcua keys init", "once: a development root and its keys"),
+    ("rtshcua compile missions/short.rts -o short.bundle", "check, sign"),
+    ("rtshcua run short.bundle", "fly it on the simulated vehicle"),
+    ("rtshcua verify-log runs/*/log.jsonl", "prove what happened"),
+)
+
+
+def find(name: str) -> Row | None:
+    """The row of the command called `name`, or None."""
+    return next((row for row in COMMANDS if row.name == name), None)

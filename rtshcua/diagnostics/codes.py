@@ -1,0 +1,149 @@
+"""The one registry of diagnostic codes. A code is never reused and never changes its meaning."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Severity(Enum):
+    """`ERROR` forbids compiling; `WARNING` is a best-effort finding."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A kind of finding: `id` is stable, `slug` is for people, `meaning` is one sentence."""
+
+    id: str
+    slug: str
+    meaning: str
+    severity: Severity = Severity.ERROR
+
+
+REGISTRY: dict[str, Code] = {}
+
+
+def _code(id: str, slug: str, meaning: str, severity: Severity = Severity.ERROR) -> Code:
+    assert id not in REGISTRY, id
+    code = REGISTRY[id] = Code(id, slug, meaning, severity)
+    return code
+
+
+# E01: syntax and files
+SYNTAX = _code("E0101", "syntax", "the text is not a declaration of the language")
+UNCLOSED = _code("E0102", "unclosed", "a block, a text or a comment is opened and not closed")
+NOT_TEXT = _code("E0103", "not-text", "the file is not UTF-8 text")
+TOO_LARGE = _code("E0104", "too-large", "the file is larger than the compiler reads")
+TOO_DEEP = _code("E0105", "too-deep", "an expression is nested more deeply than the compiler reads")
+WRITTEN_TWICE = _code("E0106", "written-twice", "a part of a declaration is written twice")
+NOT_WRITTEN = _code("E0107", "not-written", "a declaration lacks a part that it must have")
+NO_SUCH_FILE = _code("E0108", "no-such-file", "a file that is asked for or imported cannot be read")
+IMPORT_PATH = _code("E0109", "import-path", "an import names its file in a way that means nothing elsewhere")
+
+# E02: names
+UNKNOWN_NAME = _code("E0201", "unknown-name", "a name is used that nothing declares")
+DUPLICATE_NAME = _code("E0202", "duplicate-name", "a name is declared twice")
+SHADOWED_NAME = _code("E0203", "shadowed-name", "a parameter or an enumerator has the name of something else")
+WRONG_KIND = _code("E0204", "wrong-kind", "a name stands for another kind of thing than is asked")
+NO_ENTRY = _code("E0205", "no-entry", "the entry of a zone is used that declares none")
+NO_MISSION = _code("E0206", "no-mission", "there is not exactly one mission to compile, and none was named")
+NOT_IN_POLICY = _code("E0207", "not-in-policy", "a name is not declared in what the policy's own file imports")
+
+# E03: types, units and datum
+UNKNOWN_UNIT = _code("E0301", "unknown-unit", "a number has a unit that the language does not know")
+NOT_EXACT = _code("E0302", "not-exact", "a number is finer than the whole units in which its quantity is kept")
+OUT_OF_BOUNDS = _code("E0303", "out-of-bounds", "a number is larger than its quantity can be")
+DATUM_NOT_ALLOWED = _code("E0304", "datum-not-allowed", "a datum stands after something that is not a length")
+DIMENSION_MISMATCH = _code("E0310", "dimension-mismatch", "a number has another dimension than is asked")
+DATUM_MISMATCH = _code("E0311", "datum-mismatch", "an altitude is measured from another datum than is asked")
+WRONG_TYPE = _code("E0312", "wrong-type", "a value is of another type than is asked")
+UNKNOWN_MEMBER = _code("E0313", "unknown-member", "a name is not a value of the enumeration that is asked")
+NOT_COMPARABLE = _code("E0314", "not-comparable", "two values cannot be compared in this way")
+BAD_ARITHMETIC = _code(
+    "E0315", "bad-arithmetic", "values are computed with that are no numbers, or whose product has no unit"
+)
+EMPTY_RANGE = _code("E0316", "empty-range", "a range's first end is above its second")
+BAD_SUBJECT = _code("E0317", "bad-subject", "something is asked to be inside a zone that cannot be")
+NOT_CONSTANT = _code("E0318", "not-constant", "a value is not known before the flight where it must be")
+NOT_POSITIVE = _code("E0319", "not-positive", "a quantity is zero or negative where it must be above zero")
+
+# E04: signals and the dialect
+UNKNOWN_MESSAGE = _code("E0401", "unknown-message", "the dialect has no such message")
+UNKNOWN_FIELD = _code("E0402", "unknown-field", "the message has no such field")
+FIELD_UNIT = _code("E0403", "field-unit", "the field's unit does not measure the signal's dimension")
+FIELD_DATUM = _code("E0404", "field-datum", "the datum of the field's altitude is unknown, or differs between sources")
+ENUM_VALUE = _code("E0405", "enum-value", "an enumerator's value is not one of the dialect's enumeration")
+FIELD_COUNT = _code("E0406", "field-count", "a signal of this type is read from another number of fields")
+FIELD_TYPE = _code("E0407", "field-type", "the field is an array or text, and a signal is one number")
+UNKNOWN_AT = _code("E0408", "unknown-at", "what means `not known` is no value that the field can have")
+SIGNAL_TYPE = _code("E0409", "signal-type", "a signal has a type that no signal can have")
+WELL_KNOWN_SIGNAL = _code(
+    "E0410", "well-known-signal", "a signal that every flight needs is missing or has the wrong type"
+)
+UNKNOWN_ENUM = _code("E0411", "unknown-enum", "the dialect has no such enumeration")
+FIELD_ENUM = _code("E0412", "field-enum", "the field's values are those of another enumeration")
+
+# E05: zones and geometry
+BAD_POLYGON = _code("E0501", "bad-polygon", "the corners do not make a simple polygon with an area")
+BAD_COORDINATES = _code("E0502", "bad-coordinates", "coordinates are not on the globe, or too near to a pole")
+FLOOR_ABOVE_CEILING = _code("E0503", "floor-above-ceiling", "a zone's floor is not below its ceiling")
+ENTRY_OUTSIDE = _code("E0504", "entry-outside", "a zone's entry does not lie inside of it")
+ZONE_VANISHES = _code("E0505", "zone-vanishes", "a zone is so narrow that nothing is left of it when it shrinks")
+ZONE_SHAPE = _code("E0506", "zone-shape", "a grown or shrunk zone has holes or parts, and cannot be flown by")
+TOO_FAR = _code("E0507", "too-far", "a place is further from the vehicle's home than the local plane reaches")
+PATH_OUTSIDE = _code("E0508", "path-outside", "the planned path leaves the policy's airspace")
+AREA_TOO_SMALL = _code("E0509", "area-too-small", "an area is too small to be covered by a survey path")
+
+# E06: skills, arguments, fallback chains
+UNKNOWN_ARGUMENT = _code("E0601", "unknown-argument", "an argument has the name of no parameter")
+DUPLICATE_ARGUMENT = _code("E0602", "duplicate-argument", "an argument is given twice")
+MISSING_ARGUMENT = _code("E0603", "missing-argument", "a parameter without a default is given no argument")
+TOO_MANY_ARGUMENTS = _code("E0604", "too-many-arguments", "an argument without a name has no parameter to go to")
+ARGUMENT_RANGE = _code("E0605", "argument-range", "an argument or a default is outside of its parameter's range")
+INCOMPLETE_CONTRACT = _code("E0606", "incomplete-contract", "a skill's contract lacks a field that it must have")
+BAD_PARAMETER = _code("E0607", "bad-parameter", "a parameter's type, range and default do not belong together")
+BAD_MOTION = _code("E0608", "bad-motion", "a motion names something that is no parameter of the type it needs")
+UNKNOWN_CLASS = _code("E0609", "unknown-class", "there is no such timing class")
+UNKNOWN_RECORD = _code("E0610", "unknown-record", "there is no such kind of evidence")
+ENDLESS_LINK = _code("E0611", "endless-link", "a link that is not the last neither has a limit nor ends by itself")
+NEEDY_LAST_LINK = _code("E0612", "needy-last-link", "the last link of a chain needs something that may be missing")
+CHAIN_CYCLE = _code("E0613", "chain-cycle", "a skill is a link of its own fallback chain")
+BEYOND_VEHICLE = _code("E0614", "beyond-vehicle", "a step asks for more than the vehicle can do")
+COVERING_LINK = _code("E0615", "covering-link", "a link of a chain would fly a survey")
+
+# E07: policies and authority
+POLICY_VERSION = _code("E0701", "policy-version", "a mission names another version of its policy than is declared")
+NOT_PERMITTED = _code("E0702", "not-permitted", "no rule of the policy permits a step to this role and source")
+OUT_OF_SCOPE = _code("E0703", "out-of-scope", "a step's arguments are outside of what the policy permits")
+FORBIDDEN = _code("E0704", "forbidden", "a rule of the policy forbids a step")
+LINK_NOT_PERMITTED = _code(
+    "E0705", "link-not-permitted", "a link of a chain is not permitted whenever it may be needed"
+)
+SOURCE_CLASS = _code("E0706", "source-class", "a source may not ask for skills of this timing class")
+CONFIRM_WITHOUT_WITHIN = _code("E0707", "confirm-without-within", "a confirm rule does not say how long it waits")
+NO_CONTINGENCY = _code("E0708", "no-contingency", "a policy has no contingency chain")
+UNKNOWN_SOURCE = _code("E0709", "unknown-source", "there is no such source of decisions")
+RULE_ARGUMENT = _code("E0710", "rule-argument", "a rule reads an argument that not all of its skills have")
+NO_PROPOSER = _code("E0711", "no-proposer", "a mission does not say who proposes it for which role")
+EMPTY_MISSION = _code("E0712", "empty-mission", "a mission has no step")
+
+# E08: timing
+VALIDITY_TOO_SHORT = _code("E0801", "validity-too-short", "a step may come later than its validity lasts")
+UNKNOWN_PHASE = _code("E0802", "unknown-phase", "a skill is valid only in phases that the mission does not have")
+STEP_OUTSIDE_PHASES = _code("E0803", "step-outside-phases", "a step stands in a phase in which its skill is not valid")
+
+# E09: mission specifications (structured input of an agent)
+NOT_JSON = _code("E0901", "not-json", "the specification is not JSON")
+SPECIFICATION_SHAPE = _code("E0902", "specification-shape", "the specification does not follow its schema")
+DUPLICATE_KEY = _code("E0903", "duplicate-key", "an object has the same key twice")
+SPECIFICATION_SIZE = _code(
+    "E0904", "specification-size", "the specification is larger or deeper than the compiler reads"
+)
+
+# E10: limits of what fits on board
+TOO_MANY = _code("E1001", "too-many", "there are more of these than fit on board")
+CONDITION_SIZE = _code(
+    "E1002", "condition-size", "a condition needs more instructions or a deeper stack than fit on board"
+)
+NUMBER_SIZE = _code("E1003", "number-size", "a number is larger than what is kept or computed on board")

@@ -1,0 +1,31 @@
+"""What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same examples everywhere;
+# `make soak` looks further, with new ones each time.
+settings.register_profile("test", deadline=None, derandomize=True, max_examples=100)
+settings.register_profile("soak", deadline=None, max_examples=20_000)
+settings.load_profile("test")
+
+
+@pytest.fixture
+def checkout() -> Path:
+    """The top of the checkout."""
+    return CHECKOUT
+
+
+@pytest.fixture(autouse=True)
+def own_world(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test sees or touches the keys, the replay state or the terminal settings of whoever runs it."""
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(tmp_path_factory.mktemp("data")))
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("TZ", "UTC")
+    for name in ("FORCE_COLOR", "GITHUB_ACTIONS", "RTSHCUA_DEBUG"):
+        monkeypatch.delenv(name, raising=False)

@@ -1,0 +1,99 @@
+"""The wheel, installed outside the checkout, does what the checkout does.
+
+The throw-away environment shares the dependencies that are installed already (so nothing is fetched), but not the
+editable install: a path named in a .pth file is searched, its own .pth files are not read.
+"""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("outside")
+
+
+@pytest.fixture(scope="module")
+def python(place: Path) -> Path:
+    """The Python of an environment with the wheel in it, built by way of the sdist."""
+    checkout = Path(__file__).resolve().parents[2]
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(place), str(checkout)]
+    made = subprocess.run(build, cwd=place, capture_output=True, text=True, check=False)
+    assert made.returncode == 0, made.stdout + made.stderr
+    (wheel,) = place.glob("*.whl")
+
+    venv.create(place / "venv", with_pip=False, symlinks=True)
+    python = place / "venv/bin/python"
+    (site,) = (place / "venv/lib").glob("python*/site-packages")
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
+    made = subprocess.run(
+        [*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert made.returncode == 0, made.stdout + made.stderr
+    shared = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    (site / "shared.pth").write_text("\n".join(sorted(shared)) + "\n", encoding="utf-8")
+    return python
+
+
+@pytest.fixture
+def run(python: Path, place: Path) -> Run:
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
+
+    def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
+            [python.with_name(str(command[0])), *command[1:]],
+            cwd=place,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done
+
+    return run
+
+
+@pytest.fixture
+def library(run: Run) -> Path:
+    return Path(run("python", "-c", "from rtshcua import library; print(library.root())").stdout.strip())
+
+
+def test_library_is_inside_the_wheel_and_whole(library: Path, place: Path, checkout: Path) -> None:
+    assert library.is_relative_to(place / "venv")
+    for folder in ("grammar", "skills", "policies", "missions"):
+        ours, shipped = (
+            {
+                file.relative_to(top): file.read_bytes()
+                for file in (top / folder).rglob("*")
+                if file.is_file() and "__pycache__" not in file.parts
+            }
+            for top in (checkout, library)
+        )
+        assert ours
+        assert ours == shipped
+
+
+def test_help_and_version(run: Run) -> None:
+    assert "verify-log" in run("rtshcua", "--help").stdout
+    assert run("rtshcua", "--version").stdout.startswith("rtshcua ")
+
+
+def test_compile_and_show_a_shipped_mission(run: Run, library: Path, tmp_path: Path) -> None:
+    bundle = tmp_path / "short.bundle"
+    run("rtshcua", "keys", "init")
+    run("rtshcua", "compile", library / "missions/short.rts", "-o", bundle, "--at", "2026-01-01T00:00:00Z")
+    assert bundle.stat().st_size > 0
+    assert run("rtshcua", "show", bundle).stdout

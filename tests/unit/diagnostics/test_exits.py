@@ -1,0 +1,39 @@
+"""The table of exit codes is a promise: a change here breaks scripts."""
+
+import re
+
+from rtshcua.diagnostics.exits import ExitCode, as_markdown
+
+
+def test_codes_and_slugs_never_change() -> None:
+    assert {code.value: code.slug for code in ExitCode} == {
+        0: "ok",
+        1: "diagnostics",
+        2: "usage",
+        3: "input",
+        4: "untrusted",
+        5: "refused",
+        6: "aborted",
+        7: "stood-down",
+        8: "link",
+        9: "evidence",
+        10: "incomplete",
+        70: "fault",
+        74: "io",
+        130: "interrupted",
+    }
+
+
+def test_meanings_are_one_line_each() -> None:
+    for code in ExitCode:
+        assert re.fullmatch(r"[^\n|]{20,110}", code.meaning), code
+
+
+def test_markdown_has_a_row_for_each_code() -> None:
+    lines = as_markdown().splitlines()
+    assert lines[:3] == [
+        "| code | slug | meaning |",
+        "|---:|---|---|",
+        "| 0 | `ok` | done; a flight succeeded, a log verified, sources have no errors |",
+    ]
+    assert len(lines) == 2 + len(ExitCode)

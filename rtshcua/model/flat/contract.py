@@ -1,0 +1,95 @@
+"""Skill contracts, lowered."""
+
+from enum import IntEnum
+
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.struct import Flat
+
+
+class TimingClass(IntEnum):
+    """Paper symbol `cls`: how fast a decision of this skill must be, hence who may ask for it."""
+
+    SEMANTIC = 0
+    TACTICAL = 1
+    REFLEX = 2
+
+
+class SourceKind(IntEnum):
+    """Paper symbol `src`: where a decision comes from."""
+
+    AGENT = 0
+    OPERATOR = 1
+    ONBOARD = 2
+    REFLEX = 3
+
+
+class MotionKind(IntEnum):
+    """Where a skill takes the vehicle."""
+
+    HOLD = 0  # stay
+    CLIMB = 1  # straight up to the altitude
+    FLY = 2  # to one point at an altitude
+    COVER = 3  # along a survey path within a zone at an altitude
+    HOME = 4  # to home, and land there
+    LAND = 5  # straight down
+
+
+#: kinds of parameters: an integer quantity, an enumeration, a zone index, a place (two cells: local x, y in mm)
+QUANTITY, CHOICE, ZONE, PLACE = 0, 1, 2, 3
+
+
+class Parameter(Flat, frozen=True):
+    """A parameter at argument cell `cell`; `low`, `high` bound a quantity, a choice's ordinal, or a zone's index."""
+
+    name: str
+    kind: int
+    dimension: str
+    cell: int
+    low: int
+    high: int
+    labels: tuple[str, ...]
+
+
+class Link(Flat, frozen=True):
+    """One link of a chain: run `skill` with `arguments` for at most `limit_us` (0: until it ends by itself)."""
+
+    skill: int
+    arguments: tuple[int, ...]
+    limit_us: int
+    text: str
+    source: int
+    start: int
+    end: int
+
+
+class Motion(Flat, frozen=True):
+    """Kind of motion, and the argument cells of its altitude, its speed and how long it holds (-1: none)."""
+
+    kind: int
+    altitude: int
+    speed: int
+    time: int = -1
+
+
+class Contract(Flat, frozen=True):
+    """A skill contract (section 2: `op`, `pre`, `ddl`, `vw`, `sc`, `inv`, `f_b`, `ev`). Times in us, energy in 1/10000.
+
+    `phases` are names; empty means any. `reads` are the slots that its clauses read, in ascending order.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    motion: Motion
+    timing_class: int
+    deadline_us: int
+    validity_us: int
+    phases: tuple[str, ...]
+    duration_us: int
+    grace_us: int
+    require: tuple[Clause, ...]
+    assume: tuple[Clause, ...]
+    maintain: tuple[Clause, ...]
+    fallback: tuple[Link, ...]
+    energy: int
+    record: tuple[str, ...]
+    reads: tuple[int, ...]

@@ -1,0 +1,31 @@
+"""What fits on board. A C evaluator sizes its tables by these; the compiler reports, `prepare` refuses what
+exceeds them.
+
+Values and times stay within `MAX_VALUE`, which every JSON reader holds exactly; what code computes from them stays
+within `MAX_MAGNITUDE`, hence within a signed 64-bit integer.
+"""
+
+MAX_VALUE = (1 << 53) - 1
+MAX_MAGNITUDE = 1 << 62
+MAX_SPEED = 1 << 20  # mm/s, about 1,000 m/s
+MAX_DURATION = 1 << 42  # us, about 50 days
+FULL = 10_000  # 1/10000: a full charge
+DAY = 86_400_000_000  # us
+
+MAX_SLOTS = 256
+MAX_ROLES = 64
+MAX_ZONES = 4_096  # declared and derived
+MAX_TOTAL_VERTICES = 1 << 16
+MAX_TABLES = 256
+MAX_SETS = 4_096
+MAX_MEMBERS = 4_096
+MAX_CONTRACTS = 256
+MAX_PARAMETERS = 32
+MAX_CELLS = 64
+MAX_CLAUSES = 64  # of one kind in one contract
+MAX_LINKS = 8
+MAX_RULES = 16_384
+MAX_RULE_KEYS = 1 << 18  # entries of the rule index: skills times roles, summed over all rules
+MAX_INVOCATIONS = 16_384
+MAX_PHASES = 64
+MAX_PATH = 8_192  # points

@@ -1,0 +1,74 @@
+"""The payload of a mission envelope: contract-bound invocations under one policy."""
+
+from enum import IntEnum
+
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.struct import Flat
+
+
+class OnInadmissible(IntEnum):
+    """What the mission does when a step is not admitted."""
+
+    ABORT = 0
+    HOLD = 1
+    SKIP = 2
+
+
+class Plan(Flat, frozen=True):
+    """Where the skill will take the vehicle, after the leg from wherever it is then.
+
+    `path` is x0, y0, x1, y1, ... in local mm; `altitude` in mm above home (the height flown at; for LAND and HOLD the
+    height at dispatch counts), `speed` in mm/s, 0 where the skill leaves it to the vehicle. `hold_us` is how long
+    a HOLD lasts as a mission step; 0: until something else is commanded, or its limit as a link is over.
+    """
+
+    kind: int
+    path: tuple[int, ...]
+    altitude: int
+    speed: int
+    hold_us: int = 0
+
+
+class Invocation(Flat, frozen=True):
+    """The contract-bound invocation of section 2, `I = <sid, src, op, args, pre, ddl, vw, sc, auth, inv, f_b, ev>`.
+
+    `contract` holds the whole contract as it applies to this step, defaults resolved; `skill` is its index in the
+    policy. `phases` is the bit set of mission phase indexes in which the decision means something. `issued_at_us`
+    is UTC. `binding` is the digest over every other field, the policy's digest and version, the vehicle and the
+    mission.
+    """
+
+    invocation_id: bytes
+    step: int
+    phase: int
+    skill: int
+    source: int
+    role: int
+    arguments: tuple[int, ...]
+    issued_at_us: int
+    phases: int
+    on_inadmissible: int
+    contract: Contract
+    plan: Plan
+    text: str
+    file: int
+    start: int
+    end: int
+    binding: bytes
+
+
+class Mission(Flat, frozen=True):
+    """A whole mission. `policy_digest` names the policy envelope's payload; `sources` are file names for spans."""
+
+    name: str
+    intent: str
+    proposer: str
+    vehicle: str
+    policy: str
+    policy_version: int
+    policy_digest: bytes
+    issued_at_us: int
+    phases: tuple[str, ...]
+    invocations: tuple[Invocation, ...]
+    sources: tuple[str, ...]
+    source_digests: tuple[bytes, ...]

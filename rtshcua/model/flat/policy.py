@@ -1,0 +1,97 @@
+"""The payload of a policy envelope: everything that authority rests on, in one signed piece."""
+
+from enum import IntEnum
+
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Contract, Link
+from rtshcua.model.flat.signal import Signal
+from rtshcua.model.flat.struct import Flat
+from rtshcua.model.flat.zone import Projection, Zone
+
+
+class RuleKind(IntEnum):
+    """What a rule does when it matches."""
+
+    FORBID = 0
+    PERMIT = 1
+    CONFIRM = 2
+    DEGRADE = 3
+
+
+class Rule(Flat, frozen=True):
+    """A rule. `skills` are contract indexes and `roles` role indexes, ascending; empty means any.
+
+    `sources` are `SourceKind` values, ascending; empty means any. `approver` is a role index (confirm, else -1),
+    `within_us` how long an approval is awaited, `target` what a degrade rule flies.
+    """
+
+    kind: int
+    skills: tuple[int, ...]
+    roles: tuple[int, ...]
+    sources: tuple[int, ...]
+    when: Clause | None
+    approver: int
+    within_us: int
+    target: Link | None
+    text: str
+    source: int
+    start: int
+    end: int
+
+
+class Airspace(Flat, frozen=True):
+    """The vehicle stays inside every zone of `inside` and outside every zone of `outside` (zone indexes)."""
+
+    inside: tuple[int, ...]
+    outside: tuple[int, ...]
+    text: str
+    source: int
+    start: int
+    end: int
+
+
+class Vehicle(Flat, frozen=True):
+    """The one aircraft this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
+
+    `position`, `height`, `battery` are the state slots of the well-known signals (-1: the policy declares none).
+    """
+
+    name: str
+    identity: str
+    home_within: int
+    speed: int
+    climb: int
+    position_error: int
+    endurance_us: int
+    reserve: int
+    utc_offset_us: int
+    position: int
+    height: int
+    battery: int
+
+
+class Policy(Flat, frozen=True):
+    """A whole policy. `zones` holds the declared zones first (`declared` of them), derived ones after.
+
+    `sets` are membership sets of enumeration values or zone indexes. `tables` map each declared zone's index to a
+    derived zone's index, for `grow(argument, margin)`. `sources` are file names for spans, `source_digests` the
+    SHA-256 of each.
+    """
+
+    name: str
+    version: int
+    vehicle: Vehicle
+    projection: Projection
+    roles: tuple[str, ...]
+    signals: tuple[Signal, ...]
+    slots: int
+    zones: tuple[Zone, ...]
+    declared: int
+    tables: tuple[tuple[int, ...], ...]
+    sets: tuple[tuple[int, ...], ...]
+    contracts: tuple[Contract, ...]
+    rules: tuple[Rule, ...]
+    airspace: Airspace | None
+    contingency: tuple[Link, ...]
+    sources: tuple[str, ...]
+    source_digests: tuple[bytes, ...]

@@ -1,0 +1,31 @@
+"""Signals as the state monitor needs them: which MAVLink fields, how scaled, when unknown, when stale."""
+
+from rtshcua.model.flat.struct import Flat
+
+NUMBER, ENUMERATION, POSITION = 0, 1, 2
+
+
+class SignalSource(Flat, frozen=True):
+    """One message and its field or fields; a raw value `v` is `v * numerator / denominator` in the canonical unit."""
+
+    message: str
+    fields: tuple[str, ...]
+    numerator: int
+    denominator: int
+    unknown: tuple[int, ...]
+
+
+class Signal(Flat, frozen=True):
+    """A signal owns state slot `slot`; a position owns `slot` (x, local mm) and `slot + 1` (y).
+
+    `kind` is NUMBER (a pair of fields is the length of the vector), ENUMERATION or POSITION (latitude, longitude).
+    `dimension` is a `Dimension` value, the enumeration's name, or `position`; `labels` name an enumeration's values.
+    """
+
+    name: str
+    slot: int
+    kind: int
+    dimension: str
+    stale_us: int
+    labels: tuple[tuple[int, str], ...]
+    sources: tuple[SignalSource, ...]

@@ -1,0 +1,50 @@
+"""Everything that `decide` reads beside the invocation and the policy; all of it is recorded."""
+
+from rtshcua.model.flat.struct import Flat
+
+
+class State(Flat, frozen=True):
+    """Paper symbol `S_t`: one integer a slot in its signal's canonical unit, None where nothing valid was ever
+    received.
+
+    `ages` are in us at the moment of the decision, one a slot; the age of a slot that is None does not count.
+    """
+
+    values: tuple[int | None, ...]
+    ages: tuple[int, ...]
+
+
+class Now(Flat, frozen=True):
+    """The moment of a decision, in us: monotonic, and UTC since the epoch with a bound on its error."""
+
+    monotonic_us: int
+    utc_us: int
+    utc_error_us: int
+
+
+class Approval(Flat, frozen=True):
+    """An operator's verified answer to a `confirm` rule: `granted` 1 or 0, at a monotonic time in us."""
+
+    rule: int
+    role: int
+    granted: int
+    monotonic_us: int
+
+
+class Context(Flat, frozen=True):
+    """Where the mission stands. Times are monotonic, in us.
+
+    `binding` is the one that the request presented, `vehicle` the identity of the vehicle we are on,
+    `policy_version` the one in force (latched at take-off), `consumed` 1 when the id was used before,
+    `released_us` the moment the predecessor ended or the phase began, `phase` the current mission phase's index,
+    `remaining_us` paper symbol `L_rem`.
+    """
+
+    binding: bytes
+    vehicle: str
+    policy_version: int
+    consumed: int
+    released_us: int
+    phase: int
+    remaining_us: int
+    approvals: tuple[Approval, ...]

@@ -1,0 +1,63 @@
+"""Zones in local integer millimetres.
+
+x is east, y is north of the vehicle's declared home; the map from WGS 84 is `Projection`. Coordinates stay within
+`MAX_COORDINATE`, so that every cross product of differences fits into a signed 64-bit integer.
+"""
+
+from rtshcua.model.flat.struct import Flat
+
+MAX_COORDINATE = 1 << 29  # mm, about 537 km
+MAX_VERTICES = 4096
+LOWEST, HIGHEST = -(1 << 30), 1 << 30  # mm above home: no floor, no ceiling
+
+CIRCLE, POLYGON = 0, 1
+
+
+class Projection(Flat, frozen=True):
+    """Local mm from 1e-7 degree: `x = (longitude - longitude0) * east >> SHIFT`, `y = (latitude - latitude0) * north
+    >> SHIFT`.
+
+    `east` and `north` are mm per 1e-7 degree, times 2**SHIFT, computed at compile time on the WGS 84 ellipsoid at home.
+    The shift rounds towards minus infinity: at most 1 mm. Distances are true to about 1 part in 10,000 within 5 km of
+    home at mid-latitudes.
+    """
+
+    latitude: int
+    longitude: int
+    east: int
+    north: int
+
+
+SHIFT = 20
+
+
+def project(projection: Projection, latitude: int, longitude: int) -> tuple[int, int]:
+    """(x, y) in local mm of a place in 1e-7 degree."""
+    return (
+        (longitude - projection.longitude) * projection.east >> SHIFT,
+        (latitude - projection.latitude) * projection.north >> SHIFT,
+    )
+
+
+def unproject(projection: Projection, x: int, y: int) -> tuple[int, int]:
+    """(latitude, longitude) in 1e-7 degree of a local place, to the nearest 1e-7 degree."""
+    east, north = projection.east, projection.north
+    return (
+        projection.latitude + ((y << SHIFT) + north // 2) // north,
+        projection.longitude + ((x << SHIFT) + east // 2) // east,
+    )
+
+
+class Zone(Flat, frozen=True):
+    """An open set: a point on its boundary, floor or ceiling is outside.
+
+    `shape` is `CIRCLE` with `data` = (x, y, radius squared), or `POLYGON` with `data` = (x0, y0, x1, y1, ...),
+    simple and counter-clockwise. `floor`, `ceiling` in mm above home. `name` is what a person wrote, `grow(...)`
+    for a derived one.
+    """
+
+    name: str
+    shape: int
+    floor: int
+    ceiling: int
+    data: tuple[int, ...]

@@ -1,0 +1,28 @@
+"""A parsed file and a program: the import closure of what was asked to be compiled."""
+
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl
+from rtshcua.model.ir.skills import SkillDecl
+
+
+class Import(Node):
+    """`import "../skills/goto.rts"`, relative to the importing file."""
+
+    path: str
+
+
+class Unit(Node):
+    """All declarations of one file, in source order by kind."""
+
+    file: str
+    imports: tuple[Import, ...]
+    enums: tuple[EnumDecl, ...]
+    signals: tuple[SignalDecl, ...]
+    zones: tuple[ZoneDecl, ...]
+    vehicles: tuple[VehicleDecl, ...]
+    skills: tuple[SkillDecl, ...]
+    policies: tuple[PolicyDecl, ...]
+    missions: tuple[MissionDecl, ...]

@@ -1,0 +1,48 @@
+"""Enumerations and signals: what the vehicle is known to report, and in which MAVLink field."""
+
+from pydantic import Field
+
+from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.node import Name, Node
+
+
+class Enumerator(Node):
+    """A name and the integer that stands for it on the wire."""
+
+    name: Name
+    value: int
+
+
+class EnumDecl(Node):
+    """`enum gps_fix = GPS_FIX_TYPE { fix_2d = 2, fix_3d = 3 }`: ordered by value; `dialect` names the MAVLink enum
+    it mirrors.
+    """
+
+    name: Name
+    dialect: Name | None
+    members: tuple[Enumerator, ...]
+
+
+class SignalSource(Node):
+    """One MAVLink message and the field or fields that hold the signal.
+
+    Two fields are a pair: latitude and longitude for a `position`, two components for a `speed` (taken as the
+    length of the vector).
+    """
+
+    message: Name
+    fields: tuple[Name, ...] = Field(min_length=1, max_length=2)
+
+
+class SignalDecl(Node):
+    """`signal battery : ratio = BATTERY_STATUS.battery_remaining unknown at -1 stale after 5 s`.
+
+    `type` is a dimension's name, `position`, `altitude`, or an enumeration. `sources` are alternatives (`or`): the
+    newest of them counts. `unknown_at` are raw field values, or enumerators, that mean "not known".
+    """
+
+    name: Name
+    type: Name
+    sources: tuple[SignalSource, ...] = Field(min_length=1)
+    unknown_at: tuple[Name, ...]
+    stale_after: Quantity

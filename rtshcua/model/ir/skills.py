@@ -1,0 +1,74 @@
+"""Skill contracts: the bounded capabilities of section 2, and their fallback chains."""
+
+from typing import Literal
+
+from rtshcua.model.ir.expression import Condition, Quantity, Range, Value
+from rtshcua.model.ir.node import Name, Node
+
+
+class Parameter(Node):
+    """`altitude: altitude in 5 m .. 60 m = 20 m`, `area: zone`, `target: position`, `pattern: one of grid, orbit =
+    grid`.
+    """
+
+    name: Name
+    type: Name  # a dimension, `zone`, `position`, or `choice` for `one of`
+    range: Range | None
+    choices: tuple[Name, ...]
+    default: Value | None
+
+
+class Motion(Node):
+    """Where the skill takes the vehicle, so that its planned volume is known before it flies.
+
+    `climb to altitude` straight up; `fly to target at altitude`; `cover area at altitude` by a survey path;
+    `fly home` and land there; `hold` position; `land` here.
+    """
+
+    kind: Literal["climb", "fly", "cover", "home", "hold", "land"]
+    target: Name | None  # a parameter of type position or zone
+    altitude: Name | None  # a parameter of type altitude
+    speed: Name | None  # a parameter of type speed
+    pattern: Name | None  # a choice parameter
+    time: Name | None = None  # a parameter of type duration: `hold for time`
+
+
+class ArgumentValue(Node):
+    """`altitude = 20 m`, or a positional argument (`name` is None)."""
+
+    name: Name | None
+    value: Value
+
+
+class LinkDecl(Node):
+    """One link of a fallback or contingency chain: `hover for 20 s`."""
+
+    skill: Name
+    arguments: tuple[ArgumentValue, ...]
+    limit: Quantity | None
+
+
+class Clause(Node):
+    """One condition of `require`, `assume` or `maintain`; a top-level `and` is already split into clauses."""
+
+    condition: Condition
+
+
+class SkillDecl(Node):
+    """A skill contract. None or an empty tuple means: not written (the checker says which fields must be)."""
+
+    name: Name
+    parameters: tuple[Parameter, ...]
+    motion: Motion | None
+    timing_class: Name | None  # semantic, tactical, reflex
+    deadline: Quantity | None
+    validity: Quantity | None
+    phases: tuple[Name, ...]  # `during a, b`; empty: any phase
+    duration: Quantity | None  # `lasts at most 5 min`
+    grace: Quantity | None  # how long a clause may be UNKNOWN while the skill runs
+    require: tuple[Clause, ...]
+    assume: tuple[Clause, ...]
+    maintain: tuple[Clause, ...]
+    fallback: tuple[LinkDecl, ...]
+    energy: Quantity | None
+    record: tuple[Name, ...]

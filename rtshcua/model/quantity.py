@@ -1,0 +1,87 @@
+"""Dimensions, units and datum. Every quantity is an integer in the one canonical unit of its dimension."""
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class Dimension(Enum):
+    """What a number measures, and its canonical unit.
+
+    An altitude is a length with a datum; the datum is part of the type (`Datum`), so two altitudes of different
+    datum never meet in one expression.
+    """
+
+    LENGTH = "length"  # mm
+    ALTITUDE = "altitude"  # mm above its datum
+    SPEED = "speed"  # mm/s
+    DURATION = "duration"  # us
+    ANGLE = "angle"  # 1e-7 degree
+    RATIO = "ratio"  # 1/10000
+    COUNT = "count"  # 1
+
+
+class Datum(Enum):
+    """What an altitude is measured from. `HOME` is the vehicle's home position, `SEA` mean sea level (AMSL)."""
+
+    HOME = "home"
+    SEA = "sea"
+
+
+class Unit(NamedTuple):
+    """`value * numerator / denominator` is the canonical integer; a literal that is not integral there is refused."""
+
+    dimension: Dimension
+    numerator: int
+    denominator: int = 1
+
+
+#: Units that a source may write. `m` is a length; where an altitude is asked it is one above home.
+UNITS: dict[str, Unit] = {
+    "mm": Unit(Dimension.LENGTH, 1),
+    "cm": Unit(Dimension.LENGTH, 10),
+    "m": Unit(Dimension.LENGTH, 1_000),
+    "km": Unit(Dimension.LENGTH, 1_000_000),
+    "mm/s": Unit(Dimension.SPEED, 1),
+    "cm/s": Unit(Dimension.SPEED, 10),
+    "m/s": Unit(Dimension.SPEED, 1_000),
+    "km/h": Unit(Dimension.SPEED, 2_500, 9),
+    "us": Unit(Dimension.DURATION, 1),
+    "ms": Unit(Dimension.DURATION, 1_000),
+    "s": Unit(Dimension.DURATION, 1_000_000),
+    "min": Unit(Dimension.DURATION, 60_000_000),
+    "h": Unit(Dimension.DURATION, 3_600_000_000),
+    "%": Unit(Dimension.RATIO, 100),
+    "deg": Unit(Dimension.ANGLE, 10_000_000),
+}
+
+#: The unit in which a person reads a canonical value of each dimension, largest that divides it first.
+DISPLAY: dict[Dimension, tuple[str, ...]] = {
+    Dimension.LENGTH: ("m", "cm", "mm"),
+    Dimension.ALTITUDE: ("m", "cm", "mm"),
+    Dimension.SPEED: ("m/s", "cm/s", "mm/s"),
+    Dimension.DURATION: ("min", "s", "ms", "us"),
+    Dimension.ANGLE: ("deg",),
+    Dimension.RATIO: ("%",),
+}
+
+
+def display(value: int, dimension: Dimension) -> str:
+    """A canonical value as a person writes it, exactly: `20000` of LENGTH is `20 m`, `2550` of RATIO is `25.5 %`."""
+    names = DISPLAY.get(dimension)
+    if names is None:
+        return str(value)
+    for name in names:
+        unit = UNITS[name]
+        scaled = value * unit.denominator
+        if scaled % unit.numerator == 0:
+            return f"{scaled // unit.numerator} {name}"
+    name = "s" if dimension is Dimension.DURATION else names[0]
+    return f"{_decimal(value, UNITS[name].numerator)} {name}"
+
+
+def _decimal(value: int, denominator: int) -> str:
+    """`value / denominator` in decimals, for a denominator that is a power of ten."""
+    digits = len(str(denominator)) - 1
+    whole, rest = divmod(abs(value), denominator)
+    fraction = str(rest).zfill(digits).rstrip("0")
+    return f"{'-' if value < 0 else ''}{whole}{'.' + fraction if fraction else ''}"

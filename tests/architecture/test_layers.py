@@ -1,0 +1,77 @@
+"""The house of docs/architecture.md: layers, purity, and what may load on board."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
+CORE = ("diagnostics", "model", "wire", "decision", "evidence")
+WORLD = {"lark", "os", "pymavlink", "random", "rich", "socket", "subprocess", "threading", "time", "typer"}
+GROUND_ONLY = {"lark", "pydantic", "rich", "shapely", "typer"}
+
+
+def imports(source: str) -> Iterator[str]:
+    """Every module that `source` imports, wherever it stands: in a function and by name through importlib too."""
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Import(names=names):
+                yield from (alias.name for alias in names)
+            case ast.ImportFrom(module=str(module)):
+                yield module
+            case ast.Call(
+                func=ast.Name(id="__import__" | "import_module") | ast.Attribute(attr="import_module"),
+                args=[ast.Constant(value=str(module)), *_],
+            ):
+                yield module
+
+
+def test_the_scan_finds_every_way_to_import() -> None:
+    source = (
+        "import a.b, c\nfrom d.e import f\ndef g():\n    import h\n    import_module('i')\n    x.import_module('j.k')\n"
+    )
+    assert sorted(imports(source)) == ["a.b", "c", "d.e", "h", "i", "j.k"]
+
+
+@pytest.mark.parametrize("layer", CORE)
+def test_core_touches_no_world(layer: str) -> None:
+    files = sorted((PACKAGE / layer).rglob("*.py"))
+    assert files
+    found = {
+        f"{file.relative_to(PACKAGE)}: {module}"
+        for file in files
+        for module in imports(file.read_text(encoding="utf-8"))
+        if module.partition(".")[0] in WORLD
+    }
+    assert not found
+
+
+def test_import_contracts_hold(checkout: Path) -> None:
+    tool = Path(sys.executable).with_name("lint-imports")
+    run = subprocess.run([tool, "--no-cache"], cwd=checkout, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+def test_loading_all_of_onboard_loads_nothing_of_the_ground(checkout: Path) -> None:
+    modules = [
+        ".".join(file.relative_to(checkout).with_suffix("").parts).removesuffix(".__init__")
+        for file in sorted((PACKAGE / "onboard").rglob("*.py"))
+    ]
+    assert modules
+    program = f"import importlib, sys\nfor name in {modules}: importlib.import_module(name)\nprint(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], cwd=checkout, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    loaded = run.stdout.split()
+    assert not {name for name in loaded if name.partition(".")[0] in GROUND_ONLY or name.startswith("rtshcua.ground")}
+
+
+def test_exhaustive_contract_names_every_part(checkout: Path) -> None:
+    config = tomllib.loads((checkout / "pyproject.toml").read_text(encoding="utf-8"))
+    (layers,) = [c for c in config["tool"]["importlinter"]["contracts"] if c["type"] == "layers"]
+    assert layers["exhaustive"]
+    assert "exhaustive_ignores" not in layers
+    assert "ignore_imports" not in layers

@@ -1,0 +1,29 @@
+"""docs/paper-map.md names only what exists, and leaves out nothing of an invocation or a contract."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.mission import Invocation
+
+ROOT = Path(__file__).parents[2]
+ROW = re.compile(r"^\|(?:[^|]*\|)? `([A-Z][\w.]*)` \| `(rtshcua/[\w/]+\.py)` \|", re.MULTILINE)
+ROWS = ROW.findall((ROOT / "docs" / "paper-map.md").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("name", "file"), ROWS, ids=[name for name, _ in ROWS])
+def test_every_name_exists_in_its_file(name: str, file: str) -> None:
+    module = importlib.import_module(file.removesuffix(".py").replace("/", "."))
+    owner, _, field = name.partition(".")
+    cls = getattr(module, owner)
+    assert cls.__module__ == module.__name__
+    assert not field or field in cls.__struct_fields__
+
+
+@pytest.mark.parametrize("cls", [Invocation, Contract])
+def test_every_field_is_on_the_map(cls: type) -> None:
+    mapped = {name for name, _ in ROWS}
+    assert {f"{cls.__name__}.{field}" for field in cls.__struct_fields__} <= mapped

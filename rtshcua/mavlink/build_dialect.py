@@ -1,0 +1,53 @@
+"""Derives `dialect.json` from pymavlink: `python -m rtshcua.mavlink.build_dialect` writes it anew.
+
+A test compares the shipped table with a fresh one, so that a new pymavlink cannot change the dialect unseen.
+"""
+
+import json
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega
+
+from rtshcua.mavlink.dialect import TABLE
+
+COMMAND = "python -m rtshcua.mavlink.build_dialect"
+
+
+def build_table() -> dict[str, dict[str, Any]]:
+    """The table, by introspection of the generated module.
+
+    `messages`: name -> [number, {field: [type, array length, unit, enumeration]}]; `enums`: name -> {entry: value}.
+    """
+    messages = {kind.msgname: [number, _fields(kind)] for number, kind in sorted(ardupilotmega.mavlink_map.items())}
+    enums = {
+        name: {entry.name: value for value, entry in sorted(entries.items()) if not _is_end(name, entry.name)}
+        for name, entries in sorted(ardupilotmega.enums.items())
+    }
+    return {"messages": messages, "enums": enums}
+
+
+def _fields(kind: Any) -> dict[str, list[Any]]:
+    # Types are listed in the order of the XML, array lengths in the order of the wire.
+    lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
+    return {
+        name: [type_, lengths[name], kind.fieldunits_by_name.get(name, ""), kind.fieldenums_by_name.get(name)]
+        for name, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+    }
+
+
+def _is_end(enum: str, entry: str) -> bool:
+    """Whether the entry is the end mark that the generator appends to each enumeration."""
+    return entry == f"{enum}_ENUM_END"
+
+
+def render(table: dict[str, dict[str, Any]]) -> str:
+    """The table's text: JSON, one message or enumeration a line, so that a change shows as one."""
+    sections = []
+    for section, rows in table.items():
+        lines = ",\n".join(f"{json.dumps(name)}:{json.dumps(row, separators=(',', ':'))}" for name, row in rows.items())
+        sections.append(f"{json.dumps(section)}:{{\n{lines}\n}}")
+    return "{" + ",\n".join(sections) + "}\n"
+
+
+if __name__ == "__main__":
+    TABLE.write_text(render(build_table()), encoding="utf-8")

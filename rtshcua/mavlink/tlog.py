@@ -1,0 +1,46 @@
+"""The tlog format: for each frame, 8 bytes big-endian microseconds since the epoch, then the raw MAVLink 2 frame."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rtshcua.mavlink.framing import HEADER, MARKER, frame_length
+
+STAMP = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A frame and when it was received, in microseconds since the Unix epoch."""
+
+    at_us: int
+    frame: bytes
+
+
+class DamagedTlog(ValueError):
+    """What begins at `offset` is no whole entry: the file was cut there, or is no tlog."""
+
+    def __init__(self, offset: int) -> None:
+        super().__init__(f"no whole tlog entry at byte {offset}")
+        self.offset = offset
+
+
+def encode(at_us: int, frame: bytes) -> bytes:
+    """The bytes of one entry."""
+    return at_us.to_bytes(STAMP, "big") + frame
+
+
+def read(data: bytes) -> Iterator[Entry]:
+    """The entries of a tlog, in order. Frames are not checked, only measured.
+
+    Raises `DamagedTlog` when it comes to bytes that are no whole entry, after yielding all before them.
+    """
+    offset = 0
+    while offset < len(data):
+        start = offset + STAMP
+        if len(data) < start + HEADER or data[start] != MARKER:
+            raise DamagedTlog(offset)
+        end = start + frame_length(data, start)
+        if len(data) < end:
+            raise DamagedTlog(offset)
+        yield Entry(int.from_bytes(data[offset:start], "big"), data[start:end])
+        offset = end

@@ -1,0 +1,1 @@
+"""What ArduCopter does its own way. Each file has a twin in `px4`."""

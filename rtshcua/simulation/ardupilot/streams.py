@@ -1,0 +1,70 @@
+"""What ArduCopter streams: nothing but the heartbeat until it is asked."""
+
+from collections.abc import Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.autopilot import Autopilot, Builder
+from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS
+
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+_VERSION = 4 << 24 | 7 << 16
+
+
+def _extended_sys_state(a: Autopilot) -> Message:
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_MC, a.vehicle.landed)
+
+
+def _ekf_status_report(a: Autopilot) -> Message | None:
+    if not a.sensors.booted:
+        return None
+    flags = GOOD_FLAGS if a.sensors.has_position else LOST_FLAGS
+    return mavlink.MAVLink_ekf_status_report_message(flags, 0.008, 0.005, 0.001, 0.006, 0.0)
+
+
+def _wind(a: Autopilot) -> Message | None:
+    if not a.sensors.booted:
+        return None
+    return mavlink.MAVLink_wind_message(a.air.from_degrees, a.air.speed, 0.0)
+
+
+def _autopilot_version(_: Autopilot) -> Message:
+    zeros = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0)
+
+
+BUILDERS: Mapping[int, Builder] = COMMON | {
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_sys_state,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status_report,
+    mavlink.MAVLINK_MSG_ID_WIND: _wind,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
+}
+
+DEFAULT: Mapping[int, int] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000}
+"""The streams that run from boot, and their intervals in microseconds."""
+
+_GROUPS: dict[int, tuple[int, ...]] = {
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+    ),
+    mavlink.MAV_DATA_STREAM_POSITION: (mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,),
+    mavlink.MAV_DATA_STREAM_EXTRA1: (mavlink.MAVLINK_MSG_ID_ATTITUDE,),
+    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD,),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+        mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        mavlink.MAVLINK_MSG_ID_WIND,
+    ),
+}
+GROUPS: Mapping[int, tuple[int, ...]] = _GROUPS | {
+    mavlink.MAV_DATA_STREAM_ALL: tuple(number for group in _GROUPS.values() for number in group)
+}
+"""The messages of each group that REQUEST_DATA_STREAM names. EXTENDED_SYS_STATE is in none, as on the real one."""

@@ -1,0 +1,44 @@
+"""COMMAND_LONG and COMMAND_INT, brought to one form."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+from rtshcua.mavlink.frames import Message, Received
+
+UNSET_INT = 2**31 - 1
+"""In COMMAND_INT, an x or y that means nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command: parameters 1 to 4, the place in 1e-7 degree (None if not given), the altitude in metres (or NaN)."""
+
+    number: int
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    latitude: float | None
+    longitude: float | None
+    altitude: float
+    frame: int | None
+    """The frame of COMMAND_INT (MAV_FRAME); COMMAND_LONG has none."""
+    sender: tuple[int, int]
+
+
+def from_message(received: Received) -> Command:
+    """The command in a COMMAND_LONG or COMMAND_INT."""
+    m: Message = received.message
+    sender = (received.system, received.component)
+    if received.name == "COMMAND_INT":
+        x = None if m.x == UNSET_INT else float(m.x)
+        y = None if m.y == UNSET_INT else float(m.y)
+        return Command(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.frame, sender)
+    x = m.param5 * 1e7 if isfinite(m.param5) else None
+    y = m.param6 * 1e7 if isfinite(m.param6) else None
+    return Command(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.param7, None, sender)
+
+
+def whole(value: float) -> int:
+    """A parameter that holds an integer; -1, which is no id, mode or flag, if it holds none."""
+    return int(value) if isfinite(value) and abs(value) < 2**53 else -1

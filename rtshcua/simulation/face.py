@@ -1,0 +1,146 @@
+"""The vehicle's MAVLink face: frames in, frames out."""
+
+from collections.abc import Callable, Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Codec, Message, Received
+from rtshcua.simulation.autopilot import Autopilot
+from rtshcua.simulation.command import from_message
+from rtshcua.simulation.command_rules import UNSUPPORTED
+from rtshcua.simulation.telemetry import radio_status
+
+COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
+RADIO = mavlink.MAV_COMP_ID_TELEMETRY_RADIO
+_RADIO_INTERVAL_US = 1_000_000
+
+
+class Face:
+    """Answers for an autopilot as (system, 1), and for its radio as (system, 68)."""
+
+    def __init__(self, autopilot: Autopilot, system: int) -> None:
+        self._autopilot = autopilot
+        self._system = system
+        self._codec = Codec(system, COMPONENT)
+        self._radio = Codec(system, RADIO)
+        self._radio_due_us = 0
+
+    @property
+    def damaged(self) -> int:
+        """How many stretches of bytes came that were no good frame."""
+        return self._codec.damaged
+
+    def handle(self, datagram: bytes) -> list[bytes]:
+        """Obeys what a datagram holds; the frames that answer it. Never raises, whatever the bytes."""
+        for received in self._codec.parse(datagram):
+            handler = _HANDLERS.get(received.name)
+            if handler is not None and self._is_for_me(received.message):
+                handler(self._autopilot, received)
+        return self._collect()
+
+    def due(self) -> list[bytes]:
+        """The frames to send now: streams that are due, and what happened since."""
+        autopilot = self._autopilot
+        for number in autopilot.streams.due(autopilot.now_us):
+            autopilot.send(autopilot.flavour.builders[number](autopilot))
+        frames = self._collect()
+        if autopilot.now_us >= self._radio_due_us:
+            self._radio_due_us = autopilot.now_us + _RADIO_INTERVAL_US
+            frames.append(self._radio.pack(radio_status(autopilot)))
+        return frames
+
+    def _is_for_me(self, message: Message) -> bool:
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self._system) and component in (0, COMPONENT)
+
+    def _collect(self) -> list[bytes]:
+        outbox = self._autopilot.outbox
+        frames = [self._codec.pack(message) for message in outbox]
+        outbox.clear()
+        return frames
+
+
+def _heartbeat(a: Autopilot, received: Received) -> None:
+    if received.message.type == mavlink.MAV_TYPE_GCS:
+        a.ground_station_seen = True
+
+
+def _command(a: Autopilot, received: Received) -> None:
+    command = from_message(received)
+    handle = a.flavour.commands.get(command.number)
+    results = (UNSUPPORTED,) if handle is None else handle(a, command)
+    _acknowledge(a, received, command.number, results)
+
+
+def _set_mode(a: Autopilot, received: Received) -> None:
+    results = a.flavour.on_set_mode(a, received.message.custom_mode)
+    _acknowledge(a, received, mavlink.MAVLINK_MSG_ID_SET_MODE, results)
+
+
+def _acknowledge(a: Autopilot, received: Received, command: int, results: tuple[int, ...]) -> None:
+    for result in results:
+        a.send(mavlink.MAVLink_command_ack_message(command, result, 0, 0, received.system, received.component))
+
+
+def _position_target(a: Autopilot, received: Received) -> None:
+    a.flavour.on_position_target(a, received.message)
+
+
+def _data_stream(a: Autopilot, received: Received) -> None:
+    m = received.message
+    a.flavour.on_data_stream(a, m.req_stream_id, m.req_message_rate if m.start_stop else 0)
+
+
+def _param_read(a: Autopilot, received: Received) -> None:
+    a.send(a.parameters.read(received.message.param_id, received.message.param_index))
+
+
+def _param_list(a: Autopilot, _: Received) -> None:
+    for message in a.parameters.all():
+        a.send(message)
+
+
+def _param_set(a: Autopilot, received: Received) -> None:
+    m = received.message
+    a.send(a.parameters.write(m.param_id, m.param_value, m.param_type))
+
+
+def _timesync(a: Autopilot, received: Received) -> None:
+    if received.message.tc1 == 0:
+        a.send(mavlink.MAVLink_timesync_message(a.now_us * 1000, received.message.ts1))
+
+
+def _ping(a: Autopilot, received: Received) -> None:
+    m = received.message
+    if m.target_system == 0:
+        a.send(mavlink.MAVLink_ping_message(m.time_usec, m.seq, received.system, received.component))
+
+
+def _mission_list(a: Autopilot, received: Received) -> None:
+    """This vehicle keeps no mission, no fence and no rally points: it says at once that there are none."""
+    kind = received.message.mission_type
+    a.send(mavlink.MAVLink_mission_count_message(received.system, received.component, 0, kind))
+
+
+def _mission_upload(a: Autopilot, received: Received) -> None:
+    kind = received.message.mission_type
+    result = mavlink.MAV_MISSION_UNSUPPORTED
+    a.send(mavlink.MAVLink_mission_ack_message(received.system, received.component, result, kind))
+
+
+_HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
+    "HEARTBEAT": _heartbeat,
+    "COMMAND_LONG": _command,
+    "COMMAND_INT": _command,
+    "SET_MODE": _set_mode,
+    "SET_POSITION_TARGET_GLOBAL_INT": _position_target,
+    "REQUEST_DATA_STREAM": _data_stream,
+    "PARAM_REQUEST_READ": _param_read,
+    "PARAM_REQUEST_LIST": _param_list,
+    "PARAM_SET": _param_set,
+    "TIMESYNC": _timesync,
+    "PING": _ping,
+    "MISSION_REQUEST_LIST": _mission_list,
+    "MISSION_COUNT": _mission_upload,
+}

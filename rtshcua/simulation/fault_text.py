@@ -1,0 +1,84 @@
+"""Faults as a command line writes them: `wind,at=20s,speed=12m/s,from=270deg`."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields
+from decimal import Decimal
+from typing import Any
+
+from rtshcua.simulation.faults import (
+    BatteryLevel,
+    Fault,
+    GpsJump,
+    GpsLoss,
+    LinkDelay,
+    LinkLoss,
+    LinkQuality,
+    LinkSilence,
+    Obstacle,
+    PilotMode,
+    WindStep,
+)
+from rtshcua.simulation.modes import Mode
+
+KINDS: Mapping[str, type[Fault]] = {
+    "battery": BatteryLevel,
+    "gps-loss": GpsLoss,
+    "gps-jump": GpsJump,
+    "wind": WindStep,
+    "link-delay": LinkDelay,
+    "link-loss": LinkLoss,
+    "link-silence": LinkSilence,
+    "link-quality": LinkQuality,
+    "obstacle": Obstacle,
+    "pilot": PilotMode,
+}
+
+# How a field's name ends tells its unit; what may be written, and how many of the field's unit it is.
+_UNITS: tuple[tuple[str, Mapping[str, int]], ...] = (
+    ("_us", {"us": 1, "ms": 1000, "s": 1_000_000, "min": 60_000_000}),
+    ("_mm_s", {"mm/s": 1, "m/s": 1000}),
+    ("_mm", {"mm": 1, "m": 1000}),
+    ("_deg", {"deg": 1}),
+    ("", {"%": 100}),
+)
+_QUANTITY = re.compile(r"(-?\d+(?:\.\d+)?)(\D*)", re.ASCII)
+
+
+def parse_fault(text: str) -> Fault:
+    """The fault that a text describes. Raises ValueError, with a message for a person, if it describes none."""
+    name, *pairs = text.split(",")
+    kind = KINDS.get(name)
+    if kind is None:
+        raise ValueError(f"no such fault: `{name}`; there are {', '.join(KINDS)}")
+    known = {_key(field): field for field in fields(kind)}
+    values: dict[str, Any] = {}
+    for pair in pairs:
+        key, _, value = pair.partition("=")
+        if key not in known:
+            raise ValueError(f"`{name}` has no `{key}`; it takes {', '.join(known)}")
+        values[known[key].name] = _value(known[key], value)
+    missing = [key for key, field in known.items() if field.default is MISSING and field.name not in values]
+    if missing:
+        raise ValueError(f"`{name}` needs {', '.join(missing)}")
+    return kind(**values)
+
+
+def _suffix(field: Field[Any]) -> tuple[str, Mapping[str, int]]:
+    return next(unit for unit in _UNITS if field.name.endswith(unit[0]))
+
+
+def _key(field: Field[Any]) -> str:
+    return field.name.removesuffix(_suffix(field)[0])
+
+
+def _value(field: Field[Any], text: str) -> int | Mode:
+    if field.name == "mode":
+        if text not in {mode.value for mode in Mode}:
+            raise ValueError(f"no such mode: `{text}`; there are {', '.join(Mode)}")
+        return Mode(text)
+    match = _QUANTITY.fullmatch(text)
+    units = _suffix(field)[1]
+    if match is None or match[2] not in units:
+        raise ValueError(f"`{_key(field)}` is a number with its unit ({', '.join(units)}), not `{text}`")
+    return round(Decimal(match[1]) * units[match[2]])

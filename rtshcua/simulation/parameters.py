@@ -1,0 +1,77 @@
+"""The few parameters that the simulated vehicle has, and how each flavour puts integers on the wire."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.vehicle import Handling
+
+_LEAST = 0.1
+"""No speed or height is set lower than this: the model has no vehicle that stands still in the air or dives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter: its type, and what it sets in `Handling`, if anything, in how many parts of a metre or second."""
+
+    name: str
+    integer: bool = False
+    attribute: str | None = None
+    scale: int = 1
+    value: float = 0.0
+    """What it is if it sets nothing."""
+
+
+class Parameters:
+    """The parameters of one vehicle. `bytewise`: integers travel as their bytes in the float, else cast to float."""
+
+    def __init__(self, table: tuple[Parameter, ...], handling: Handling, bytewise: bool) -> None:
+        self._table = {parameter.name: parameter for parameter in table}
+        self._names = [parameter.name for parameter in table]
+        self._handling = handling
+        self._bytewise = bytewise
+        self._values = {
+            parameter.name: parameter.value
+            if parameter.attribute is None
+            else getattr(handling, parameter.attribute) * parameter.scale
+            for parameter in table
+        }
+
+    def all(self) -> Iterator[Message]:
+        """PARAM_VALUE of each."""
+        return (self._message(name) for name in self._names)
+
+    def read(self, name: str, index: int) -> Message | None:
+        """PARAM_VALUE of the one at `index`, or of that name if `index` is -1; None if there is none."""
+        if index >= 0:
+            name = self._names[index] if index < len(self._names) else ""
+        return self._message(name) if name in self._table else None
+
+    def write(self, name: str, raw: float, type_: int) -> Message | None:
+        """Sets one, and gives PARAM_VALUE with what it is now; None if there is none of that name."""
+        parameter = self._table.get(name)
+        if parameter is None:
+            return None
+        value = self._decode(raw, type_)
+        if value == value and abs(value) < 1e9:  # NaN and nonsense change nothing
+            self._values[name] = float(round(value)) if parameter.integer else value
+            if parameter.attribute is not None:
+                setattr(self._handling, parameter.attribute, max(_LEAST, self._values[name] / parameter.scale))
+        return self._message(name)
+
+    def _decode(self, raw: float, type_: int) -> float:
+        if self._bytewise and type_ == mavlink.MAV_PARAM_TYPE_INT32:
+            return float(struct.unpack("<i", struct.pack("<f", raw))[0])
+        return raw
+
+    def _message(self, name: str) -> Message:
+        value, parameter = self._values[name], self._table[name]
+        type_ = mavlink.MAV_PARAM_TYPE_INT32 if parameter.integer else mavlink.MAV_PARAM_TYPE_REAL32
+        if parameter.integer and self._bytewise:
+            value = struct.unpack("<f", struct.pack("<i", int(value)))[0]
+        return mavlink.MAVLink_param_value_message(
+            name.encode(), value, type_, len(self._names), self._names.index(name)
+        )

@@ -1,0 +1,38 @@
+"""Where things are: local metres around home, and latitude and longitude in 1e-7 degree (WGS 84)."""
+
+from dataclasses import dataclass
+from math import cos, pi, radians
+
+_METRES_PER_E7 = 6_378_137 * pi / 180e7
+"""Metres of one 1e-7 degree of latitude, on a sphere of the equatorial radius: 0.5 % off at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Metres north, east and up of home."""
+
+    north: float
+    east: float
+    up: float
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Where the vehicle starts: degrees times 1e7, and millimetres above mean sea level."""
+
+    latitude: int
+    longitude: int
+    amsl_mm: int
+
+    def local(self, latitude: float, longitude: float) -> tuple[float, float]:
+        """Metres north and east of home; the plane is tangent at home, good for some kilometres."""
+        north = (latitude - self.latitude) * _METRES_PER_E7
+        return north, (longitude - self.longitude) * _METRES_PER_E7 * self._shrink()
+
+    def globe(self, north: float, east: float) -> tuple[int, int]:
+        """Latitude and longitude in 1e-7 degree: the inverse of `local`."""
+        latitude = self.latitude + round(north / _METRES_PER_E7)
+        return latitude, self.longitude + round(east / _METRES_PER_E7 / self._shrink())
+
+    def _shrink(self) -> float:
+        return cos(radians(self.latitude / 1e7))

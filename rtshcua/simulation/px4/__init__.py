@@ -1,0 +1,1 @@
+"""What PX4 does its own way. Each file has a twin in `ardupilot`."""

@@ -1,0 +1,68 @@
+"""What PX4 streams: all of it on by default, at tens of hertz in sum."""
+
+from collections.abc import Mapping
+from math import nan
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.autopilot import Autopilot, Builder
+from rtshcua.simulation.telemetry import COMMON, LOST_FLAGS
+
+_GOOD_FLAGS = 0x3FF
+"""As recorded from PX4 v1.16 in good health."""
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+_VERSION = 1 << 24 | 16 << 16 | 0xFF
+
+
+def _extended_sys_state(a: Autopilot) -> Message:
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, a.vehicle.landed)
+
+
+def _estimator_status(a: Autopilot) -> Message | None:
+    if not a.sensors.booted:
+        return None
+    flags = _GOOD_FLAGS if a.sensors.has_position else LOST_FLAGS
+    return mavlink.MAVLink_estimator_status_message(a.now_us, flags, 0.06, 0.04, 0.03, 0.06, 0.005, nan, 0.3, 0.3)
+
+
+def _wind_cov(a: Autopilot) -> Message | None:
+    if not a.sensors.booted:
+        return None
+    return mavlink.MAVLink_wind_cov_message(
+        a.now_us, a.air.north, a.air.east, 0.0, 0.1, 0.0, a.home.amsl_mm / 1000 + a.vehicle.body.up, 0.5, 0.5
+    )
+
+
+def _autopilot_version(_: Autopilot) -> Message:
+    zeros = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 1, zeros, zeros, zeros, 0, 0, 1)
+
+
+BUILDERS: Mapping[int, Builder] = COMMON | {
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_sys_state,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _estimator_status,
+    mavlink.MAVLINK_MSG_ID_WIND_COV: _wind_cov,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
+}
+
+DEFAULT: Mapping[int, int] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 100_000,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: 200_000,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 200_000,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 250_000,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 500_000,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 500_000,
+    mavlink.MAVLINK_MSG_ID_WIND_COV: 500_000,
+    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: 100_000,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 2_000_000,
+}
+"""The streams that run from boot, and their intervals in microseconds."""

@@ -1,0 +1,186 @@
+"""The messages that both flavours stream, built from what the autopilot knows."""
+
+from math import atan2, degrees, hypot
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.autopilot import LOW_TO_LAND, Autopilot, Builder
+from rtshcua.simulation.sensors import RANGE_MAX_MM, RANGE_MIN_MM
+
+GOOD_FLAGS, LOST_FLAGS = 0x33F, 0x025
+"""ESTIMATOR_STATUS_FLAGS and EKF_STATUS_FLAGS share these bits: all well; only attitude and height (as recorded)."""
+
+_SENSORS = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+)
+
+
+def heartbeat(a: Autopilot) -> Message:
+    """HEARTBEAT: mode, armed or not, and state."""
+    vehicle, modes = a.vehicle, a.flavour.modes
+    base = modes.base[vehicle.mode] | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0)
+    if not a.sensors.booted:
+        status = mavlink.MAV_STATE_BOOT
+    elif vehicle.armed and (not a.sensors.has_position or a.battery.level <= LOW_TO_LAND):
+        status = mavlink.MAV_STATE_CRITICAL
+    else:
+        status = mavlink.MAV_STATE_ACTIVE if vehicle.armed else mavlink.MAV_STATE_STANDBY
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_QUADROTOR, a.flavour.autopilot, base, modes.numbers[vehicle.mode], status, 3
+    )
+
+
+def sys_status(a: Autopilot) -> Message:
+    """SYS_STATUS: which sensors are healthy, and the battery."""
+    healthy = _SENSORS
+    if not a.sensors.has_fix:
+        healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    if not a.sensors.has_position:
+        healthy &= ~mavlink.MAV_SYS_STATUS_AHRS
+    if not a.vehicle.armed and not a.ready:
+        healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    battery = a.battery
+    return mavlink.MAVLink_sys_status_message(
+        _SENSORS, _SENSORS, healthy, 250, battery.millivolts, battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
+    )
+
+
+def gps_raw_int(a: Autopilot) -> Message:
+    """GPS_RAW_INT: what the receiver measures, with its noise; the last place again while there is no fix."""
+    sensors, body = a.sensors, a.vehicle.body
+    fixed = sensors.has_fix
+    if not sensors.booted:
+        fix_type, satellites = mavlink.GPS_FIX_TYPE_NO_FIX, 0
+    elif fixed:
+        fix_type, satellites = mavlink.GPS_FIX_TYPE_3D_FIX, 10
+    else:
+        fix_type, satellites = mavlink.GPS_FIX_TYPE_NO_FIX, 3
+    point = sensors.fix(body)
+    latitude, longitude = a.home.globe(point.north, point.east)
+    amsl = a.home.amsl_mm + round(point.up * 1000)
+    speed = round(hypot(body.v_north, body.v_east) * 100)
+    course = round(degrees(atan2(body.v_east, body.v_north)) * 100) % 36_000
+    return mavlink.MAVLink_gps_raw_int_message(
+        a.now_us, fix_type, latitude, longitude, amsl, 70, 110, speed, course, satellites, amsl, 900, 1780, 400
+    )
+
+
+def global_position_int(a: Autopilot) -> Message | None:
+    """GLOBAL_POSITION_INT: the estimate. It goes on as if nothing had happened when the fix is lost, as recorded."""
+    if not a.sensors.booted:
+        return None
+    body = a.vehicle.body
+    point = a.sensors.estimate(body)
+    latitude, longitude = a.home.globe(point.north, point.east)
+    up = round(point.up * 1000)
+    return mavlink.MAVLink_global_position_int_message(
+        a.boot_ms,
+        latitude,
+        longitude,
+        a.home.amsl_mm + up,
+        up,
+        round(body.v_north * 100),
+        round(body.v_east * 100),
+        round(-body.v_up * 100),
+        round(degrees(body.yaw) * 100) % 36_000,
+    )
+
+
+def attitude(a: Autopilot) -> Message:
+    """ATTITUDE, without rates."""
+    body = a.vehicle.body
+    return mavlink.MAVLink_attitude_message(a.boot_ms, body.roll, body.pitch, body.yaw, 0.0, 0.0, 0.0)
+
+
+def vfr_hud(a: Autopilot) -> Message:
+    """VFR_HUD."""
+    body = a.vehicle.body
+    throttle = round(min(100.0, 45 * a.battery.load)) if a.vehicle.in_air else 0
+    airspeed = hypot(body.v_north - a.air.north, body.v_east - a.air.east) if a.vehicle.in_air else 0.0
+    return mavlink.MAVLink_vfr_hud_message(
+        airspeed,
+        hypot(body.v_north, body.v_east),
+        round(degrees(body.yaw)) % 360,
+        throttle,
+        a.home.amsl_mm / 1000 + body.up,
+        body.v_up,
+    )
+
+
+def battery_status(a: Autopilot) -> Message:
+    """BATTERY_STATUS of the one battery."""
+    battery = a.battery
+    if battery.level <= 0.07:
+        charge = mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    elif battery.level <= 0.15:
+        charge = mavlink.MAV_BATTERY_CHARGE_STATE_LOW
+    else:
+        charge = mavlink.MAV_BATTERY_CHARGE_STATE_OK
+    voltages = [battery.millivolts] + [65_535] * 9
+    return mavlink.MAVLink_battery_status_message(
+        0,
+        mavlink.MAV_BATTERY_FUNCTION_ALL,
+        mavlink.MAV_BATTERY_TYPE_LIPO,
+        32_767,
+        voltages,
+        battery.centiamperes,
+        round(battery.used_mah),
+        -1,
+        battery.percent,
+        0,
+        charge,
+    )
+
+
+def home_position(a: Autopilot) -> Message | None:
+    """HOME_POSITION, once there is one."""
+    if not a.sensors.booted:
+        return None
+    home = a.home
+    return mavlink.MAVLink_home_position_message(
+        home.latitude, home.longitude, home.amsl_mm, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, a.now_us
+    )
+
+
+def distance_sensor(a: Autopilot) -> Message:
+    """DISTANCE_SENSOR looking ahead; its greatest distance if nothing is there."""
+    seen = RANGE_MAX_MM if a.sensors.obstacle_mm is None else min(a.sensors.obstacle_mm, RANGE_MAX_MM)
+    return mavlink.MAVLink_distance_sensor_message(
+        a.boot_ms,
+        RANGE_MIN_MM // 10,
+        RANGE_MAX_MM // 10,
+        seen // 10,
+        mavlink.MAV_DISTANCE_SENSOR_LASER,
+        0,
+        mavlink.MAV_SENSOR_ROTATION_NONE,
+        255,
+    )
+
+
+def radio_status(a: Autopilot) -> Message:
+    """RADIO_STATUS, from the radio: signal strength of 254 when all is well, and `txbuf` as the link's quality in %."""
+    percent = a.link_quality // 100
+    rssi = 254 * percent // 100
+    return mavlink.MAVLink_radio_status_message(rssi, rssi, percent, 30, 30, 0, 0)
+
+
+COMMON: dict[int, Builder] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position_int,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: attitude,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: home_position,
+    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
+}
+"""Those that both flavours stream alike, by number."""

@@ -1,0 +1,172 @@
+"""What the simulated ArduCopter answers: the table of a recorded session with the real one (4.7.0-dev)."""
+
+from collections.abc import Callable
+from math import nan
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.simulation.modes import Mode
+
+
+@pytest.fixture
+def copter(pilot: Callable[..., Any]) -> Any:
+    return pilot("ardupilot").ready()
+
+
+@pytest.fixture
+def flying(copter: Any) -> Any:
+    copter.take_off(10)
+    return copter
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "expected"),
+    [
+        (511, (33, 200_000), [0]),
+        (511, (193, 1_000_000), [0]),
+        (511, (230, 1_000_000), [2]),  # PX4's estimator message
+        (512, (148,), [0]),
+        (512, (242,), [0]),
+        (512, (9999,), [4]),
+        (9, (), [3]),
+        (186, (12, 3), [3]),
+        (34, (10, 2), [3]),
+        (22, (0, 0, 0, 0, 0, 0, 10), [4]),  # disarmed
+        (176, (1, 99), [4]),
+        (176, (1, 5), [0]),
+        (176, (1, 17), [0]),
+        (176, (0, 5), [2]),
+        (400, (1,), [0]),
+        (400, (0,), [0]),
+        (178, (1, 3, -1), [0]),
+        (300, (), [4]),
+        (20, (), [0]),
+        (21, (), [0]),
+        (512, (nan,), [4]),
+    ],
+)
+def test_results_on_the_ground(copter: Any, command: int, params: tuple[float, ...], expected: list[int]) -> None:
+    assert copter.long(command, *params) == expected
+
+
+@pytest.mark.parametrize(
+    ("mode", "number"),
+    [(Mode.GUIDED, 4), (Mode.LOITER, 5), (Mode.RETURN, 6), (Mode.LAND, 9), (Mode.BRAKE, 17), (Mode.MANUAL, 0)],
+)
+def test_custom_modes(copter: Any, mode: Mode, number: int) -> None:
+    assert copter.mode(mode) == [0]
+    copter.wait(1)
+    assert copter.last("HEARTBEAT").custom_mode == number
+
+
+def test_arming_before_ready_fails_with_a_text(pilot: Callable[..., Any]) -> None:
+    early = pilot("ardupilot", station=False)
+    assert early.arm() == [4]
+    assert early.texts() == ["Arm: Need Position Estimate"]
+
+
+@pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN, Mode.BRAKE])
+def test_modes_that_cannot_be_armed_in(copter: Any, mode: Mode) -> None:
+    copter.mode(mode)
+    assert copter.arm() == [4]
+    assert copter.texts()[-1].endswith("mode not armable")
+
+
+def test_takeoff_in_loiter_is_accepted_and_does_nothing(copter: Any) -> None:
+    copter.mode(Mode.LOITER)
+    assert copter.arm() == [0]
+    assert copter.long(22, 0, 0, 0, 0, 0, 0, 10) == [0]
+    copter.wait(5)
+    assert not copter.truth.in_air
+
+
+@pytest.mark.parametrize(("frame", "result"), [(0, 2), (5, 2), (10, 2), (3, 0), (6, 0)])
+def test_takeoff_wants_a_relative_frame(copter: Any, frame: int, result: int) -> None:
+    copter.mode(Mode.GUIDED)
+    copter.arm()
+    assert copter.int(22, frame, [0, 0, 0, 0], 0, 0, 10) == [result]
+    copter.wait(2)
+    assert copter.truth.in_air is (result == 0)
+
+
+def test_in_the_air(flying: Any) -> None:
+    assert flying.truth.mode is Mode.GUIDED
+    assert flying.arm() == [0]
+    assert flying.long(400, 0) == [4]
+    assert flying.long(22, 0, 0, 0, 0, 0, 0, 20) == [4]
+    assert flying.long(115, 90, 20, 1) == [0]
+    assert flying.truth.armed
+
+
+@pytest.mark.parametrize(("frame", "altitude"), [(3, 12), (6, 12), (None, 12), (0, 600), (5, 600)])
+def test_reposition_honours_the_frame(flying: Any, frame: int | None, altitude: float) -> None:
+    latitude, longitude = flying.config.home.globe(20, 0)
+    up = altitude if altitude < 100 else 12.0
+    altitude = up if altitude < 100 else up + flying.config.home.amsl_mm / 1000
+    if frame is None:
+        assert flying.long(192, -1, 0, 0, 0, latitude / 1e7, longitude / 1e7, altitude) == [0]
+    else:
+        assert flying.int(192, frame, [-1, 0, 0, 0], latitude, longitude, altitude) == [0]
+    flying.wait(15)
+    assert abs(flying.truth.north_mm - 20_000) < 800
+    assert abs(flying.truth.up_mm - 12_000) < 300
+
+
+@pytest.mark.parametrize(("frame", "moves"), [(6, True), (3, True), (5, True), (10, False)])
+def test_position_target_honours_the_frame(flying: Any, frame: int, moves: bool) -> None:
+    latitude, longitude = flying.config.home.globe(20, 0)
+    altitude = 10 + flying.config.home.amsl_mm / 1000 if frame == 5 else 10
+    flying.target(latitude, longitude, altitude, frame=frame)
+    flying.wait(15)
+    assert (abs(flying.truth.north_mm - 20_000) < 300) is moves
+    assert abs(flying.truth.up_mm - 10_000) < 300
+
+
+def test_position_target_is_ignored_on_the_ground_and_outside_guided(copter: Any) -> None:
+    latitude, longitude = copter.config.home.globe(20, 0)
+    copter.mode(Mode.GUIDED)
+    copter.arm()
+    copter.target(latitude, longitude, 10)
+    copter.wait(4)
+    assert not copter.truth.in_air
+    copter.long(22, 0, 0, 0, 0, 0, 0, 10)
+    copter.wait(10)
+    copter.mode(Mode.LOITER)
+    copter.target(latitude, longitude, 10)
+    copter.wait(5)
+    assert abs(copter.truth.north_mm) < 300
+
+
+def test_pause_stops_and_brake_stops(flying: Any) -> None:
+    for stop in (lambda: flying.long(193, 0), lambda: flying.mode(Mode.BRAKE)):
+        flying.mode(Mode.GUIDED)
+        flying.go_to(flying.truth.north_mm / 1000 + 100, 0, 10)
+        flying.wait(5)
+        assert flying.truth.speed_mm_s > 4_000
+        assert stop() == [0]
+        flying.wait(5)
+        assert flying.truth.speed_mm_s < 50
+
+
+def test_set_mode_message_is_acknowledged_with_its_own_number(flying: Any) -> None:
+    answers = flying.send(mavlink.MAVLink_set_mode_message(1, 1, 9))
+    assert [(f.message.command, f.message.result) for f in answers if f.name == "COMMAND_ACK"] == [(11, 0)]
+    assert flying.truth.mode is Mode.LAND
+
+
+def test_nothing_but_the_heartbeat_and_the_radio_unasked(copter: Any) -> None:
+    assert {frame.name for frame in copter.seen} <= {"HEARTBEAT", "RADIO_STATUS"}
+
+
+def test_data_stream_request_overrides_an_interval(copter: Any) -> None:
+    def count(name: str) -> int:
+        return sum(frame.name == name for frame in copter.wait(2))
+
+    copter.long(511, 33, 50_000)
+    assert count("GLOBAL_POSITION_INT") in (40, 41)
+    copter.send(mavlink.MAVLink_request_data_stream_message(1, 1, mavlink.MAV_DATA_STREAM_ALL, 5, 1))
+    assert count("GLOBAL_POSITION_INT") in (10, 11)
+    copter.send(mavlink.MAVLink_request_data_stream_message(1, 1, mavlink.MAV_DATA_STREAM_ALL, 5, 0))
+    assert count("GLOBAL_POSITION_INT") == 0

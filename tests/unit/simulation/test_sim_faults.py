@@ -1,0 +1,212 @@
+"""Each fault, and what it shows to a client."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtshcua.simulation import faults
+from rtshcua.simulation.fault_text import parse_fault
+from rtshcua.simulation.modes import Mode
+
+S = 1_000_000
+
+
+@pytest.fixture
+def flying(pilot: Callable[..., Any], flavour: str) -> Any:
+    p = pilot(flavour)
+    for number in (24, 33, 147, 132, 231, 168, 230, 193):
+        p.long(511, number, 100_000)
+    p.take_off(20)
+    return p
+
+
+def inject(p: Any, kind: Callable[..., faults.Fault], *args: Any) -> None:
+    p.simulation.inject(kind(p.simulation.now_us, *args))
+
+
+def test_battery_level(flying: Any) -> None:
+    inject(flying, faults.BatteryLevel, 2_000)
+    flying.wait(1)
+    assert flying.last("BATTERY_STATUS").battery_remaining in (19, 20)
+    inject(flying, faults.BatteryLevel, 9_000)
+    flying.wait(1)
+    assert flying.last("BATTERY_STATUS").battery_remaining in (19, 20), "a battery does not fill"
+
+
+def test_empty_battery_lands_and_then_falls(flying: Any) -> None:
+    inject(flying, faults.BatteryLevel, 390)
+    flying.wait(1)
+    assert flying.truth.mode is Mode.LAND
+    inject(flying, faults.BatteryLevel, 0)
+    flying.wait(1)
+    assert flying.truth.climb_mm_s < -5_000
+    flying.wait(5)
+    assert flying.truth.up_mm == 0
+
+
+def test_low_battery_refuses_to_arm(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour, battery=500).ready()
+    p.mode(Mode.LOITER)
+    assert p.arm() == [1 if p.px4 else 4]
+    assert "Battery too low" in p.texts()[-1]
+
+
+def test_gps_loss_shows_at_once_and_the_autopilot_lands_later(flying: Any) -> None:
+    flying.mode(Mode.LOITER)
+    inject(flying, faults.GpsLoss)
+    flying.wait(1)
+    assert flying.last("GPS_RAW_INT").fix_type == 1
+    assert flying.truth.mode is Mode.LOITER
+    assert flying.simulation.now_us - flying.last("GLOBAL_POSITION_INT").time_boot_ms * 1000 < 200_000
+    estimator = "ESTIMATOR_STATUS" if flying.px4 else "EKF_STATUS_REPORT"
+    assert flying.last(estimator).flags & 16
+    flying.wait(8)
+    assert flying.truth.mode is Mode.LAND
+    assert not flying.last(estimator).flags & 16
+    assert flying.mode(Mode.LOITER)[-1] != 0
+    flying.until(lambda: not flying.truth.armed)
+
+
+def test_short_gps_loss_passes(flying: Any) -> None:
+    flying.mode(Mode.LOITER)
+    inject(flying, faults.GpsLoss, 2 * S)
+    flying.wait(4)
+    assert flying.last("GPS_RAW_INT").fix_type == 3
+    assert flying.truth.mode is Mode.LOITER
+
+
+def test_gps_jump_moves_the_report_and_then_the_vehicle(flying: Any) -> None:
+    before = flying.last("GLOBAL_POSITION_INT").lat
+    inject(flying, faults.GpsJump, 20_000, 0)
+    flying.wait(0.2)
+    assert flying.last("GLOBAL_POSITION_INT").lat - before > 1_500
+    flying.wait(15)
+    assert abs(flying.last("GLOBAL_POSITION_INT").lat - before) < 60
+    assert abs(flying.truth.north_mm + 20_000) < 500
+
+
+def test_wind_step_is_told_in_the_flavours_own_message(flying: Any) -> None:
+    inject(flying, faults.WindStep, 12_000, 270)
+    flying.wait(1)
+    if flying.px4:
+        assert flying.last("WIND_COV").wind_y == pytest.approx(12)  # from the west: towards the east
+        assert flying.last("WIND_COV").wind_x == pytest.approx(0, abs=1e-6)
+    else:
+        assert flying.last("WIND").speed == pytest.approx(12)
+        assert flying.last("WIND").direction == pytest.approx(-90)
+
+
+def test_a_storm_carries_it_away(flying: Any) -> None:
+    inject(flying, faults.WindStep, 25_000, 270)
+    flying.wait(10)
+    assert flying.truth.east_mm > 30_000
+
+
+def test_link_delay(flying: Any) -> None:
+    inject(flying, faults.LinkDelay, 300_000)
+    flying.wait(1)
+    assert flying.mode(Mode.LAND) == []
+    flying.wait(0.28)
+    assert flying.truth.mode is not Mode.LAND
+    flying.wait(0.04)
+    assert flying.truth.mode is Mode.LAND
+    flying.wait(0.3)
+    assert flying.last("COMMAND_ACK").result == 0
+
+
+def test_link_loss(flying: Any) -> None:
+    inject(flying, faults.LinkLoss, 4_000)
+    flying.wait(0.1)
+    received = len(flying.wait(20))
+    inject(flying, faults.LinkLoss, 0)
+    flying.wait(0.1)
+    assert 0.5 < received / len(flying.wait(20)) < 0.7
+
+
+def test_link_silence(flying: Any) -> None:
+    inject(flying, faults.LinkSilence, 5 * S)
+    flying.wait(0.1)
+    assert flying.wait(4.8) == []
+    assert flying.mode(Mode.LAND) == []
+    assert flying.wait(1)
+    assert flying.truth.mode is not Mode.LAND
+
+
+def test_link_quality_is_told_by_the_radio(flying: Any) -> None:
+    assert flying.last("RADIO_STATUS").txbuf == 100
+    inject(flying, faults.LinkQuality, 2_500)
+    flying.wait(1.1)
+    assert (flying.last("RADIO_STATUS").txbuf, flying.last("RADIO_STATUS").rssi) == (25, 63)
+    radio = next(frame for frame in flying.seen if frame.name == "RADIO_STATUS")
+    assert (radio.system, radio.component) == (1, 68)
+
+
+def test_obstacle(flying: Any) -> None:
+    assert flying.last("DISTANCE_SENSOR").current_distance == 4_000
+    inject(flying, faults.Obstacle, 3_000, 2 * S)
+    flying.wait(1)
+    assert flying.last("DISTANCE_SENSOR").current_distance == 300
+    flying.wait(2)
+    assert flying.last("DISTANCE_SENSOR").current_distance == 4_000
+
+
+def test_pilot_takes_over(flying: Any) -> None:
+    flying.go_to(100, 0, 20)
+    flying.wait(4)
+    inject(flying, faults.PilotMode)
+    flying.wait(6)
+    assert flying.last("HEARTBEAT").custom_mode == (3 << 16 if flying.px4 else 16)
+    assert flying.truth.speed_mm_s < 100
+
+
+def test_faults_from_the_configuration_happen_when_they_should(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour, faults=(faults.BatteryLevel(3 * S, 5_000), faults.BatteryLevel(2 * S, 7_000)))
+    p.wait(1.9)
+    assert p.truth.battery > 9_900
+    p.wait(0.2)
+    assert 6_900 < p.truth.battery <= 7_000
+    p.wait(1)
+    assert 4_900 < p.truth.battery <= 5_000
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("battery,at=20s,level=15%", faults.BatteryLevel(20 * S, 1_500)),
+        ("battery,at=0s,level=12.5%", faults.BatteryLevel(0, 1_250)),
+        ("gps-loss,at=1min", faults.GpsLoss(60 * S)),
+        ("gps-loss,at=10s,for=1500ms", faults.GpsLoss(10 * S, 1_500_000)),
+        ("gps-jump,at=1s,north=-20m,east=0.5m", faults.GpsJump(S, -20_000, 500)),
+        ("wind,at=20s,speed=12m/s,from=270deg", faults.WindStep(20 * S, 12_000, 270)),
+        ("wind,at=20s,speed=12m/s,gust=1.5m/s", faults.WindStep(20 * S, 12_000, 0, 1_500)),
+        ("link-delay,at=1s,delay=200ms", faults.LinkDelay(S, 200_000)),
+        ("link-loss,at=1s,loss=30%", faults.LinkLoss(S, 3_000)),
+        ("link-silence,at=1s", faults.LinkSilence(S)),
+        ("link-quality,at=1s,quality=20%", faults.LinkQuality(S, 2_000)),
+        ("obstacle,at=1s,distance=3m,for=4s", faults.Obstacle(S, 3_000, 4 * S)),
+        ("pilot,at=1s,mode=altitude", faults.PilotMode(S, Mode.ALTITUDE)),
+        ("pilot,at=1s", faults.PilotMode(S, Mode.POSITION)),
+    ],
+)
+def test_fault_texts(text: str, expected: faults.Fault) -> None:
+    assert parse_fault(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no such fault"),
+        ("rain,at=1s", "no such fault: `rain`"),
+        ("wind,at=1s", "`wind` needs speed"),
+        ("wind,at=1s,speed=12", "a number with its unit"),
+        ("wind,at=1s,speed=12km/h", "a number with its unit"),
+        ("battery,at=1s,level=5m", "a number with its unit"),
+        ("battery,when=1s,level=5%", "has no `when`"),
+        ("pilot,at=1s,mode=upside-down", "no such mode"),
+        ("battery,at=1s,level", "a number with its unit"),
+    ],
+)
+def test_bad_fault_texts(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        parse_fault(text)

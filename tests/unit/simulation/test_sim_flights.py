@@ -1,0 +1,107 @@
+"""Whole flights in virtual time, both flavours: take off, go somewhere, come home, land, disarm."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.wind import Wind
+
+
+@pytest.mark.parametrize(
+    ("north_m", "east_m", "up_m", "cruise_mm_s"),
+    [(100, 0, 20, 5_000), (-150, 200, 40, 12_000), (0, -300, 12, 8_000)],
+)
+def test_out_and_home(
+    pilot: Callable[..., Any], flavour: str, north_m: float, east_m: float, up_m: float, cruise_mm_s: int
+) -> None:
+    p = pilot(flavour, cruise_mm_s=cruise_mm_s, wind=Wind(4_000, 300, 1_000))
+    p.take_off(20)
+    assert p.truth.in_air
+    p.go_to(north_m, east_m, up_m)
+    fastest, away = 0, []
+    for _ in range(900):
+        p.wait(0.1)
+        t = p.truth
+        fastest = max(fastest, t.speed_mm_s)
+        away.append(((t.north_mm - north_m * 1000) ** 2 + (t.east_mm - east_m * 1000) ** 2) ** 0.5)
+    assert cruise_mm_s * 0.95 < fastest < cruise_mm_s * 1.1
+    assert away[-1] < 200
+    arrived = next(i for i, distance in enumerate(away) if distance < 1_000)
+    assert max(away[arrived:]) < 1_000, "it overshoots or oscillates"
+    assert all(later < earlier + 150 for earlier, later in pairwise(away)), "it strays on the way"
+    assert abs(p.truth.up_mm - up_m * 1000) < 200
+    assert p.truth.speed_mm_s < 100
+
+    assert p.mode(Mode.RETURN)[-1] == 0
+    p.until(lambda: not p.truth.armed)
+    t = p.truth
+    assert (abs(t.north_mm) < 700, abs(t.east_mm) < 700, t.up_mm) == (True, True, 0)
+    p.wait(1)
+    assert p.last("HEARTBEAT").base_mode & 128 == 0
+
+
+def test_return_climbs_first(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour)
+    p.take_off(10)
+    p.go_to(60, 0, 8)
+    p.wait(20)
+    p.mode(Mode.RETURN)
+    highest = 0
+    while p.truth.north_mm > 55_000:
+        p.wait(0.1)
+        highest = max(highest, p.truth.up_mm)
+    assert highest > (29_000 if p.px4 else 14_000)
+
+
+def test_landed_state_tells_the_parts_of_the_flight(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour)
+    p.long(511, 245, 100_000)
+    p.take_off(12)
+    p.go_to(10, 0, 12)
+    p.wait(5)
+    p.mode(Mode.LAND)
+    p.until(lambda: not p.truth.armed)
+    p.wait(0.5)
+    states = [f.message.landed_state for f in p.seen if f.name == "EXTENDED_SYS_STATE"]
+    assert [states[0]] + [b for a, b in pairwise(states) if a != b] == [1, 3, 2, 4, 1]
+
+
+def test_hold_keeps_the_place_in_wind(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour, wind=Wind(9_000, 45, 1_500))
+    p.take_off(20)
+    p.mode(Mode.LOITER)
+    p.wait(3)
+    start = p.truth
+    p.wait(30)
+    assert abs(p.truth.north_mm - start.north_mm) < 1_000
+    assert abs(p.truth.east_mm - start.east_mm) < 1_000
+
+
+def test_telemetry_agrees_with_the_truth(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour)
+    for number in (33, 24, 74):
+        p.long(511, number, 100_000)
+    p.take_off(20)
+    p.go_to(50, 30, 25)
+    p.wait(30)
+    t, position, fix = p.truth, p.last("GLOBAL_POSITION_INT"), p.last("GPS_RAW_INT")
+    assert abs(position.relative_alt - t.up_mm) < 200
+    assert position.alt - position.relative_alt == p.config.home.amsl_mm
+    assert abs(position.lat - t.latitude) < 20
+    assert abs(position.lon - t.longitude) < 20
+    assert abs(fix.alt - p.config.home.amsl_mm - t.up_mm) < 1_500
+    assert position.time_boot_ms * 1000 <= p.simulation.now_us < position.time_boot_ms * 1000 + 200_000
+
+
+def test_forced_disarm_in_the_air_is_a_fall(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour)
+    p.take_off(20)
+    assert p.long(400, 0, 21196) == [0]
+    assert not p.truth.armed
+    p.wait(1)
+    assert p.truth.climb_mm_s < -5_000
+    p.wait(5)
+    assert (p.truth.up_mm, p.truth.in_air) == (0, False)

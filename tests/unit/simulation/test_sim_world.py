@@ -1,0 +1,269 @@
+"""The simulation as a whole: the same in, the same out; and nothing that comes in stops it."""
+
+import random
+from collections.abc import Callable
+from time import process_time
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Codec
+from rtshcua.simulation import faults
+from rtshcua.simulation.config import HOME, Kind, SimulationConfig
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.place import Home
+from rtshcua.simulation.wind import Wind
+from rtshcua.simulation.world import Simulation
+
+S = 1_000_000
+
+
+def flight(kind: Kind, seed: int, steps_us: list[int]) -> tuple[list[bytes], Any]:
+    """Twenty seconds, advanced in the steps given, with two commands at fixed times."""
+    simulation = Simulation(
+        SimulationConfig(flavour=kind, seed=seed, wind=Wind(5_000, 10, 1_000), faults=(faults.LinkLoss(4 * S, 500),))
+    )
+    codec, sent, frames = Codec(255, 190), 0, []
+    commands = [
+        (2 * S, 176, (1, 4, 0)),
+        (2 * S, 400, (1, 0, 0)),
+        (3 * S, 22, (0, 0, 0, 0, 0, 0, 508 - 488 * (kind != "px4"))),
+    ]
+    at_us, step = 0, 0
+    while at_us < 20 * S:
+        target = min(20 * S, at_us + steps_us[step % len(steps_us)])
+        if sent < len(commands) and target >= commands[sent][0]:
+            target, command, params = commands[sent]
+            padded = [*params, *[0] * (7 - len(params))]
+            frames += simulation.receive(
+                codec.pack(mavlink.MAVLink_command_long_message(1, 1, command, 0, *padded)), target
+            )
+            sent += 1
+        else:
+            frames += simulation.advance(target)
+        at_us, step = target, step + 1
+    return frames, simulation.truth()
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_same_seed_same_bytes_however_time_is_cut(kind: Kind) -> None:
+    reference = flight(kind, 1, [S])
+    assert flight(kind, 1, [S]) == reference
+    assert flight(kind, 1, [20_000]) == reference
+    assert flight(kind, 1, [7_001, 333, 190_000]) == reference
+    assert reference[1].in_air
+    if kind is Kind.PX4:
+        assert flight(kind, 2, [S])[0] != reference[0]
+
+
+def test_time_does_not_go_back() -> None:
+    simulation = Simulation(SimulationConfig())
+    simulation.advance(S)
+    assert simulation.advance(S // 2) == []
+    assert simulation.now_us == S
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_first_heartbeat_comes_at_once_then_each_second(pilot: Callable[..., Any], kind: Kind) -> None:
+    p = pilot(kind.value)
+    times = []
+    for _ in range(500):
+        times += [p.simulation.now_us for frame in p.wait(0.02) if frame.name == "HEARTBEAT"]
+    assert times == [20_000, *range(S, 11 * S, S)]
+
+
+def test_stream_rates_of_px4(pilot: Callable[..., Any]) -> None:
+    p = pilot("px4").ready()
+    received = p.wait(20)
+    rates = {name: sum(f.name == name for f in received) / 20 for name in {f.name for f in received}}
+    assert rates == {
+        "HEARTBEAT": 1,
+        "SYS_STATUS": 1,
+        "GLOBAL_POSITION_INT": 10,
+        "GPS_RAW_INT": 5,
+        "ATTITUDE": 5,
+        "VFR_HUD": pytest.approx(4, abs=0.2),
+        "EXTENDED_SYS_STATE": 5,
+        "BATTERY_STATUS": 2,
+        "ESTIMATOR_STATUS": 2,
+        "WIND_COV": 2,
+        "DISTANCE_SENSOR": 10,
+        "HOME_POSITION": 0.5,
+        "RADIO_STATUS": 1,
+    }
+
+
+def test_stream_intervals(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour).ready()
+
+    def count() -> int:
+        return sum(frame.name == "GLOBAL_POSITION_INT" for frame in p.wait(2))
+
+    p.long(511, 33, 50_000)
+    assert count() in (40, 41)
+    p.long(511, 33, 70_000)
+    assert count() in (28, 29)
+    p.long(511, 33, -1)
+    assert count() == 0
+    p.long(511, 33, 0)
+    assert count() in ((20, 21) if p.px4 else (0,))
+
+
+@pytest.mark.parametrize(
+    ("system", "component", "heard"), [(1, 1, True), (1, 0, True), (0, 0, True), (2, 1, False), (1, 191, False)]
+)
+def test_only_what_is_addressed_to_it(
+    pilot: Callable[..., Any], flavour: str, system: int, component: int, heard: bool
+) -> None:
+    p = pilot(flavour).ready()
+    assert p.long(512, 148, system=system, component=component) == ([0] if heard else [])
+
+
+def test_it_runs_a_hundred_times_faster_than_real_time(pilot: Callable[..., Any]) -> None:
+    p = pilot("px4")
+    p.take_off(20)
+    start = process_time()
+    for _ in range(60 * 50):
+        p.simulation.advance(p.simulation.now_us + 20_000)
+    assert 60 / (process_time() - start) > 100
+
+
+def test_no_position_before_it_is_ready(pilot: Callable[..., Any]) -> None:
+    p = pilot("px4")
+    p.wait(0.9)
+    assert not {"GLOBAL_POSITION_INT", "HOME_POSITION", "ESTIMATOR_STATUS"} & {f.name for f in p.seen}
+    assert p.last("GPS_RAW_INT").fix_type == 1
+    prearm = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    assert not p.last("SYS_STATUS").onboard_control_sensors_health & prearm
+    p.wait(1.5)
+    assert p.last("GPS_RAW_INT").fix_type == 3
+    assert p.last("SYS_STATUS").onboard_control_sensors_health & prearm
+
+
+def test_garbage_stops_nothing(pilot: Callable[..., Any], flavour: str) -> None:
+    """Random bytes, and frames with a right checksum but random content: it answers the next command all the same."""
+    chance = random.Random(5)
+    p = pilot(flavour)
+    p.take_off(20)
+    kinds = [m for m in mavlink.mavlink_map.items() if m[1].msgname not in {"SET_MODE", "COMMAND_LONG", "COMMAND_INT"}]
+    for number in range(2_000):
+        if number % 2:
+            noise = chance.randbytes(chance.randrange(300))
+        else:
+            noise = frame_of(*chance.choice(kinds), chance.randbytes(chance.randrange(1, 256)))
+        p.take(p.simulation.receive(noise, p.simulation.now_us + 2_000))
+    assert p.simulation.damaged > 500
+    assert p.truth.in_air
+    assert p.long(512, 148) == [0]
+
+
+def test_commands_with_any_parameters_are_answered(pilot: Callable[..., Any], flavour: str) -> None:
+    chance = random.Random(6)
+    p = pilot(flavour)
+    p.take_off(20)
+    odd = [0.0, 1.0, -1.0, 6.0, 21196.0, 1e9, -1e30, 3e38, float("nan"), float("inf")]
+    for number in range(2_000):
+        command = chance.choice([*p.simulation._autopilot.flavour.commands, 16, 193, 9])
+        params = [chance.choice(odd) for _ in range(7)]
+        if number % 2:
+            assert p.long(command, *params)
+        else:
+            x, y = (chance.choice([0, 2**31 - 1, -(2**31), 473_977_400]) for _ in range(2))
+            assert p.int(command, chance.randrange(0, 22), params[:4], x, y, params[6])
+        p.wait(0.02)
+
+
+def frame_of(number: int, kind: Any, payload: bytes) -> bytes:
+    frame = bytes([0xFD, len(payload), 0, 0, 0, 1, 1]) + number.to_bytes(3, "little") + payload
+    checksum = mavlink.x25crc(frame[1:])
+    checksum.accumulate(bytes([kind.crc_extra]))
+    sealed: bytes = frame + checksum.crc.to_bytes(2, "little")
+    return sealed
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.sampled_from(list(Kind)),
+    st.lists(
+        st.tuples(
+            st.sampled_from([20, 21, 22, 400, 192, 17]),
+            st.integers(-400, 400),
+            st.integers(-400, 400),
+            st.integers(0, 100),
+        ),
+        max_size=6,
+    ),
+    st.integers(0, 15_000),
+)
+def test_whatever_it_is_told_it_stays_within_bounds_and_uses_energy(
+    kind: Kind, orders: list[tuple[int, int, int, int]], wind: int
+) -> None:
+    simulation = Simulation(SimulationConfig(flavour=kind, wind=Wind(wind, 77, wind // 10)))
+    codec = Codec(255, 190)
+    simulation.advance(2 * S)
+    last = simulation.truth()
+    px4 = kind is Kind.PX4
+    start = [(176, 0, 0, 0), (400, 0, 0, 0), (22, 0, 0, 20)]
+    for command, north, east, up in [*start, *orders]:
+        latitude, longitude = HOME.globe(north, east)
+        altitude = up + (488 if px4 else 0)
+        p1, p2 = (1, 4) if command == 176 else (-1, 1) if command == 192 else (1, 0)
+        message = mavlink.MAVLink_command_int_message(
+            1, 1, 6, command, 0, 0, p1, p2, 3, 0, latitude, longitude, altitude
+        )
+        simulation.receive(codec.pack(message), simulation.now_us)
+        for _ in range(40):
+            simulation.advance(simulation.now_us + S // 4)
+            now = simulation.truth()
+            assert now.battery <= last.battery
+            assert now.up_mm >= 0
+            assert now.up_mm <= 101_000
+            assert now.speed_mm_s <= 16_000
+            assert abs(now.climb_mm_s) <= 3_100
+            assert abs(now.north_mm) < 450_000
+            assert abs(now.east_mm) < 450_000
+            moved = ((now.north_mm - last.north_mm) ** 2 + (now.east_mm - last.east_mm) ** 2) ** 0.5
+            assert moved <= 16_000 / 4 + 10
+            assert now.in_air or now.up_mm == 0
+            last = now
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"system": 0},
+        {"battery": 10_001},
+        {"hover_us": 0},
+        {"cruise_mm_s": 13_000},
+        {"max_speed_mm_s": 20_000},
+        {"home": Home(900_000_000, 0, 0)},
+    ],
+)
+def test_impossible_configurations(bad: dict[str, Any]) -> None:
+    with pytest.raises(ValueError):
+        SimulationConfig(**bad)
+
+
+@given(
+    st.integers(-600_000_000, 600_000_000),
+    st.integers(-1_799_000_000, 1_799_000_000),
+    st.floats(-3000, 3000),
+    st.floats(-3000, 3000),
+)
+def test_places_go_there_and_back(latitude: int, longitude: int, north: float, east: float) -> None:
+    home = Home(latitude, longitude, 0)
+    back = home.local(*home.globe(north, east))
+    assert abs(back[0] - north) < 0.02
+    assert abs(back[1] - east) < 0.02
+
+
+def test_every_mode_has_a_name_and_a_base_in_both_flavours(pilot: Callable[..., Any], flavour: str) -> None:
+    table = pilot(flavour).simulation._autopilot.flavour.modes
+    assert set(table.numbers) == set(table.names)
+    assert set(table.numbers) <= set(table.base)
+    assert len(set(table.numbers.values())) == len(table.numbers)
+    assert all(table.mode(number) is mode for mode, number in table.numbers.items())
+    assert Mode.RETURN in table.numbers

@@ -1,0 +1,64 @@
+"""The binding (paper symbol `B`): one digest over everything that an invocation says and rests on.
+
+The published binding leaves out `pre`, `sc`, `f_b` and `ev`, so that they could be weakened unseen; this one covers
+every field of the invocation, its whole contract among them, and what it stands in: the policy by digest and version,
+the vehicle, and the mission.
+"""
+
+from typing import Final
+
+import msgspec
+
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.struct import Flat
+from rtshcua.wire import cbor
+from rtshcua.wire.digest import BINDING, Domain, digest
+
+#: length of an invocation's id in bytes
+ID_BYTES: Final = 16
+
+_INVOCATION: Final = Domain(b"rtshcua/invocation")
+
+
+def bind(mission: Mission, policy_digest: bytes) -> Mission:
+    """The mission under the policy of that digest, every invocation with its id and its binding.
+
+    An id depends on all that the mission says, the time of its issue and the step, so the same inputs give the same id,
+    and no other mission or time of issue gives it again.
+    """
+    blank = tuple(msgspec.structs.replace(each, invocation_id=b"", binding=b"") for each in mission.invocations)
+    mission = msgspec.structs.replace(mission, policy_digest=policy_digest, invocations=blank)
+    root = digest(_INVOCATION, _encoded(mission))
+    identified = [
+        msgspec.structs.replace(each, invocation_id=digest(_INVOCATION, cbor.encode([root, each.step]))[:ID_BYTES])
+        for each in blank
+    ]
+    bound = tuple(msgspec.structs.replace(each, binding=binding_of(mission, each)) for each in identified)
+    return msgspec.structs.replace(mission, invocations=bound)
+
+
+def binding_of(mission: Mission, invocation: Invocation) -> bytes:
+    """The binding that an invocation of this mission must carry: 32 bytes."""
+    around = [
+        mission.policy_digest,
+        mission.policy,
+        mission.policy_version,
+        mission.vehicle,
+        mission.name,
+        mission.issued_at_us,
+        list(mission.phases),
+    ]
+    own = msgspec.to_builtins(msgspec.structs.replace(invocation, binding=b""), builtin_types=(bytes,))
+    return digest(BINDING, cbor.encode([around, own]))
+
+
+def first_unbound(mission: Mission) -> int | None:
+    """The index of the first invocation whose binding is not the one it must carry, or None."""
+    for index, invocation in enumerate(mission.invocations):
+        if invocation.binding != binding_of(mission, invocation):
+            return index
+    return None
+
+
+def _encoded(part: Flat) -> bytes:
+    return cbor.encode(msgspec.to_builtins(part, builtin_types=(bytes,)))

@@ -1,0 +1,163 @@
+"""A bundle: the policy's envelope and the mission's, nested as signed bytes.
+
+Each envelope is a COSE_Sign1 around an artefact whose body is the flat form. Payloads are verified before they are
+parsed, and their digests are those of the bytes that were signed.
+"""
+
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+import msgspec
+
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.struct import Flat
+from rtshcua.wire import artefact, binding, cose, digest, names
+from rtshcua.wire.cose import Opened
+from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
+from rtshcua.wire.names import Artefact
+from rtshcua.wire.trust import TrustRoot, key_refusal, speaker_refusal
+from rtshcua.wire.untrusted import Untrusted
+
+#: a bundle larger than this is refused unread, in bytes
+MAX_BUNDLE: Final = 16 << 20
+
+_F = TypeVar("_F", bound=Flat)
+
+
+class BundleError(Untrusted):
+    """A bundle that is refused.
+
+    `too-large`, `malformed`, `wrong-policy`, `wrong-vehicle`, `key-expired`, `wrong-source`, `wrong-role`,
+    `binding-mismatch`; and, of its envelopes, the slugs of `EnvelopeError` and `ArtefactError`.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """A verified bundle: its parts, the digests that name them, and the keys that signed them."""
+
+    policy: Policy
+    mission: Mission
+    policy_digest: bytes
+    digest: bytes
+    policy_key: VerificationKey
+    mission_key: VerificationKey
+
+
+def policy_payload(policy: Policy) -> bytes:
+    """The bytes that a policy key signs."""
+    return _payload(names.POLICY, policy)
+
+
+def mission_payload(mission: Mission) -> bytes:
+    """The bytes that a mission key signs."""
+    return _payload(names.MISSION, mission)
+
+
+def policy_digest(payload: bytes) -> bytes:
+    """The name of a policy: what the mission and every binding refer to."""
+    return digest.digest(digest.POLICY, payload)
+
+
+def seal(policy: bytes, mission: bytes, *, policy_key: SigningKey, mission_key: SigningKey) -> bytes:
+    """Sign both payloads and nest them. Raises `WrongDuty` for a key of another duty."""
+    return artefact.wrap(
+        names.BUNDLE,
+        (
+            cose.sign1(policy, key=policy_key, duty=Duty.POLICY, content_type=names.POLICY.content_type),
+            cose.sign1(mission, key=mission_key, duty=Duty.MISSION, content_type=names.MISSION.content_type),
+        ),
+    )
+
+
+def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: int) -> Bundle:
+    """Verify a bundle under a trust root, for `vehicle` (None: whichever it names), at a UTC time; then parse it.
+
+    Raises `BundleError`, `EnvelopeError` and `ArtefactError`.
+    """
+    first, second = envelopes(data)
+    signed_policy = _open(first, root, Duty.POLICY, names.POLICY)
+    signed_mission = _open(second, root, Duty.MISSION, names.MISSION)
+    policy = parse(names.POLICY, signed_policy.payload, Policy)
+    mission = parse(names.MISSION, signed_mission.payload, Mission)
+    named = policy_digest(signed_policy.payload)
+    bundle = Bundle(policy, mission, named, digest.digest(digest.BUNDLE, data), signed_policy.key, signed_mission.key)
+    _check_belonging(bundle)
+    _check_entitled(bundle, policy.vehicle.identity if vehicle is None else vehicle, now_us)
+    return bundle
+
+
+def envelopes(data: bytes) -> tuple[bytes, bytes]:
+    """The policy's and the mission's envelope, unopened. Raises `BundleError` and `ArtefactError`."""
+    if len(data) > MAX_BUNDLE:
+        raise BundleError("too-large", f"a bundle of {len(data)} bytes is not read; at most {MAX_BUNDLE} are")
+    match artefact.unwrap(names.BUNDLE, data):
+        case (bytes(policy), bytes(mission)):
+            return policy, mission
+    raise BundleError("malformed", "a bundle holds two envelopes, the policy's and the mission's")
+
+
+def parse(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
+    """The flat form in a payload that was verified. Raises `BundleError` and `ArtefactError`."""
+    try:
+        flat = msgspec.convert(artefact.unwrap(kind, payload), shape, builtin_types=(bytes,))
+    except msgspec.ValidationError as error:
+        raise BundleError("malformed", f"not a `{kind.name}`: {error}") from None
+    if _payload(kind, flat) != payload:
+        raise BundleError("malformed", f"not the bytes that this `{kind.name}` encodes to")
+    return flat
+
+
+def _payload(kind: Artefact, flat: Flat) -> bytes:
+    return artefact.wrap(kind, msgspec.to_builtins(flat, builtin_types=(bytes,)))
+
+
+def _open(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact) -> Opened:
+    """All keys of the root are offered, so that one of another duty is told apart from one that nobody knows."""
+    keys = {key.kid: key for key in root.keys}
+    return cose.open1(envelope, keys=keys, duty=duty, content_type=kind.content_type)
+
+
+def _check_belonging(bundle: Bundle) -> None:
+    policy, mission = bundle.policy, bundle.mission
+    if mission.policy_digest != bundle.policy_digest:
+        raise BundleError("wrong-policy", "the mission was signed for another policy than the one beside it")
+    if (mission.policy, mission.policy_version) != (policy.name, policy.version):
+        raise BundleError(
+            "wrong-policy",
+            f"the mission is for `{mission.policy}@{mission.policy_version}`, the policy is "
+            f"`{policy.name}@{policy.version}`",
+        )
+    if mission.vehicle != policy.vehicle.identity:
+        raise BundleError(
+            "wrong-vehicle", f"the mission is for `{mission.vehicle}`, the policy for `{policy.vehicle.identity}`"
+        )
+    unbound = binding.first_unbound(mission)
+    if unbound is not None:
+        raise BundleError("binding-mismatch", f"the binding of step {unbound} is not the one over its fields")
+
+
+def _check_entitled(bundle: Bundle, vehicle: str, now_us: int) -> None:
+    identity = bundle.policy.vehicle.identity
+    if identity != vehicle:
+        raise BundleError("wrong-vehicle", f"the bundle is for `{identity}`, this vehicle is `{vehicle}`")
+    refusal = key_refusal(bundle.policy_key, vehicle=vehicle, now_us=now_us)
+    if refusal:
+        raise BundleError(refusal, f"the policy's key {bundle.policy_key.kid.hex()} may not speak for `{vehicle}` now")
+    for invocation in bundle.mission.invocations:
+        role, source = _speaker(bundle.policy, invocation)
+        refusal = speaker_refusal(bundle.mission_key, role=role, source=source, vehicle=vehicle, now_us=now_us)
+        if refusal:
+            kid = bundle.mission_key.kid.hex()
+            raise BundleError(
+                refusal, f"the mission's key {kid} may not speak for role `{role}` through `{source}` on `{vehicle}`"
+            )
+
+
+def _speaker(policy: Policy, invocation: Invocation) -> tuple[str, str]:
+    """The names of an invocation's role and source."""
+    if not 0 <= invocation.role < len(policy.roles) or invocation.source not in SourceKind._value2member_map_:
+        raise BundleError("malformed", f"step {invocation.step} has no role or source that the policy knows")
+    return policy.roles[invocation.role], SourceKind(invocation.source).name.lower()

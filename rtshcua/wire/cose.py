@@ -1,0 +1,114 @@
+"""Signed envelopes: COSE_Sign1 (RFC 9052, sections 4.2 and 4.4) with Ed25519, and nothing optional.
+
+The algorithm is Ed25519 (-19, RFC 9864) and not EdDSA (-8), which that RFC deprecates for not saying which curve. The
+external data that is signed along is the duty's label: a signature made for one duty verifies for no other. Signed
+bytes stay opaque: they are verified before anyone parses them, and never made anew.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from rtshcua.wire import cbor
+from rtshcua.wire.cbor import CborError
+from rtshcua.wire.keys import KID_BYTES, Duty, SigningKey, VerificationKey
+from rtshcua.wire.untrusted import Untrusted
+
+#: COSE algorithm Ed25519 (RFC 9864, section 2.2)
+ED25519: Final = -19
+
+_TAG_18: Final = b"\xd2"  # COSE_Sign1
+_ALGORITHM, _CONTENT_TYPE, _KID = 1, 3, 4  # header labels (RFC 9052, section 3.1)
+_SIGNATURE_BYTES: Final = 64
+
+
+class EnvelopeError(Untrusted):
+    """An envelope that is refused: `malformed`, `wrong-content-type`, `unknown-key`, `wrong-duty`, `bad-signature`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A verified payload, as it was signed, and the key that signed it."""
+
+    payload: bytes
+    key: VerificationKey
+
+    @property
+    def kid(self) -> bytes:
+        """The signer's name."""
+        return self.key.kid
+
+
+@dataclass(frozen=True, slots=True)
+class Unverified:
+    """What an envelope claims. Nothing of it is to be trusted; it is for showing, and for finding the key."""
+
+    protected: bytes
+    content_type: str
+    kid: bytes
+    payload: bytes
+    signature: bytes
+
+
+def sign1(payload: bytes, *, key: SigningKey, duty: Duty, content_type: str) -> bytes:
+    """An envelope around `payload`. Raises `WrongDuty` unless `duty` is the key's."""
+    protected = cbor.encode({_ALGORITHM: ED25519, _CONTENT_TYPE: content_type, _KID: key.kid})
+    signature = key.sign(_signed(protected, duty, payload), duty=duty)
+    return _TAG_18 + cbor.encode((protected, {}, payload, signature))
+
+
+def open1(
+    envelope: bytes, *, keys: Mapping[bytes, VerificationKey], duty: Duty, content_type: str, limit: int = cbor.LIMIT
+) -> Opened:
+    """The payload, if a key among `keys` (by `kid`) that has this duty signed it. Raises `EnvelopeError`.
+
+    Neither expiry nor what the key may speak for is looked at: see `trust.key_refusal` and `trust.speaker_refusal`.
+    """
+    claimed = unverified(envelope, limit=limit)
+    if claimed.content_type != content_type:
+        raise EnvelopeError(
+            "wrong-content-type", f"the envelope holds `{claimed.content_type[:80]}`, not `{content_type}`"
+        )
+    key = keys.get(claimed.kid)
+    if key is None or key.kid != claimed.kid:
+        raise EnvelopeError("unknown-key", f"key {claimed.kid.hex()} is not trusted here")
+    if key.duty is not duty:
+        raise EnvelopeError("wrong-duty", f"key {key.kid.hex()} is trusted for `{key.duty}`, not for `{duty}`")
+    if not key.verify(claimed.signature, _signed(claimed.protected, duty, claimed.payload)):
+        raise EnvelopeError("bad-signature", f"key {key.kid.hex()} did not sign these bytes for `{duty}`")
+    return Opened(claimed.payload, key)
+
+
+def unverified(envelope: bytes, *, limit: int = cbor.LIMIT) -> Unverified:
+    """Take an envelope apart without trusting it. Raises `EnvelopeError` (`malformed`) unless it is canonical."""
+    if envelope[:1] != _TAG_18:
+        raise EnvelopeError("malformed", "not a signed envelope: COSE_Sign1 begins with tag 18")
+    match _decode(envelope[1:], limit):
+        case (bytes(protected), {**unprotected}, bytes(payload), bytes(signature)) if (
+            not unprotected and len(signature) == _SIGNATURE_BYTES
+        ):
+            content_type, kid = _headers(protected)
+            return Unverified(protected, content_type, kid, payload, signature)
+    raise EnvelopeError("malformed", "not the four parts of a COSE_Sign1 with a 64-byte signature")
+
+
+def _headers(protected: bytes) -> tuple[str, bytes]:
+    match _decode(protected, len(protected)):
+        case {1: int(algorithm), 3: str(content_type), 4: bytes(kid), **others} if not others:
+            if algorithm != ED25519:
+                raise EnvelopeError("malformed", f"signature algorithm {algorithm} is not Ed25519 ({ED25519})")
+            if len(kid) == KID_BYTES:
+                return content_type, kid
+    raise EnvelopeError("malformed", "the protected header is not algorithm, content type and key identifier")
+
+
+def _signed(protected: bytes, duty: Duty, payload: bytes) -> bytes:
+    """The Sig_structure (RFC 9052, section 4.4)."""
+    return cbor.encode(("Signature1", protected, duty.label, payload))
+
+
+def _decode(data: bytes, limit: int) -> cbor.Value:
+    try:
+        return cbor.decode(data, limit=limit)
+    except CborError as error:
+        raise EnvelopeError("malformed", f"not canonical CBOR: {error}") from None

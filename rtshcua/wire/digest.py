@@ -1,0 +1,23 @@
+"""SHA-256 with domain separation: a digest of one kind of thing is never a digest of another."""
+
+from hashlib import sha256
+from typing import Final, NewType
+
+#: what a digest is over; a label holds no NUL, so that label and data cannot run into each other
+Domain = NewType("Domain", bytes)
+
+POLICY: Final = Domain(b"rtshcua/policy")  # the payload of a policy envelope
+MISSION: Final = Domain(b"rtshcua/mission")  # the payload of a mission envelope
+BUNDLE: Final = Domain(b"rtshcua/bundle")  # a whole bundle
+BINDING: Final = Domain(b"rtshcua/binding")  # paper symbol `B`: an invocation and all that it rests on
+CONTRACT: Final = Domain(b"rtshcua/contract")  # one skill contract
+ROOT: Final = Domain(b"rtshcua/root")  # the payload of a trust root
+KEY: Final = Domain(b"rtshcua/key")  # a duty and a public key
+
+#: length of a digest in bytes
+DIGEST_BYTES: Final = 32
+
+
+def digest(domain: Domain, data: bytes) -> bytes:
+    """SHA-256 over label, 0x00 and data: 32 bytes."""
+    return sha256(domain + b"\0" + data).digest()

@@ -1,0 +1,118 @@
+"""Ed25519 keys (RFC 8032), each bound to one duty."""
+
+from dataclasses import dataclass, field
+from typing import Final, Self
+
+import msgspec
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.wire import digest
+from rtshcua.wire.duty import Duty
+from rtshcua.wire.untrusted import Untrusted
+
+__all__ = ["ANY", "KID_BYTES", "Duty", "SigningKey", "VerificationKey", "WrongDuty", "key_id"]
+
+#: length of a key identifier, a public key and a seed in bytes
+KID_BYTES: Final = 16
+PUBLIC_BYTES: Final = 32
+SEED_BYTES: Final = 32
+
+#: stands for every role or every vehicle; a source is always named
+ANY: Final = "*"
+
+_SOURCES: Final = frozenset(kind.name.lower() for kind in SourceKind)
+
+
+class WrongDuty(Untrusted):
+    """A key asked to do what another duty is for; `slug` is `wrong-duty`."""
+
+    def __init__(self, has: Duty, asked: Duty) -> None:
+        super().__init__("wrong-duty", f"the key is for `{has}`, not for `{asked}`")
+        self.has = has
+        self.asked = asked
+
+
+def key_id(duty: Duty, public: bytes) -> bytes:
+    """The name of a key, 16 bytes: it depends on the duty too, so a relabelled key is a key that nobody knows."""
+    return digest.digest(digest.KEY, duty.label + b"\0" + public)[:KID_BYTES]
+
+
+class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A public key as the trust root names it.
+
+    `roles`, `sources` (`agent`, `operator`, ...) and `vehicles` (identities) are those that it may speak for; empty is
+    none, and `*` is every role or vehicle. `expires_us` is UTC in microseconds, None for as long as the root lives.
+    """
+
+    duty: Duty
+    public: bytes
+    roles: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
+    vehicles: tuple[str, ...] = ()
+    expires_us: int | None = None
+    development: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.public) != PUBLIC_BYTES:
+            raise ValueError(f"a public key has {PUBLIC_BYTES} bytes, not {len(self.public)}")
+        if unknown := sorted(set(self.sources) - _SOURCES):
+            raise ValueError(f"`{unknown[0]}` is not a source")
+
+    @property
+    def kid(self) -> bytes:
+        """The key's name: see `key_id`."""
+        return key_id(self.duty, self.public)
+
+    def verify(self, signature: bytes, message: bytes) -> bool:
+        """Whether this key made `signature` over exactly `message`; one with s >= L is refused (RFC 8032, 5.1.7)."""
+        try:
+            Ed25519PublicKey.from_public_bytes(self.public).verify(signature, message)
+        except InvalidSignature:
+            return False
+        return True
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SigningKey:
+    """A private key and its one duty. It never shows its secret; Python cannot promise to erase it."""
+
+    duty: Duty
+    development: bool
+    private: Ed25519PrivateKey
+    public: bytes = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "public", self.private.public_key().public_bytes_raw())
+
+    @classmethod
+    def from_seed(cls, seed: bytes, *, duty: Duty, development: bool = False) -> Self:
+        """The key of a 32-byte secret seed, which the caller draws from the system's random source."""
+        return cls(duty, development, Ed25519PrivateKey.from_private_bytes(seed))
+
+    @property
+    def kid(self) -> bytes:
+        """The key's name: see `key_id`."""
+        return key_id(self.duty, self.public)
+
+    def sign(self, message: bytes, *, duty: Duty) -> bytes:
+        """Sign `message` (64 bytes). Raises `WrongDuty` unless `duty` is this key's."""
+        if duty is not self.duty:
+            raise WrongDuty(self.duty, duty)
+        return self.private.sign(message)
+
+    def verification(
+        self,
+        *,
+        roles: tuple[str, ...] = (),
+        sources: tuple[str, ...] = (),
+        vehicles: tuple[str, ...] = (),
+        expires_us: int | None = None,
+    ) -> VerificationKey:
+        """The public half, as a trust root would name it."""
+        return VerificationKey(self.duty, self.public, roles, sources, vehicles, expires_us, self.development)
+
+    def __repr__(self) -> str:
+        mark = " development" if self.development else ""
+        return f"<{self.duty} signing key {self.kid.hex()}{mark}>"

@@ -1,0 +1,45 @@
+"""The formats: name, integer version and media type of every artefact, in one place."""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Artefact:
+    """A format. `version` is raised by any change that an older reader would misread."""
+
+    name: str
+    version: int
+    suffix: str = "+cbor"
+
+    @property
+    def content_type(self) -> str:
+        """Media type, as in the protected header of an envelope (RFC 9052, section 3.1, label 3)."""
+        return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
+
+
+ROOT: Final = Artefact("rtshcua/root", 1)
+POLICY: Final = Artefact("rtshcua/policy", 1)
+MISSION: Final = Artefact("rtshcua/mission", 1)
+BUNDLE: Final = Artefact("rtshcua/bundle", 1)
+APPROVAL: Final = Artefact("rtshcua/approval", 1)
+LOG: Final = Artefact("rtshcua/log", 1, "")  # JSON lines (RFC 8785), which have no registered suffix
+REQUEST: Final = Artefact("rtshcua/request", 1)
+RESPONSE: Final = Artefact("rtshcua/response", 1)
+PERMIT: Final = Artefact("rtshcua/permit", 1)
+DIAGNOSTICS: Final = Artefact("rtshcua/diagnostics", 1, "+json")
+MISSION_SPEC: Final = Artefact("rtshcua/mission-spec", 1, "+json")
+
+ALL: Final = (
+    ROOT,
+    POLICY,
+    MISSION,
+    BUNDLE,
+    APPROVAL,
+    LOG,
+    REQUEST,
+    RESPONSE,
+    PERMIT,
+    DIAGNOSTICS,
+    MISSION_SPEC,
+)

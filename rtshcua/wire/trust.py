@@ -1,0 +1,170 @@
+"""The trust root: which keys are trusted, for which duty, role, source and vehicle, and until when.
+
+After The Update Framework (specification 1.0, sections 2.1, 4.3 and 5.3): a root names the root keys too and is signed
+by one of them; versions only rise, one by one, and each root is signed by a key of the one before it.
+"""
+
+from typing import Final, Self
+
+import msgspec
+
+from rtshcua.wire import artefact, cose, names
+from rtshcua.wire.keys import ANY, KID_BYTES, PUBLIC_BYTES, Duty, SigningKey, VerificationKey
+from rtshcua.wire.untrusted import Untrusted
+
+#: a root larger than this is refused unread, in bytes
+MAX_ROOT: Final = 1 << 20
+
+
+class RootError(Untrusted):
+    """A trust root that is refused.
+
+    `malformed`, `unsupported-threshold`, `shared-key`, `development-key`, `not-self-signed`, `expired`, `key-expired`,
+    `unpinned`, `unknown-key`, `rollback`, `version-gap`, `development-root`.
+    """
+
+
+class Thresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How many keys of a duty must sign. Only 1 is supported; the field is there so that more never passes for one."""
+
+    root: int = 1
+    policy: int = 1
+    mission: int = 1
+    approval: int = 1
+    log: int = 1
+
+
+class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A root. `version` counts from 1; times are UTC in microseconds; a `development` root says so of itself."""
+
+    version: int
+    development: bool
+    issued_at_us: int
+    expires_at_us: int
+    keys: tuple[VerificationKey, ...]
+    thresholds: Thresholds = Thresholds()
+
+    def keys_for(self, duty: Duty) -> dict[bytes, VerificationKey]:
+        """The keys of a duty by `kid`, expired ones included: see `key_refusal`."""
+        return {key.kid: key for key in self.keys if key.duty is duty}
+
+    def encode(self) -> bytes:
+        """The payload that a root key signs."""
+        return artefact.wrap(names.ROOT, msgspec.to_builtins(self, builtin_types=(bytes,)))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> Self:
+        """A root from its payload, which says nothing about who signed it. Raises `RootError` and `ArtefactError`."""
+        try:
+            root = msgspec.convert(artefact.unwrap(names.ROOT, payload), cls, builtin_types=(bytes,))
+        except msgspec.ValidationError as error:
+            raise RootError("malformed", f"not a trust root: {error}") from None
+        if root.encode() != payload:
+            raise RootError("malformed", "not the bytes that this trust root encodes to")
+        _check(root)
+        return root
+
+    def sign(self, key: SigningKey) -> bytes:
+        """The signed root. Raises `WrongDuty`, and `RootError` for a root that nobody would accept."""
+        _check(self)
+        envelope = cose.sign1(self.encode(), key=key, duty=Duty.ROOT, content_type=names.ROOT.content_type)
+        _check_signer(self, key.kid)
+        return envelope
+
+
+def open_root(data: bytes, *, pinned: bytes | None, now_us: int) -> TrustRoot:
+    """The root in a signed envelope, if the pinned root key signed it and it has not expired.
+
+    `pinned` is the root's public key (32 bytes) or that key's `kid` (16 bytes). None trusts a development root on its
+    own word, and no other. Raises `RootError`, `ArtefactError` and `EnvelopeError`.
+    """
+    if pinned is not None and len(pinned) == PUBLIC_BYTES:
+        key = VerificationKey(Duty.ROOT, pinned)
+        return _open(data, {key.kid: key}, now_us)
+    # Nothing but the root itself holds the key: it is parsed first, by a total and strict decoder, then verified.
+    claimed = TrustRoot.decode(cose.unverified(data, limit=MAX_ROOT).payload)
+    trusted = claimed.keys_for(Duty.ROOT)
+    if pinned is None:
+        if not claimed.development:
+            raise RootError("unpinned", "a root that is not for development is trusted by a pinned key alone")
+    elif len(pinned) == KID_BYTES:
+        trusted = {kid: key for kid, key in trusted.items() if kid == pinned}
+    else:
+        raise ValueError(f"a root is pinned by {PUBLIC_BYTES} or {KID_BYTES} bytes, not {len(pinned)}")
+    return _open(data, trusted, now_us)
+
+
+def open_successor(data: bytes, *, current: TrustRoot, now_us: int) -> TrustRoot:
+    """The root that replaces `current` (which may have expired): signed by a root key of both, one version higher.
+
+    So a root key is changed in two steps: name old and new, signed by the old; then drop the old, signed by the new.
+    Raises `RootError`, `ArtefactError` and `EnvelopeError`.
+    """
+    root = _open(data, current.keys_for(Duty.ROOT), now_us)
+    if root.version <= current.version:
+        raise RootError("rollback", f"root version {root.version} does not follow version {current.version}")
+    if root.version > current.version + 1:
+        raise RootError("version-gap", f"root version {current.version + 1} is missing before {root.version}")
+    if root.development and not current.development:
+        raise RootError("development-root", "a development root may not replace one that is not")
+    return root
+
+
+def key_refusal(key: VerificationKey, *, vehicle: str, now_us: int) -> str | None:
+    """Why `key` may not speak for `vehicle` at a UTC time: `key-expired`, `wrong-vehicle`; None if it may."""
+    if key.expires_us is not None and now_us >= key.expires_us:
+        return "key-expired"
+    if vehicle not in key.vehicles and ANY not in key.vehicles:
+        return "wrong-vehicle"
+    return None
+
+
+def speaker_refusal(key: VerificationKey, *, role: str, source: str, vehicle: str, now_us: int) -> str | None:
+    """Why `key` may not speak for `role` through `source`; None if it may.
+
+    As `key_refusal`, and `wrong-source`, `wrong-role`. This is what keeps an agent's host from posing as an operator:
+    its key lists the operator's role through `agent` only.
+    """
+    if refusal := key_refusal(key, vehicle=vehicle, now_us=now_us):
+        return refusal
+    if source not in key.sources:
+        return "wrong-source"
+    if role not in key.roles and ANY not in key.roles:
+        return "wrong-role"
+    return None
+
+
+def _open(data: bytes, keys: dict[bytes, VerificationKey], now_us: int) -> TrustRoot:
+    opened = cose.open1(data, keys=keys, duty=Duty.ROOT, content_type=names.ROOT.content_type, limit=MAX_ROOT)
+    root = TrustRoot.decode(opened.payload)
+    signer = _check_signer(root, opened.kid)
+    if now_us >= root.expires_at_us:
+        raise RootError("expired", f"root version {root.version} has expired")
+    if signer.expires_us is not None and now_us >= signer.expires_us:
+        raise RootError("key-expired", f"the key that signed root version {root.version} has expired")
+    return root
+
+
+def _check_signer(root: TrustRoot, kid: bytes) -> VerificationKey:
+    signer = root.keys_for(Duty.ROOT).get(kid)
+    if signer is None:
+        raise RootError("not-self-signed", f"key {kid.hex()} is not among the root keys that this root names")
+    return signer
+
+
+def _check(root: TrustRoot) -> None:
+    """Refuse a root that contradicts itself, whoever signed it."""
+    if root.version < 1 or root.expires_at_us <= root.issued_at_us:
+        raise RootError("malformed", "a root counts its versions from 1 and expires after it was issued")
+    for duty in Duty:
+        threshold = getattr(root.thresholds, duty)
+        if threshold > 1:
+            raise RootError(
+                "unsupported-threshold", f"`{duty}` asks for {threshold} signatures; only 1 is supported so far"
+            )
+        if threshold < 1:
+            raise RootError("malformed", f"`{duty}` asks for {threshold} signatures")
+    if len({key.public for key in root.keys}) != len(root.keys):
+        raise RootError("shared-key", "one public key is named twice: a key has one duty")
+    if not root.development and any(key.development for key in root.keys):
+        raise RootError("development-key", "a root that is not for development names a development key")

@@ -1,0 +1,171 @@
+"""wire/bundle.py: what is sealed opens under the right root, for the right vehicle; everything else has its slug."""
+
+from collections.abc import Callable
+
+import msgspec
+import pytest
+
+from rtshcua.model.flat.contract import Contract, Motion, MotionKind, SourceKind, TimingClass
+from rtshcua.model.flat.mission import Invocation, Mission, Plan
+from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.zone import Projection
+from rtshcua.wire import artefact, bundle, cose, names
+from rtshcua.wire.binding import bind
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.untrusted import Untrusted
+
+HOUR = 3_600_000_000
+NOW = 1_790_000_000_000_000
+ROOT = SigningKey.from_seed(b"r" * 32, duty=Duty.ROOT)
+POLICY = SigningKey.from_seed(b"p" * 32, duty=Duty.POLICY)
+MISSION = SigningKey.from_seed(b"m" * 32, duty=Duty.MISSION)
+STRANGER = SigningKey.from_seed(b"s" * 32, duty=Duty.MISSION)
+
+HOVER = Contract(
+    "hover", (), Motion(MotionKind.HOLD, -1, -1), TimingClass.TACTICAL, 2_000_000, HOUR, (), 60_000_000, 500_000,
+    (), (), (), (), 100, ("decision",), (),
+)  # fmt: skip
+AIRCRAFT = Vehicle("quad", "quad-07", 50_000, 12_000, 3_000, 3_000, 18 * 60_000_000, 1_500, 0, -1, -1, -1)
+THE_POLICY = Policy(
+    "field", 7, AIRCRAFT, Projection(473_977_400, 85_455_900, 7_000_000, 11_000_000), ("operator",), (), 0, (), 0, (),
+    (), (HOVER,), (), None, (), ("field.rts",), (b"\0" * 32,),
+)  # fmt: skip
+STEP = Invocation(
+    b"", 0, 0, 0, SourceKind.AGENT, 0, (), NOW, 1, 0, HOVER, Plan(MotionKind.HOLD, (), 0, 0), "hover()", 0, 0, 7, b""
+)
+THE_MISSION = Mission(
+    "look", "", "openclaw", "quad-07", "field", 7, b"", NOW, ("only",), (STEP,), ("look.rts",), (b"\0" * 32,)
+)
+
+
+def root(**mission_key: tuple[str, ...]) -> TrustRoot:
+    speaks = {"roles": ("operator",), "sources": ("agent",), "vehicles": ("quad-07",), **mission_key}
+    return TrustRoot(
+        1,
+        False,
+        NOW - HOUR,
+        NOW + HOUR,
+        (
+            ROOT.verification(),
+            POLICY.verification(vehicles=("quad-07",), expires_us=NOW + HOUR),
+            MISSION.verification(**speaks),
+        ),
+    )
+
+
+def sealed(
+    *,
+    policy: Policy = THE_POLICY,
+    mission: Mission = THE_MISSION,
+    key: SigningKey = MISSION,
+    after: Callable[[Mission], Mission] = lambda bound: bound,
+) -> bytes:
+    payload = bundle.policy_payload(policy)
+    bound = after(bind(mission, bundle.policy_digest(payload)))
+    return bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY, mission_key=key)
+
+
+def slug(data: bytes, *, trust: TrustRoot | None = None, vehicle: str | None = "quad-07", now: int = NOW) -> str:
+    with pytest.raises(Untrusted) as refused:
+        bundle.open_bundle(data, root=root() if trust is None else trust, vehicle=vehicle, now_us=now)
+    assert str(refused.value)
+    return refused.value.slug
+
+
+def test_what_was_sealed_opens_as_it_was() -> None:
+    opened = bundle.open_bundle(sealed(), root=root(), vehicle="quad-07", now_us=NOW)
+    assert opened.policy == THE_POLICY
+    assert opened.mission.name == "look"
+    assert opened.policy_key.kid == POLICY.kid
+    assert opened.mission_key.kid == MISSION.kid
+    assert opened.mission.policy_digest == opened.policy_digest
+    assert bundle.open_bundle(sealed(), root=root(), vehicle=None, now_us=NOW) == opened
+
+
+def test_the_same_parts_and_keys_give_the_same_bytes() -> None:
+    assert sealed() == sealed()
+
+
+def test_a_bundle_for_another_vehicle() -> None:
+    assert slug(sealed(), vehicle="quad-08") == "wrong-vehicle"
+
+
+def test_a_mission_for_another_vehicle_than_its_policy() -> None:
+    assert slug(sealed(mission=msgspec.structs.replace(THE_MISSION, vehicle="quad-08"))) == "wrong-vehicle"
+
+
+def test_a_mission_beside_another_policy() -> None:
+    first, _ = bundle.envelopes(sealed(policy=msgspec.structs.replace(THE_POLICY, version=8)))
+    _, second = bundle.envelopes(sealed())
+    assert slug(artefact.wrap(names.BUNDLE, (first, second))) == "wrong-policy"
+
+
+def test_a_mission_that_names_another_version() -> None:
+    assert slug(sealed(mission=msgspec.structs.replace(THE_MISSION, policy_version=6))) == "wrong-policy"
+
+
+def test_a_mission_key_that_nobody_knows() -> None:
+    assert slug(sealed(key=STRANGER)) == "unknown-key"
+
+
+def test_envelopes_in_each_others_place() -> None:
+    first, second = bundle.envelopes(sealed())
+    assert slug(artefact.wrap(names.BUNDLE, (second, first))) == "wrong-content-type"
+
+
+def test_a_policy_key_that_expired() -> None:
+    assert slug(sealed(), now=NOW + HOUR) == "key-expired"
+
+
+@pytest.mark.parametrize(
+    ("speaks", "expected"),
+    [
+        ({"roles": ("trainee",)}, "wrong-role"),
+        ({"sources": ("operator",)}, "wrong-source"),
+        ({"vehicles": ("quad-08",)}, "wrong-vehicle"),
+    ],
+)
+def test_a_mission_key_that_may_not_speak_for_it(speaks: dict[str, tuple[str, ...]], expected: str) -> None:
+    assert slug(sealed(), trust=root(**speaks)) == expected
+
+
+@pytest.mark.parametrize("change", [{"role": 1}, {"role": -1}, {"source": 9}])
+def test_a_step_whose_speaker_nobody_knows(change: dict[str, int]) -> None:
+    step = msgspec.structs.replace(STEP, **change)
+    assert slug(sealed(mission=msgspec.structs.replace(THE_MISSION, invocations=(step,)))) == "malformed"
+
+
+def test_a_binding_that_does_not_cover_its_step() -> None:
+    def weaken(bound: Mission) -> Mission:
+        step = msgspec.structs.replace(bound.invocations[0], on_inadmissible=2)
+        return msgspec.structs.replace(bound, invocations=(step,))
+
+    assert slug(sealed(after=weaken)) == "binding-mismatch"
+
+
+def test_a_payload_of_the_wrong_shape() -> None:
+    first, _ = bundle.envelopes(sealed())
+    payload = artefact.wrap(names.MISSION, ("look", 3))
+    second = cose.sign1(payload, key=MISSION, duty=Duty.MISSION, content_type=names.MISSION.content_type)
+    assert slug(artefact.wrap(names.BUNDLE, (first, second))) == "malformed"
+
+
+def test_a_payload_that_leaves_a_default_out() -> None:
+    """Structs with defaults decode from shorter arrays too: only the bytes that we would have made are read."""
+    payload = bundle.mission_payload(bind(THE_MISSION, b"\0" * 32))
+    body = list(artefact.unwrap(names.MISSION, payload))  # type: ignore[arg-type]
+    step = list(body[9][0])  # type: ignore[index]
+    step[11] = step[11][:4]  # type: ignore[index]
+    body[9] = (tuple(step),)
+    with pytest.raises(bundle.BundleError, match="not the bytes"):
+        bundle.parse(names.MISSION, artefact.wrap(names.MISSION, tuple(body)), Mission)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x80", artefact.wrap(names.POLICY, ()), artefact.wrap(names.BUNDLE, (b"",))])
+def test_bytes_that_are_no_bundle(data: bytes) -> None:
+    assert slug(data) in {"malformed", "unknown-format"}
+
+
+def test_a_bundle_that_is_too_large_is_not_read() -> None:
+    assert slug(bytes(bundle.MAX_BUNDLE + 1)) == "too-large"

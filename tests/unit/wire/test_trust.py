@@ -1,0 +1,241 @@
+"""The trust root: pinned, self-signed, expiring, and replaced one version at a time."""
+
+import hashlib
+
+import msgspec
+import pytest
+
+from rtshcua.wire import artefact, cose, names
+from rtshcua.wire.keys import ANY, Duty, SigningKey, VerificationKey, WrongDuty
+from rtshcua.wire.trust import (
+    MAX_ROOT,
+    RootError,
+    Thresholds,
+    TrustRoot,
+    key_refusal,
+    open_root,
+    open_successor,
+    speaker_refusal,
+)
+from rtshcua.wire.untrusted import Untrusted
+
+
+def signing_key(number, duty, *, development=False):
+    return SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=development)
+
+
+ROOT = signing_key(1, Duty.ROOT)
+NEXT = signing_key(2, Duty.ROOT)
+POLICY = signing_key(3, Duty.POLICY)
+AGENT = signing_key(4, Duty.MISSION)
+AGENT_KEY = AGENT.verification(roles=("operator",), sources=("agent",), vehicles=("quad-07",), expires_us=500)
+KEYS = (ROOT.verification(), POLICY.verification(vehicles=(ANY,)), AGENT_KEY)
+TRUST = TrustRoot(1, False, 100, 1000, KEYS)
+SIGNED = TRUST.sign(ROOT)
+
+
+def changed(root=TRUST, **fields):
+    return msgspec.structs.replace(root, **fields)
+
+
+def envelope(payload, key=ROOT):
+    return cose.sign1(payload, key=key, duty=Duty.ROOT, content_type=names.ROOT.content_type)
+
+
+def refusal(function, *args, **more):
+    with pytest.raises(Untrusted) as refused:
+        function(*args, **more)
+    return refused.value.slug
+
+
+def opening(data, pinned=ROOT.public, now_us=200):
+    return refusal(open_root, data, pinned=pinned, now_us=now_us)
+
+
+@pytest.mark.parametrize("pinned", [ROOT.public, ROOT.kid])
+def test_a_pinned_root_is_opened(pinned):
+    assert open_root(SIGNED, pinned=pinned, now_us=200) == TRUST
+
+
+def test_the_format_is_stable():
+    assert TRUST.sign(ROOT) == SIGNED
+    assert artefact.unwrap(names.ROOT, TRUST.encode())["keys"][2] == {
+        "duty": "mission",
+        "public": AGENT.public,
+        "roles": ("operator",),
+        "sources": ("agent",),
+        "vehicles": ("quad-07",),
+        "expires_us": 500,
+        "development": False,
+    }
+    assert hashlib.sha256(SIGNED).hexdigest() == "72d492e8e30e7ab9fd343e5e9433e1d6a63f0267d2004823542f415cfbfa43ad"
+
+
+def test_keys_are_found_by_duty():
+    assert TRUST.keys_for(Duty.MISSION) == {AGENT.kid: AGENT_KEY}
+    assert TRUST.keys_for(Duty.LOG) == {}
+
+
+def test_another_pin_is_refused():
+    assert opening(SIGNED, pinned=NEXT.public) == "unknown-key"
+    assert opening(SIGNED, pinned=NEXT.kid) == "unknown-key"
+    with pytest.raises(ValueError, match="a root is pinned by 32 or 16 bytes, not 3"):
+        open_root(SIGNED, pinned=b"pin", now_us=200)
+
+
+def test_only_a_development_root_is_trusted_unpinned():
+    developer = signing_key(9, Duty.ROOT, development=True)
+    root = TrustRoot(1, True, 100, 1000, (developer.verification(),))
+    assert open_root(root.sign(developer), pinned=None, now_us=200) == root
+    assert opening(SIGNED, pinned=None) == "unpinned"
+
+
+def test_expiry():
+    assert open_root(SIGNED, pinned=ROOT.public, now_us=999) == TRUST
+    assert opening(SIGNED, now_us=1000) == "expired"
+    root = changed(keys=(ROOT.verification(expires_us=300),))
+    assert open_root(root.sign(ROOT), pinned=ROOT.kid, now_us=299) == root
+    assert opening(root.sign(ROOT), now_us=300) == "key-expired"
+
+
+def test_a_root_names_the_key_that_signed_it():
+    assert refusal(TRUST.sign, NEXT) == "not-self-signed"
+    assert opening(envelope(TRUST.encode(), NEXT), pinned=NEXT.public) == "not-self-signed"
+    assert opening(envelope(TRUST.encode(), NEXT), pinned=NEXT.kid) == "unknown-key"
+    with pytest.raises(WrongDuty):
+        TRUST.sign(POLICY)
+
+
+def test_a_tampered_root_is_refused():
+    claimed = cose.unverified(SIGNED)
+    forged = SIGNED.replace(claimed.payload, changed(expires_at_us=2000).encode())
+    assert opening(forged) == opening(forged, pinned=ROOT.kid) == "bad-signature"
+
+
+@pytest.mark.parametrize(
+    ("fields", "slug"),
+    [
+        ({"version": 0}, "malformed"),
+        ({"expires_at_us": 100}, "malformed"),
+        ({"thresholds": Thresholds(root=2)}, "unsupported-threshold"),
+        ({"thresholds": Thresholds(log=3)}, "unsupported-threshold"),
+        ({"thresholds": Thresholds(mission=0)}, "malformed"),
+        ({"keys": (*KEYS, ROOT.verification())}, "shared-key"),
+        ({"keys": (*KEYS, VerificationKey(Duty.LOG, POLICY.public))}, "shared-key"),
+        ({"keys": (*KEYS, signing_key(5, Duty.LOG, development=True).verification())}, "development-key"),
+    ],
+    ids=str,
+)
+def test_a_root_that_contradicts_itself_is_neither_signed_nor_opened(fields, slug):
+    root = changed(**fields)
+    assert refusal(root.sign, ROOT) == slug
+    assert opening(envelope(root.encode())) == slug
+
+
+def test_a_threshold_above_one_says_so():
+    with pytest.raises(RootError, match="`policy` asks for 2 signatures; only 1 is supported so far"):
+        changed(thresholds=Thresholds(policy=2)).sign(ROOT)
+
+
+def body(**changes):
+    fields = artefact.unwrap(names.ROOT, TRUST.encode()) | changes
+    return artefact.wrap(names.ROOT, {key: value for key, value in fields.items() if value is not ...})
+
+
+def key_body(**changes):
+    fields = artefact.unwrap(names.ROOT, TRUST.encode())["keys"][0] | changes
+    return body(keys=[fields])
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        body(version="1"),
+        body(version=True),
+        body(development=0),
+        body(surplus=1),
+        body(version=...),
+        body(thresholds=...),  # the default would do, but then the bytes would not be those of the root
+        body(keys=None),
+        key_body(public=ROOT.public[1:]),
+        key_body(public="Hm1KxwV0OhW9nULkYcfkvaoQdbzKcsQyCVzcLpsbNDM="),  # as text
+        key_body(duty="pilot"),
+        key_body(sources=("pilot",)),
+        key_body(surplus=1),
+        artefact.wrap(names.ROOT, 1),
+        b"",
+    ],
+)
+def test_malformed_payloads(payload):
+    assert opening(envelope(payload)) == opening(envelope(payload), pinned=ROOT.kid) == "malformed"
+
+
+def test_another_format_or_version_is_refused():
+    other = artefact.wrap(names.POLICY, artefact.unwrap(names.ROOT, TRUST.encode()))
+    assert opening(envelope(other)) == "unknown-format"
+    newer = artefact.wrap(names.Artefact("rtshcua/root", 2), None)
+    assert opening(envelope(newer)) == "unknown-version"
+
+
+def test_a_huge_root_is_refused_unread():
+    assert opening(b"\xd2" + bytes(MAX_ROOT + 1)) == "malformed"
+
+
+def succession(data, now_us=200, current=TRUST):
+    return refusal(open_successor, data, current=current, now_us=now_us)
+
+
+def test_a_root_key_is_changed_in_two_steps():
+    both = changed(version=2, keys=(ROOT.verification(), NEXT.verification()))
+    second = open_successor(both.sign(ROOT), current=TRUST, now_us=500)
+    assert second == both
+    third = changed(version=3, keys=(NEXT.verification(),))
+    assert open_successor(third.sign(NEXT), current=second, now_us=200) == third
+    assert succession(changed(version=2, keys=(NEXT.verification(),)).sign(NEXT)) == "unknown-key"
+
+
+def test_an_expired_root_can_be_replaced_but_not_by_an_expired_one():
+    renewed = changed(version=2, expires_at_us=9000)
+    assert open_successor(renewed.sign(ROOT), current=TRUST, now_us=5000) == renewed
+    assert succession(changed(version=2).sign(ROOT), now_us=5000) == "expired"
+
+
+def test_versions_rise_one_by_one():
+    assert succession(SIGNED) == "rollback"
+    assert succession(SIGNED, current=changed(version=3)) == "rollback"
+    assert succession(changed(version=3).sign(ROOT)) == "version-gap"
+
+
+def test_development_is_never_a_successor():
+    assert succession(changed(version=2, development=True).sign(ROOT)) == "development-root"
+    developer = changed(development=True)
+    promoted = changed(version=2)
+    assert open_successor(promoted.sign(ROOT), current=developer, now_us=200) == promoted
+
+
+def speaking(key=AGENT_KEY, *, role="operator", source="agent", vehicle="quad-07", now_us=200):
+    return speaker_refusal(key, role=role, source=source, vehicle=vehicle, now_us=now_us)
+
+
+def test_an_agents_host_speaks_as_agent_only():
+    assert speaking() is None
+    assert speaking(source="operator") == "wrong-source"
+    assert speaking(role="supervisor") == "wrong-role"
+    assert speaking(vehicle="quad-08") == "wrong-vehicle"
+    assert speaking(now_us=499) is None
+    assert speaking(now_us=500) == "key-expired"
+
+
+def test_any_stands_for_roles_and_vehicles_but_never_for_sources():
+    key = AGENT.verification(roles=(ANY,), sources=("operator",), vehicles=(ANY,))
+    assert speaking(key, role="whoever", source="operator", vehicle="whatever") is None
+    assert speaking(key, source="agent") == "wrong-source"
+    with pytest.raises(ValueError, match="`\\*` is not a source"):
+        AGENT.verification(sources=(ANY,))
+
+
+def test_nothing_listed_is_nothing_allowed():
+    assert key_refusal(POLICY.verification(), vehicle="quad-07", now_us=0) == "wrong-vehicle"
+    assert key_refusal(POLICY.verification(vehicles=("quad-07",)), vehicle="quad-07", now_us=0) is None
+    assert speaking(AGENT.verification(vehicles=(ANY,), sources=("agent",))) == "wrong-role"
+    assert speaking(AGENT.verification(vehicles=(ANY,), roles=(ANY,))) == "wrong-source"

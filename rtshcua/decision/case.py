@@ -1,0 +1,48 @@
+"""One case to decide: everything that the steps read, as sets of values; a single situation is a set of one."""
+
+from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.values import MAYBE, MISSING, PRESENT, Sets, Span, Value
+from rtshcua.model.flat.situation import Context, Now, State
+
+
+class Case:
+    """`release` is moved by an approval (step 3b); `utc` is the hull of all moments; `exact`: one situation."""
+
+    __slots__ = ("at", "context", "error", "exact", "invocation", "monotonic", "policy", "release", "utc")
+
+    def __init__(
+        self, invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, exact: bool
+    ) -> None:
+        self.invocation, self.policy, self.context, self.exact = invocation, policy, context, exact
+        values, self.monotonic, utc, self.error = sets
+        self.at = Environment([*values, MISSING], invocation.arguments, utc, self.error)
+        self.utc: Span = utc[0] if len(utc) == 1 else (min(low for low, _ in utc), max(high for _, high in utc))
+        self.release: Span = (context.released_us, context.released_us)
+
+
+def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
+    """The set whose only member is this situation: a slot that is missing, stale or beyond all sense is MISSING.
+
+    A state of the wrong size is a fault of whoever made it; nothing of it is believed.
+    """
+    limits = policy.limits
+    values: list[Value]
+    if len(state.values) == len(state.ages) == len(limits):
+        values = [
+            (value, value, PRESENT, None)
+            if value is not None and 0 <= age <= stale and -most <= value <= most
+            else MISSING
+            for value, age, (stale, most) in zip(state.values, state.ages, limits, strict=True)
+        ]
+    else:
+        values = [MISSING] * len(limits)
+    utc, error = now.utc_us, max(now.utc_error_us, 0)
+    return Sets(values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error))
+
+
+def is_situation(sets: Sets) -> bool:
+    """Whether a set of situations has one member only."""
+    spans = (sets.monotonic_us, sets.utc_error_us, *sets.utc_us)
+    points = all(low == high and gap != MAYBE for low, high, gap, _ in sets.values)
+    return points and len(sets.utc_us) == 1 and all(low == high for low, high in spans)

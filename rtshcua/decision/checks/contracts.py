@@ -1,0 +1,126 @@
+"""Skill contracts, their clauses, and the links of chains."""
+
+from collections.abc import Iterator
+
+from rtshcua.decision.checks.indexes import at, index, within
+from rtshcua.decision.parameters import cells, misfit
+from rtshcua.decision.reads import slots_read
+from rtshcua.decision.scope import Scope
+from rtshcua.decision.tree import parse
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import (
+    CHOICE,
+    PLACE,
+    QUANTITY,
+    ZONE,
+    Contract,
+    Link,
+    MotionKind,
+    Parameter,
+    TimingClass,
+)
+from rtshcua.model.flat.limits import (
+    FULL,
+    MAX_CELLS,
+    MAX_CLAUSES,
+    MAX_DURATION,
+    MAX_LINKS,
+    MAX_PARAMETERS,
+    MAX_VALUE,
+)
+from rtshcua.model.flat.policy import Policy
+
+
+def clause(clause: Clause, scope: Scope) -> Iterator[str]:
+    """What is wrong with a clause's code."""
+    node = parse(clause.code, scope)
+    if isinstance(node, str):
+        yield node
+
+
+def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
+    """What is wrong with a contract. Its links are `chain`'s: they speak of other contracts."""
+    yield from _parameters(contract, policy)
+    yield from _motion(contract)
+    yield from within("timing class", contract.timing_class, TimingClass.SEMANTIC, TimingClass.REFLEX)
+    for name, duration in (
+        ("deadline", contract.deadline_us),
+        ("validity", contract.validity_us),
+        ("duration", contract.duration_us),
+        ("grace", contract.grace_us),
+    ):
+        yield from within(name, duration, 0, MAX_DURATION)
+    yield from within("energy", contract.energy, 0, FULL)
+    about = scope.about(contract)
+    for name, clauses in (
+        ("require", contract.require),
+        ("assume", contract.assume),
+        ("maintain", contract.maintain),
+    ):
+        yield from within(f"number of {name} clauses", len(clauses), 0, MAX_CLAUSES)
+        for number, one in enumerate(clauses):
+            yield from at(f"{name} {number}", clause(one, about))
+    if contract.reads != slots_read((*contract.require, *contract.assume, *contract.maintain), policy.vehicle):
+        yield "`reads` is not what the clauses read"
+
+
+def _parameters(contract: Contract, policy: Policy) -> Iterator[str]:
+    yield from within("number of parameters", len(contract.parameters), 0, MAX_PARAMETERS)
+    cell = 0
+    for parameter in contract.parameters:
+        if parameter.cell != cell:
+            yield f"parameter `{parameter.name}`: cell {parameter.cell} is not the next, {cell}"
+        yield from at(f"parameter `{parameter.name}`", _parameter(parameter, policy))
+        cell += 2 if parameter.kind == PLACE else 1
+    yield from within("number of cells", cell, 0, MAX_CELLS)
+
+
+def _parameter(parameter: Parameter, policy: Policy) -> Iterator[str]:
+    yield from within("kind", parameter.kind, QUANTITY, PLACE)
+    yield from within("low bound", parameter.low, -MAX_VALUE, MAX_VALUE)
+    yield from within("high bound", parameter.high, parameter.low, MAX_VALUE)
+    if parameter.kind == CHOICE:
+        yield from index("label", parameter.low, len(parameter.labels))
+        yield from index("label", parameter.high, len(parameter.labels))
+    elif parameter.kind == ZONE:
+        yield from index("declared zone", parameter.low, policy.declared)
+        yield from index("declared zone", parameter.high, policy.declared)
+
+
+def _motion(contract: Contract) -> Iterator[str]:
+    kinds = {parameter.cell: parameter.kind for parameter in contract.parameters}
+    motion = contract.motion
+    yield from within("motion", motion.kind, MotionKind.HOLD, MotionKind.LAND)
+    for name, cell in (("altitude", motion.altitude), ("speed", motion.speed), ("time", motion.time)):
+        if cell != -1 and kinds.get(cell) != QUANTITY:
+            yield f"motion: argument cell {cell} is no {name}"
+    if motion.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER) and motion.altitude == -1:
+        yield "motion: a skill that flies somewhere needs an altitude"
+    if motion.kind == MotionKind.FLY and PLACE not in kinds.values():
+        yield "motion: a skill that flies to a place needs one"
+
+
+def arguments(values: tuple[int, ...], contract: Contract) -> Iterator[str]:
+    """What is wrong with the arguments of a call."""
+    if len(values) != cells(contract):
+        yield f"{len(values)} argument cells instead of {cells(contract)}"
+    found = misfit(values, contract)
+    if found is not None:
+        yield f"argument `{found.name}` is out of range"
+
+
+def chain(links: tuple[Link, ...], policy: Policy) -> Iterator[str]:
+    """What is wrong with the links of a chain; the contracts are well-formed."""
+    yield from within("number of links", len(links), 0, MAX_LINKS)
+    for number, one in enumerate(links):
+        yield from at(f"link {number}", link(one, policy))
+
+
+def link(link: Link, policy: Policy) -> Iterator[str]:
+    """What is wrong with a link: it is a complete call of a skill that needs no survey path."""
+    yield from index("skill", link.skill, len(policy.contracts))
+    called = policy.contracts[link.skill]
+    if called.motion.kind == MotionKind.COVER:
+        yield "a link has no path to cover a zone along"
+    yield from arguments(link.arguments, called)
+    yield from within("limit", link.limit_us, 0, MAX_DURATION)

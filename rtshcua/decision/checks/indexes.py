@@ -1,0 +1,31 @@
+"""The small questions that all checks ask."""
+
+from collections.abc import Iterable, Iterator
+
+
+def within(name: str, value: int, low: int, high: int) -> Iterator[str]:
+    """A number lies in `low`..`high`."""
+    if not low <= value <= high:
+        yield f"{name} {value} is not in {low}..{high}"
+
+
+def index(name: str, value: int, count: int) -> Iterator[str]:
+    """A number is the index of one of `count` things."""
+    if not 0 <= value < count:
+        yield f"there is no {name} {value}"
+
+
+def ascending(name: str, values: Iterable[int], count: int) -> Iterator[str]:
+    """Numbers are distinct indexes of `count` things, in order."""
+    before = -1
+    for value in values:
+        if value <= before:
+            yield f"{name} indexes are not ascending"
+        yield from index(name, value, count)
+        before = value
+
+
+def at(place: str, problems: Iterable[str]) -> Iterator[str]:
+    """The same problems, each told with where it is."""
+    for problem in problems:
+        yield f"{place}: {problem}"

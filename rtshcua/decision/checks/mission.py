@@ -1,0 +1,82 @@
+"""A mission and its invocations, under a policy that is well-formed."""
+
+from collections.abc import Iterator
+
+from rtshcua.decision.checks.contracts import contract
+from rtshcua.decision.checks.indexes import at, index, within
+from rtshcua.decision.checks.tighten import tightens
+from rtshcua.decision.parameters import cells, place_of
+from rtshcua.decision.scope import scope_of
+from rtshcua.model.flat.contract import Contract, MotionKind, SourceKind
+from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PATH, MAX_PHASES, MAX_SPEED, MAX_VALUE
+from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE
+
+
+def mission(mission: Mission, policy: Policy) -> Iterator[str]:
+    """What is wrong with a mission apart from its invocations."""
+    for name, mine, policys in (
+        ("policy", mission.policy, policy.name),
+        ("policy version", mission.policy_version, policy.version),
+        ("vehicle", mission.vehicle, policy.vehicle.identity),
+    ):
+        if mine != policys:
+            yield f"{name} `{mine}` is not the policy's, `{policys}`"
+    yield from within("number of invocations", len(mission.invocations), 0, MAX_INVOCATIONS)
+    yield from within("number of phases", len(mission.phases), 0, MAX_PHASES)
+    for step, one in enumerate(mission.invocations):
+        if one.step != step:
+            yield f"step {step} says it is step {one.step}"
+        yield from at(f"step {step}", index("phase", one.phase, len(mission.phases)))
+    if len({one.invocation_id for one in mission.invocations}) != len(mission.invocations):
+        yield "two steps have the same id"
+
+
+def invocation(invocation: Invocation, policy: Policy) -> Iterator[str]:
+    """What is wrong with an invocation. Arguments out of range are for `decide` to refuse, so that it is recorded."""
+    yield from index("skill", invocation.skill, len(policy.contracts))
+    yield from index("role", invocation.role, len(policy.roles))
+    yield from within("source", invocation.source, SourceKind.AGENT, SourceKind.REFLEX)
+    yield from within("on inadmissible", invocation.on_inadmissible, OnInadmissible.ABORT, OnInadmissible.SKIP)
+    yield from within("issued at", invocation.issued_at_us, 0, MAX_VALUE)
+    yield from within("phases", invocation.phases, 0, (1 << MAX_PHASES) - 1)
+    mine = invocation.contract
+    yield from tightens(mine, policy.contracts[invocation.skill])
+    yield from contract(mine, policy, scope_of(policy))
+    if len(invocation.arguments) != cells(mine):
+        yield f"{len(invocation.arguments)} argument cells instead of {cells(mine)}"
+    for argument in invocation.arguments:
+        yield from within("argument", argument, -MAX_VALUE, MAX_VALUE)
+    yield from at("plan", _plan(invocation.plan, mine, invocation.arguments))
+
+
+def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterator[str]:
+    """The plan is what the arguments say, so that what is checked is what will be flown."""
+    motion = contract.motion
+    if plan.kind != motion.kind:
+        yield f"kind {plan.kind} is not the skill's, {motion.kind}"
+    yield from within("speed", plan.speed, 0, MAX_SPEED)
+    yield from within("altitude", plan.altitude, LOWEST, HIGHEST)
+    for name, cell, value in (("altitude", motion.altitude, plan.altitude), ("speed", motion.speed, plan.speed)):
+        if cell != -1 and arguments[cell] != value:
+            yield f"{name} {value} is not the argument, {arguments[cell]}"
+    if len(plan.path) % 2:
+        yield "a coordinate is missing"
+    yield from within("number of points", len(plan.path) // 2, 0, MAX_PATH)
+    for coordinate in plan.path:
+        yield from within("coordinate", coordinate, -MAX_COORDINATE, MAX_COORDINATE)
+    if not _leads_right(plan, contract, arguments):
+        yield "the path is not the one that the skill flies"
+
+
+def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> bool:
+    match plan.kind:
+        case MotionKind.COVER:
+            return bool(plan.path)
+        case MotionKind.FLY:
+            return plan.path == place_of(contract, arguments)
+        case MotionKind.HOME:
+            return plan.path in ((), (0, 0))
+        case _:
+            return not plan.path

@@ -1,0 +1,50 @@
+"""The vehicle and its signals."""
+
+from collections.abc import Iterator
+
+from rtshcua.decision.checks.indexes import at, within
+from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED
+from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.signal import NUMBER, POSITION
+from rtshcua.model.flat.zone import MAX_COORDINATE
+
+MAX_POSITION_ERROR = 1 << 20  # mm, about 1 km
+
+
+def signals(policy: Policy) -> Iterator[str]:
+    """What is wrong with a policy's signals: every slot has exactly one owner."""
+    yield from within("number of slots", policy.slots, 0, MAX_SLOTS)
+    owned: set[int] = set()
+    for signal in policy.signals:
+        where = f"signal `{signal.name}`"
+        yield from at(where, within("kind", signal.kind, NUMBER, POSITION))
+        yield from at(where, within("staleness", signal.stale_us, 1, MAX_DURATION))
+        for slot in (signal.slot, signal.slot + 1) if signal.kind == POSITION else (signal.slot,):
+            if not 0 <= slot < policy.slots or slot in owned:
+                yield f"{where}: slot {slot} does not exist or is owned twice"
+            owned.add(slot)
+    if len(owned) != policy.slots:
+        yield "a slot has no signal"
+
+
+def vehicle(policy: Policy) -> Iterator[str]:
+    """What is wrong with a policy's vehicle."""
+    yield from at("vehicle", _numbers(policy.vehicle))
+    kinds = {signal.slot: signal.kind for signal in policy.signals}
+    for name, slot, kind in (
+        ("position", policy.vehicle.position, POSITION),
+        ("height", policy.vehicle.height, NUMBER),
+        ("battery", policy.vehicle.battery, NUMBER),
+    ):
+        if slot != -1 and kinds.get(slot) != kind:
+            yield f"vehicle: slot {slot} is no {name}"
+
+
+def _numbers(vehicle: Vehicle) -> Iterator[str]:
+    yield from within("home distance", vehicle.home_within, 0, MAX_COORDINATE)
+    yield from within("speed", vehicle.speed, 1, MAX_SPEED)
+    yield from within("climb", vehicle.climb, 1, MAX_SPEED)
+    yield from within("position error", vehicle.position_error, 0, MAX_POSITION_ERROR)
+    yield from within("endurance", vehicle.endurance_us, 1, MAX_DURATION)
+    yield from within("reserve", vehicle.reserve, 0, FULL)
+    yield from within("offset from UTC", vehicle.utc_offset_us, -DAY, DAY)

@@ -1,0 +1,226 @@
+"""Conditions compiled, once, at load, into functions from what is known to an abstract truth."""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+from rtshcua.decision import tree
+from rtshcua.decision.daytime import Daytime
+from rtshcua.decision.places import Place, WellKnown, here
+from rtshcua.decision.truth import AND, FALSE, NOT, OR, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import ABSENT, Span, Value
+from rtshcua.decision.zones import PreparedZone
+
+
+class Environment:
+    """What a condition is evaluated over: a value for each slot (and MISSING after the last), the arguments, where the
+    vehicle is (None: where the state says; found when first asked), and UTC with its error."""
+
+    __slots__ = ("arguments", "error", "place", "slots", "utc")
+
+    def __init__(
+        self,
+        slots: Sequence[Value],
+        arguments: Sequence[Value],
+        utc: tuple[Span, ...],
+        error: Span,
+        place: Place | None = None,
+    ) -> None:
+        self.slots, self.arguments = slots, arguments
+        self.utc, self.error = utc, error
+        self.place = place
+
+
+Condition: TypeAlias = Callable[[Environment], Truth]
+
+
+class Tables(NamedTuple):
+    """What code refers to by index, ready for use."""
+
+    zones: tuple[PreparedZone, ...]
+    tables: tuple[tuple[int, ...], ...]
+    sets: tuple[frozenset[int], ...]
+    known: WellKnown
+    utc_offset_us: int
+
+
+def always(_: Environment) -> Truth:
+    """The condition of a rule without one."""
+    return TRUE
+
+
+def build(node: tree.Node, tables: Tables) -> Condition:
+    """The function that evaluates a condition."""
+    match node:
+        case tree.Both(left, right):
+            return _both(build(left, tables), build(right, tables))
+        case tree.Either(left, right):
+            return _either(build(left, tables), build(right, tables))
+        case tree.Not(operand):
+            return _not(build(operand, tables))
+        case tree.AtMost(terms, bound):
+            return _at_most(terms, bound)
+        case tree.Equal(terms, value):
+            return _equal(terms, value)
+        case tree.Member(argument, index, members):
+            return _member(argument, index, tables.sets[members])
+        case tree.Inside(zone):
+            return _inside(tables.zones[zone], tables.known)
+        case tree.InsideArgument(cell, table):
+            return _inside_argument(cell, tables.tables[table], tables)
+        case tree.PointInside(cell, zone):
+            return _point_inside(cell, tables.zones[zone])
+        case tree.InWindow(start, end):
+            return _in_window(Daytime(start, end, tables.utc_offset_us))
+
+
+def _both(left: Condition, right: Condition) -> Condition:
+    def run(at: Environment) -> Truth:
+        truth = left(at)
+        if truth == TRUE:
+            return right(at)
+        return FALSE if truth == FALSE else AND[truth][right(at)]
+
+    return run
+
+
+def _either(left: Condition, right: Condition) -> Condition:
+    def run(at: Environment) -> Truth:
+        truth = left(at)
+        if truth == FALSE:
+            return right(at)
+        return TRUE if truth == TRUE else OR[truth][right(at)]
+
+    return run
+
+
+def _not(operand: Condition) -> Condition:
+    def run(at: Environment) -> Truth:
+        return NOT[operand(at)]
+
+    return run
+
+
+def known(truth: Truth, gap: int) -> Truth:
+    """A truth about a value that may be missing."""
+    if not gap:
+        return truth
+    return UNKNOWN if gap == ABSENT else truth | UNKNOWN
+
+
+def total(terms: tuple[tree.Term, ...], at: Environment) -> tuple[int, int, int]:
+    """The least and the greatest the sum can be, and whether a part of it is missing."""
+    low = high = gap = 0
+    for argument, index, factor in terms:
+        least, most, missing, _ = at.arguments[index] if argument else at.slots[index]
+        if factor < 0:
+            least, most = most, least
+        low += factor * least
+        high += factor * most
+        if missing > gap:
+            gap = missing
+    return low, high, gap
+
+
+def at_most(low: int, high: int, bound: int) -> Truth:
+    """Whether what lies in `low`..`high` is at most `bound`."""
+    if high <= bound:
+        return TRUE
+    return FALSE if low > bound else TRUE | FALSE
+
+
+def _at_most(terms: tuple[tree.Term, ...], bound: int) -> Condition:
+    if len(terms) == 1 and terms[0].factor in (1, -1):
+        (argument, index, factor) = terms[0]
+        return _upper(argument, index, bound) if factor == 1 else _lower(argument, index, -bound)
+
+    def run(at: Environment) -> Truth:
+        low, high, gap = total(terms, at)
+        return known(at_most(low, high, bound), gap)
+
+    return run
+
+
+def _upper(argument: bool, index: int, bound: int) -> Condition:
+    def run(at: Environment) -> Truth:
+        low, high, gap, _ = at.arguments[index] if argument else at.slots[index]
+        truth = TRUE if high <= bound else FALSE if low > bound else TRUE | FALSE
+        return known(truth, gap) if gap else truth
+
+    return run
+
+
+def _lower(argument: bool, index: int, bound: int) -> Condition:
+    def run(at: Environment) -> Truth:
+        low, high, gap, _ = at.arguments[index] if argument else at.slots[index]
+        truth = TRUE if low >= bound else FALSE if high < bound else TRUE | FALSE
+        return known(truth, gap) if gap else truth
+
+    return run
+
+
+def _equal(terms: tuple[tree.Term, ...], value: int) -> Condition:
+    def run(at: Environment) -> Truth:
+        low, high, gap = total(terms, at)
+        truth = FALSE if low > value or high < value else TRUE if low == high else TRUE | FALSE
+        return known(truth, gap)
+
+    return run
+
+
+def _member(argument: bool, index: int, wanted: frozenset[int]) -> Condition:
+    ordered = sorted(wanted)
+
+    def run(at: Environment) -> Truth:
+        low, high, gap, elements = at.arguments[index] if argument else at.slots[index]
+        if low == high:
+            truth = TRUE if low in wanted else FALSE
+        elif elements is None:
+            common = bisect_right(ordered, high) - bisect_left(ordered, low)
+            truth = FALSE if not common else TRUE if common == high - low + 1 else TRUE | FALSE
+        else:
+            truth = FALSE if elements.isdisjoint(wanted) else TRUE if elements <= wanted else TRUE | FALSE
+        return known(truth, gap)
+
+    return run
+
+
+def _inside(zone: PreparedZone, where: WellKnown) -> Condition:
+    def run(at: Environment) -> Truth:
+        place = at.place
+        if place is None:
+            place = at.place = here(at.slots, where)
+        return place.inside(zone)
+
+    return run
+
+
+def _inside_argument(cell: int, table: tuple[int, ...], tables: Tables) -> Condition:
+    each = tuple(_inside(tables.zones[zone], tables.known) for zone in table)
+
+    def run(at: Environment) -> Truth:
+        low, high, _, elements = at.arguments[cell]
+        if low == high:
+            return each[low](at)
+        truth = 0
+        for zone in elements or range(low, high + 1):
+            truth |= each[zone](at)
+        return truth
+
+    return run
+
+
+def _point_inside(cell: int, zone: PreparedZone) -> Condition:
+    def run(at: Environment) -> Truth:
+        west, east, _, _ = at.arguments[cell]
+        south, north, _, _ = at.arguments[cell + 1]
+        return zone.along((west, south), (0, 0, east - west, north - south))
+
+    return run
+
+
+def _in_window(window: Daytime) -> Condition:
+    def run(at: Environment) -> Truth:
+        return window.truth(at.utc, at.error)
+
+    return run

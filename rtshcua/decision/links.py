@@ -1,0 +1,105 @@
+"""Which link flies when something is refused (paper symbol `f_b`, design 4.4).
+
+A link skips steps 2 to 5 and `degrade`, for a vehicle in trouble must not be left without an answer: its own `require`
+must be true now, and it must not lead out of the airspace. Holding and landing lead nowhere; a vehicle that is out of
+the airspace already, as far as its position error tells, may always go home.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from rtshcua.decision.airspace import keeps
+from rtshcua.decision.case import situation
+from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.link import PreparedLink
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import MISSING, Sets
+from rtshcua.model.flat.contract import Link, MotionKind
+from rtshcua.model.flat.situation import Now, State
+
+#: the index of the link that a `degrade` rule flies, and of having tried nothing yet
+DEGRADE = -1
+START = -2
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """A link and its index in the chain, or DEGRADE."""
+
+    index: int
+    link: Link
+
+
+def choose_fallback(
+    invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now, after: int = START
+) -> Choice | None:
+    """The target of a matching `degrade` rule, else the first link of the chain after `after` that may fly now.
+
+    Pass the index of the link that failed or whose time is over as `after`: the choice never goes backwards.
+    """
+    return next(fallbacks(invocation, situation(state, policy, now), policy, after, exact=True))
+
+
+def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: int = START) -> Choice | None:
+    """The first link of the policy's contingency after `after` that may fly now."""
+    return next(_chosen(policy.contingency, situation(state, policy, now), policy, after, exact=True))
+
+
+def link_admissible(link: PreparedLink, state: State, policy: PreparedPolicy, now: Now) -> bool:
+    """Whether a link of a prepared chain may fly now."""
+    return admissible(link, situation(state, policy, now), policy, exact=True) == TRUE
+
+
+def fallbacks(
+    invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, after: int, exact: bool
+) -> Iterator[Choice | None]:
+    """The links that may be the choice, in order, and None if perhaps none flies; one situation has one answer."""
+    if after < DEGRADE and invocation.misfit is None:
+        at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
+        for rule in invocation.candidates.degrades:
+            matches = rule.condition(at)
+            truth = AND[matches][admissible(rule.target, sets, policy, exact)] if matches & TRUE else FALSE
+            if truth & TRUE:
+                yield Choice(DEGRADE, rule.target.link)
+            if truth == TRUE:
+                return
+    yield from _chosen(invocation.chain, sets, policy, after, exact)
+
+
+def _chosen(
+    chain: Sequence[PreparedLink], sets: Sets, policy: PreparedPolicy, after: int, exact: bool
+) -> Iterator[Choice | None]:
+    for index in range(max(after + 1, 0), len(chain)):
+        truth = admissible(chain[index], sets, policy, exact)
+        if truth & TRUE:
+            yield Choice(index, chain[index].link)
+        if truth == TRUE:
+            return
+    yield None
+
+
+def admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: bool) -> Truth:
+    """Whether a link may fly, over a set of situations."""
+    at = Environment([*sets.values, MISSING], link.arguments, sets.utc_us, sets.utc_error_us)
+    truth = TRUE
+    for _, condition in link.require:
+        truth = AND[truth][condition(at)]
+    if truth == FALSE or policy.airspace is None or link.motion in (MotionKind.HOLD, MotionKind.LAND):
+        return truth
+    return AND[truth][_deepens_no_breach(link, at, policy, exact)]
+
+
+def _deepens_no_breach(link: PreparedLink, at: Environment, policy: PreparedPolicy, exact: bool) -> Truth:
+    """Whether a link that moves stays in the airspace, or goes home from where the vehicle should not be."""
+    airspace, known = policy.airspace, policy.tables.known
+    assert airspace is not None
+    along = keeps(link.planner.volume(at.slots, known).place, airspace)
+    if exact:
+        along = EVERYWHERE[along]
+    if link.motion != MotionKind.HOME:
+        return along
+    now = keeps(policy.still.volume(at.slots, known).place, airspace)
+    if exact:
+        now = EVERYWHERE[now]
+    return (TRUE if now & FALSE else 0) | (along if now & TRUE else 0) | now & UNKNOWN

@@ -1,0 +1,116 @@
+"""Check a policy and a mission once, at load, and compile them for many decisions.
+
+The bundle may come from the wrong people or be damaged, so everything that deciding relies on is checked here; what is
+malformed is refused with a value that names it. Signatures, digests and bindings are verified before, by `wire`.
+"""
+
+from typing import NamedTuple
+
+from rtshcua.decision.checks import mission as mission_checks
+from rtshcua.decision.checks.policy import problems
+from rtshcua.decision.compiler import Compiler
+from rtshcua.decision.energy import Energy
+from rtshcua.decision.parameters import misfit
+from rtshcua.decision.prepared import Limit, PreparedAirspace, PreparedInvocation, PreparedPolicy
+from rtshcua.decision.reads import slots_read, where
+from rtshcua.decision.rules import Candidates, RuleIndex
+from rtshcua.decision.values import point
+from rtshcua.decision.volume import Planner
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Airspace, Policy
+from rtshcua.model.flat.signal import POSITION
+from rtshcua.model.flat.zone import MAX_COORDINATE
+
+
+class Malformed(NamedTuple):
+    """Why a policy or a mission is refused: the first thing that is wrong with it."""
+
+    what: str
+
+
+def prepare(policy: Policy) -> PreparedPolicy | Malformed:
+    """The policy, compiled, or what is wrong with it."""
+    problem = next(problems(policy), None)
+    if problem is not None:
+        return Malformed(problem)
+    compiler = Compiler(policy)
+    return PreparedPolicy(
+        policy=policy,
+        compiler=compiler,
+        tables=compiler.tables,
+        limits=_limits(policy),
+        rules=RuleIndex(policy.rules, compiler.condition, compiler.link),
+        airspace=None if policy.airspace is None else _airspace(policy.airspace, compiler),
+        contingency=compiler.links(policy.contingency),
+        still=Planner(MotionKind.HOLD, (), None, policy.vehicle.position_error),
+    )
+
+
+def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedInvocation, ...] | Malformed:
+    """The mission's invocations in order, compiled, or what is wrong with them."""
+    problem = next(mission_checks.mission(mission, policy.policy), None)
+    if problem is not None:
+        return Malformed(problem)
+    prepared: list[PreparedInvocation] = []
+    for step, invocation in enumerate(mission.invocations):
+        found = prepare_invocation(invocation, policy)
+        if isinstance(found, Malformed):
+            return Malformed(f"step {step}: {found.what}")
+        prepared.append(found)
+    return tuple(prepared)
+
+
+def prepare_invocation(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation | Malformed:
+    """The invocation, compiled, or what is wrong with it. An argument out of range is for `decide` to refuse."""
+    problem = next(mission_checks.invocation(invocation, policy.policy), None)
+    if problem is not None:
+        return Malformed(problem)
+    compiler, contract, plan = policy.compiler, invocation.contract, invocation.plan
+    candidates = policy.rules.candidates(invocation.skill, invocation.role, invocation.source)
+    return PreparedInvocation(
+        invocation=invocation,
+        policy=policy,
+        arguments=tuple(map(point, invocation.arguments)),
+        misfit=misfit(invocation.arguments, contract),
+        require=compiler.guards(contract.require, contract),
+        assume=compiler.guards(contract.assume, contract),
+        maintain=compiler.guards(contract.maintain, contract),
+        chain=compiler.links(contract.fallback),
+        candidates=candidates,
+        planner=Planner(
+            plan.kind,
+            plan.path,
+            None if contract.motion.altitude == -1 else plan.altitude,
+            policy.policy.vehicle.position_error,
+        ),
+        energy=Energy(contract, policy.policy.vehicle),
+        reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(invocation, candidates, policy.policy)),
+    )
+
+
+def _airspace(airspace: Airspace, compiler: Compiler) -> PreparedAirspace:
+    zones = compiler.tables.zones
+    return PreparedAirspace(
+        airspace, tuple(zones[zone] for zone in airspace.inside), tuple(zones[zone] for zone in airspace.outside)
+    )
+
+
+def _limits(policy: Policy) -> tuple[Limit, ...]:
+    limits = [Limit(0, 0)] * policy.slots
+    for signal in policy.signals:
+        if signal.kind == POSITION:
+            limits[signal.slot] = limits[signal.slot + 1] = Limit(signal.stale_us, MAX_COORDINATE)
+        else:
+            limits[signal.slot] = Limit(signal.stale_us, MAX_VALUE)
+    return tuple(limits)
+
+
+def _reads(invocation: Invocation, candidates: Candidates, policy: Policy) -> tuple[int, ...]:
+    """The slots that a decision on this invocation may read: whatever it found there bounds how long it holds."""
+    conditions = [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
+    vehicle = policy.vehicle
+    battery = () if vehicle.battery == -1 else (vehicle.battery,)
+    slots = {*invocation.contract.reads, *slots_read(conditions, vehicle), *where(vehicle), *battery}
+    return tuple(sorted(slots))

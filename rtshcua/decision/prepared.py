@@ -1,0 +1,67 @@
+"""A policy and an invocation as they are held between `prepare` and the decisions on them."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rtshcua.decision.compiler import Compiler
+from rtshcua.decision.energy import Energy
+from rtshcua.decision.evaluate import Tables
+from rtshcua.decision.link import Guards, PreparedLink
+from rtshcua.decision.rules import Candidates, RuleIndex
+from rtshcua.decision.values import Value
+from rtshcua.decision.volume import Planner
+from rtshcua.decision.zones import PreparedZone
+from rtshcua.model.flat.contract import Parameter
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Airspace, Policy
+
+
+class PreparedAirspace(NamedTuple):
+    """The airspace and its zones."""
+
+    airspace: Airspace
+    inside: tuple[PreparedZone, ...]
+    outside: tuple[PreparedZone, ...]
+
+
+class Limit(NamedTuple):
+    """What a state slot may hold: no older than `stale_us`, no further from 0 than `most`."""
+
+    stale_us: int
+    most: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedPolicy:
+    """A policy that was found well-formed, compiled. `limits` has one entry a slot."""
+
+    policy: Policy
+    compiler: Compiler
+    tables: Tables
+    limits: tuple[Limit, ...]
+    rules: RuleIndex
+    airspace: PreparedAirspace | None
+    contingency: tuple[PreparedLink, ...]
+    still: Planner  # plans to stay: the present place with its error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedInvocation:
+    """An invocation that was found well-formed, compiled under `policy`.
+
+    `misfit` is the first parameter whose argument is out of range; `reads` are the slots that a decision may read, each
+    with the age in us at which it is stale.
+    """
+
+    invocation: Invocation
+    policy: PreparedPolicy
+    arguments: tuple[Value, ...]
+    misfit: Parameter | None
+    require: Guards
+    assume: Guards
+    maintain: Guards
+    chain: tuple[PreparedLink, ...]
+    candidates: Candidates
+    planner: Planner
+    energy: Energy
+    reads: tuple[tuple[int, int], ...]

@@ -1,0 +1,22 @@
+"""How long an admission holds (design 4.3): it bounds the permit."""
+
+from rtshcua.decision.case import Case
+from rtshcua.model.flat.situation import State
+
+
+def valid_until(case: Case, state: State) -> int:
+    """The earliest of deadline, end of validity and the moment when something that was read is stale, monotonic us.
+
+    The end of validity is mapped from UTC with the clock's error taken off.
+    """
+    invocation = case.invocation
+    contract = invocation.invocation.contract
+    now, utc, error = case.monotonic[0], case.utc[0], case.error[0]
+    end = invocation.invocation.issued_at_us + contract.validity_us
+    until = min(case.release[0] + contract.deadline_us, now + end - utc - error)
+    left = until - now
+    values, ages = state.values, state.ages
+    for slot, stale in invocation.reads:
+        if 0 <= stale - ages[slot] < left and values[slot] is not None:
+            left = stale - ages[slot]
+    return now + left

@@ -1,0 +1,97 @@
+"""The planned volume: every place where a skill may take the vehicle from where it is now.
+
+It is the leg from the present position to the first point of the plan's path, and the path, at all heights between the
+present one and the plan's altitude; HOME ends with the descent at home, LAND is the descent here. All of it is widened
+by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no floor
+(`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
+"""
+
+from collections.abc import Sequence
+from math import isqrt
+from typing import NamedTuple
+
+from rtshcua.decision.places import NOWHERE, Part, Place, Sweep, WellKnown
+from rtshcua.decision.truth import UNKNOWN
+from rtshcua.decision.values import ABSENT, MISSING, Span, Value
+from rtshcua.decision.zones import Box
+from rtshcua.model.flat.contract import MotionKind
+
+HOME = (0, 0)  # the origin of local coordinates
+
+
+class Volume(NamedTuple):
+    """A planned volume: its `place`, the heights in it, and how far from home its farthest point is, mm rounded up."""
+
+    place: Place
+    height: Value
+    farthest: Span
+
+
+UNKNOWN_VOLUME = Volume(NOWHERE, MISSING, (0, 0))
+
+
+class Planner:
+    """The planned volumes of one plan. It remembers the last start, for which the answer is always the same."""
+
+    __slots__ = ("_altitude", "_distance", "_error", "_kind", "_last", "_leg", "_path", "_sweep")
+
+    def __init__(self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int) -> None:
+        """`altitude` is None where the height at the start counts."""
+        self._kind, self._altitude = kind, altitude
+        self._path = HOME if kind == MotionKind.HOME else path
+        self._error: Box = (-position_error, -position_error, position_error, position_error)
+        self._sweep = Sweep(self._path, self._error) if self._path else None
+        self._distance = max((_distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
+        self._leg: tuple[tuple[int, int, int, int], Sweep, Span] | None = None
+        self._last: tuple[tuple[Value, Value, Value], Volume] | None = None
+
+    def volume(self, slots: Sequence[Value], known: WellKnown) -> Volume:
+        """The volume from where the state says that the vehicle is."""
+        start = (slots[known.x], slots[known.y], slots[known.height])
+        last = self._last
+        if last is not None and last[0] == start:
+            return last[1]
+        volume = self._from(*start)
+        self._last = (start, volume)
+        return volume
+
+    def _from(self, x: Value, y: Value, height: Value) -> Volume:
+        gap = max(x[2], y[2], height[2])
+        if gap == ABSENT:
+            return UNKNOWN_VOLUME
+        leg, farthest = self._first_leg(x, y)
+        low, high = height[0], height[1]
+        parts: list[Part] = []
+        if self._kind == MotionKind.LAND:
+            low = min(low, 0)
+        elif self._altitude is not None:
+            low, high = min(low, self._altitude), max(high, self._altitude)
+        parts.append((leg, low, high))
+        if self._sweep is not None:
+            if self._kind == MotionKind.HOME:
+                low = min(low, 0)
+            parts.append((self._sweep, low, high))
+        return Volume(Place(tuple(parts), UNKNOWN if gap else 0), (low, high, gap, None), farthest)
+
+    def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Span]:
+        """The leg to the path, wherever in a box it starts, and the distance of the farthest point of leg and path."""
+        west, east, south, north = key = (x[0], x[1], y[0], y[1])
+        if self._leg is not None and self._leg[0] == key:
+            return self._leg[1], self._leg[2]
+        left, bottom, right, top = self._error
+        leg = Sweep((west, south, *self._path[:2]), (left, bottom, right + east - west, top + north - south))
+        nearest = _distance(_clamp(0, west, east), _clamp(0, south, north))
+        farthest = _distance(max(abs(west), abs(east)), max(abs(south), abs(north)))
+        span = (max(nearest, self._distance), max(farthest, self._distance))
+        self._leg = (key, leg, span)
+        return leg, span
+
+
+def _clamp(value: int, low: int, high: int) -> int:
+    return min(max(value, low), high)
+
+
+def _distance(x: int, y: int) -> int:
+    """How far a place is from home, mm rounded up."""
+    square = x * x + y * y
+    return isqrt(square - 1) + 1 if square else 0

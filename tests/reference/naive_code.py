@@ -1,0 +1,169 @@
+"""An interpreter of conditions over sets of situations, by definition: slow, obvious, written apart from `evaluate`.
+
+Truths are the letters T, F and U, and what a condition may be is a set of them. A single value is a set of one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+from reference.naive_geometry import circle_far, circle_near, corners, in_shape, touches, widened
+
+from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import CIRCLE, Zone
+
+DAY = 24 * 3600 * 1_000_000
+Truths = frozenset[str]
+T, F, U = frozenset("T"), frozenset("F"), frozenset("U")
+
+#: widened legs (a, b, box) between two heights
+Leg = tuple[tuple[int, int], tuple[int, int], tuple[int, int, int, int], int, int]
+
+
+class TooNear(Exception):
+    """A circle is passed so near that rounding may count; the test should ask something else."""
+
+
+@dataclass
+class World:
+    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is or will be (None: unknown)."""
+
+    policy: Policy
+    slots: list[int | None]
+    arguments: tuple[int, ...]
+    utc: int
+    error: int
+    legs: list[Leg] | None
+    heights: tuple[int, int] | None = None  # of the legs, where the height ranges over them
+
+
+def kleene_and(a: str, b: str) -> str:
+    return "F" if "F" in (a, b) else "U" if "U" in (a, b) else "T"
+
+
+def kleene_or(a: str, b: str) -> str:
+    return "T" if "T" in (a, b) else "U" if "U" in (a, b) else "F"
+
+
+def truths(code: tuple[int, ...], world: World) -> Truths:
+    """Run the code on a stack of sets of truths and of numbers: `(c, k)` is c times the height, plus k; None is missing."""
+    stack: list = []
+    for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True):
+        match op:
+            case Op.CONST:
+                stack.append((0, a))
+            case Op.SIGNAL:
+                stack.append(number_of(a, world))
+            case Op.ARGUMENT:
+                stack.append((0, world.arguments[a]))
+            case Op.ADD | Op.SUB:
+                right, left = stack.pop(), stack.pop()
+                if left is None or right is None:
+                    stack.append(None)
+                elif op == Op.ADD:
+                    stack.append((left[0] + right[0], left[1] + right[1]))
+                else:
+                    stack.append((left[0] - right[0], left[1] - right[1]))
+            case Op.SCALE:
+                value = stack.pop()
+                stack.append(None if value is None else (value[0] * a, value[1] * a))
+            case Op.LT | Op.LE | Op.GT | Op.GE | Op.EQ | Op.NE:
+                right, left = stack.pop(), stack.pop()
+                stack.append(U if left is None or right is None else compared(op, left, right, world.heights or (0, 0)))
+            case Op.AND | Op.OR:
+                right, left = stack.pop(), stack.pop()
+                table = kleene_and if op == Op.AND else kleene_or
+                stack.append(frozenset(table(x, y) for x, y in product(left, right)))
+            case Op.NOT:
+                stack.append(frozenset({"T": "F", "F": "T", "U": "U"}[x] for x in stack.pop()))
+            case Op.SIGNAL_IN:
+                value = world.slots[a]
+                stack.append(U if value is None else T if value in world.policy.sets[b] else F)
+            case Op.ARGUMENT_IN:
+                stack.append(T if world.arguments[a] in world.policy.sets[b] else F)
+            case Op.POSITION_IN:
+                stack.append(inside(world, world.policy.zones[a]))
+            case Op.POSITION_IN_ARGUMENT:
+                derived = world.policy.tables[b][world.arguments[a]]
+                stack.append(inside(world, world.policy.zones[derived]))
+            case Op.ARGUMENT_POINT_IN:
+                place = (world.arguments[a], world.arguments[a + 1])
+                stack.append(T if in_shape(place, world.policy.zones[b]) else F)
+            case Op.TIME_IN:
+                stack.append(daytime(world.utc, world.error, world.policy.vehicle.utc_offset_us, a, b))
+            case _:
+                raise AssertionError(op)
+    (answer,) = stack
+    return answer
+
+
+def number_of(slot: int, world: World) -> tuple[int, int] | None:
+    if slot == world.policy.vehicle.height and world.heights is not None:
+        return 1, 0
+    value = world.slots[slot]
+    return None if value is None else (0, value)
+
+
+RELATIONS: dict[int, Callable[[int, int], bool]] = {
+    Op.LT: lambda x, y: x < y,
+    Op.LE: lambda x, y: x <= y,
+    Op.GT: lambda x, y: x > y,
+    Op.GE: lambda x, y: x >= y,
+    Op.EQ: lambda x, y: x == y,
+    Op.NE: lambda x, y: x != y,
+}
+
+
+def compared(op: int, left: tuple[int, int], right: tuple[int, int], heights: tuple[int, int]) -> Truths:
+    """The relation at the lowest and the highest height, and in between where the difference is 0 there."""
+    differences = [(left[0] - right[0]) * height + left[1] - right[1] for height in heights]
+    if min(differences) < 0 < max(differences):
+        differences.append(0)
+    return frozenset("T" if RELATIONS[op](difference, 0) else "F" for difference in differences)
+
+
+def inside(world: World, zone: Zone) -> Truths:
+    if world.legs is None:
+        return U
+    found: set[str] = set()
+    for a, b, box, low, high in world.legs:
+        vertical = {"T" if zone.floor < z < zone.ceiling else "F" for z in (low, high)}
+        if low <= zone.floor and high >= zone.ceiling and zone.ceiling - zone.floor > 1:
+            vertical.add("T")
+        flat = horizontal(a, b, box, zone)
+        found |= {"T" if v == h == "T" else "F" for v, h in product(vertical, flat)}
+    return frozenset(found)
+
+
+def horizontal(a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int], zone: Zone) -> Truths:
+    if a == b and box == (0, 0, 0, 0):
+        return T if in_shape(a, zone) else F
+    outline = widened(a, b, box)
+    if zone.shape != CIRCLE:
+        assert corners(zone)
+        return T | F if touches(outline, zone) else T if in_shape(a, zone) else F
+    if circle_far(outline, zone) < zone.data[2]:
+        return T
+    reach = (max(-box[0], box[2]) ** 2 + max(-box[1], box[3]) ** 2) ** 0.5
+    clear = float(circle_near(widened(a, b, (0, 0, 0, 0)), zone)) ** 0.5 - zone.data[2] ** 0.5 - reach
+    if abs(clear) < 5:
+        raise TooNear
+    return F if clear > 0 else T | F
+
+
+def daytime(utc: int, error: int, offset: int, start: int, end: int) -> Truths:
+    """Look at the moment and, around it, at each boundary of the window that the error may reach."""
+    end = min(end, DAY - 1)
+
+    def within(moment: int) -> bool:
+        time = (moment + offset) % DAY
+        return start <= time <= end if start <= end else time >= start or time <= end
+
+    first, last = utc - error, utc + error
+    looked = {within(first), within(last)}
+    for boundary in (start - 1, start, end, end + 1):
+        next_one = first + (boundary - offset - first) % DAY
+        if next_one <= last:
+            looked.add(within(next_one))
+    return U if len(looked) == 2 else T if True in looked else F

@@ -1,0 +1,125 @@
+"""Geometry by definition, in rationals: slow, obvious, and written apart from `rtshcua.decision.zones`."""
+
+from fractions import Fraction
+from itertools import pairwise
+
+from rtshcua.model.flat.zone import CIRCLE, Zone
+
+Point = tuple[int, int]
+
+
+def corners(zone: Zone) -> list[Point]:
+    return list(zip(zone.data[::2], zone.data[1::2], strict=True))
+
+
+def edges(zone: Zone) -> list[tuple[Point, Point]]:
+    points = corners(zone)
+    return list(pairwise([*points, points[0]]))
+
+
+def on_segment(p: Point, a: Point, b: Point) -> bool:
+    """p is a + t (b - a) for some t in 0..1."""
+    if a == b:
+        return p == a
+    along = [
+        Fraction(p[axis] - a[axis], b[axis] - a[axis]) if a[axis] != b[axis] else None for axis in (0, 1)
+    ]
+    if any(t is None and p[axis] != a[axis] for axis, t in enumerate(along)):
+        return False
+    places = {t for t in along if t is not None}
+    return len(places) == 1 and 0 <= places.pop() <= 1
+
+
+def in_polygon(p: Point, zone: Zone) -> bool:
+    """Rays cast to the east cross the outline an odd number of times; the outline itself is outside."""
+    if any(on_segment(p, a, b) for a, b in edges(zone)):
+        return False
+    crossings = 0
+    for (ax, ay), (bx, by) in edges(zone):
+        if min(ay, by) <= p[1] < max(ay, by) and ax + Fraction((p[1] - ay) * (bx - ax), by - ay) > p[0]:
+            crossings += 1
+    return crossings % 2 == 1
+
+
+def in_shape(p: Point, zone: Zone) -> bool:
+    if zone.shape == CIRCLE:
+        x, y, square = zone.data
+        return (p[0] - x) ** 2 + (p[1] - y) ** 2 < square
+    return in_polygon(p, zone)
+
+
+def segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
+    """Some a + t (b - a) is c + s (d - c), with t and s in 0..1."""
+    if any((on_segment(a, c, d), on_segment(b, c, d), on_segment(c, a, b), on_segment(d, a, b))):
+        return True
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]
+    cross = ux * vy - uy * vx
+    if cross == 0:
+        return False
+    wx, wy = c[0] - a[0], c[1] - a[1]
+    return 0 <= Fraction(wx * vy - wy * vx, cross) <= 1 and 0 <= Fraction(wx * uy - wy * ux, cross) <= 1
+
+
+def hull(points: list[Point]) -> list[Point]:
+    """Gift wrapping: each next corner has all others on its left."""
+    points = sorted(set(points))
+    if len(points) < 3:
+        return points
+    wrapped = [points[0]]
+    while True:
+        at = wrapped[-1]
+        best = next(p for p in points if p != at)
+        for p in points:
+            cross = (best[0] - at[0]) * (p[1] - at[1]) - (best[1] - at[1]) * (p[0] - at[0])
+            nearer = (p[0] - at[0]) ** 2 + (p[1] - at[1]) ** 2 > (best[0] - at[0]) ** 2 + (best[1] - at[1]) ** 2
+            if p != at and (cross < 0 or (cross == 0 and nearer)):
+                best = p
+        if best == wrapped[0]:
+            return wrapped
+        wrapped.append(best)
+
+
+def widened(a: Point, b: Point, box: tuple[int, int, int, int]) -> list[Point]:
+    west, south, east, north = box
+    return hull([(x + dx, y + dy) for x, y in (a, b) for dx in (west, east) for dy in (south, north)])
+
+
+def in_hull(p: Point, outline: list[Point]) -> bool:
+    """Inside a convex outline, or on it."""
+    if len(outline) < 3:
+        return on_segment(p, outline[0], outline[-1])
+    return all(
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0
+        for a, b in pairwise([*outline, outline[0]])
+    )
+
+
+def touches(outline: list[Point], zone: Zone) -> bool:
+    """Whether the boundary of a polygon shares a place with a convex outline or its inside."""
+    sides = list(pairwise([*outline, outline[0]]))
+    return any(
+        in_hull(a, outline) or in_hull(b, outline) or any(segments_meet(a, b, c, d) for c, d in sides)
+        for a, b in edges(zone)
+    )
+
+
+def square_distance(p: Point, a: Point, b: Point) -> Fraction:
+    """The square of the distance between a point and a segment."""
+    square = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2
+    t = Fraction((p[0] - a[0]) * (b[0] - a[0]) + (p[1] - a[1]) * (b[1] - a[1]), square) if square else Fraction(0)
+    t = min(max(t, Fraction(0)), Fraction(1))
+    x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
+    return (p[0] - x) ** 2 + (p[1] - y) ** 2
+
+
+def circle_near(outline: list[Point], zone: Zone) -> Fraction | int:
+    """The square of the distance between a circle's centre and a convex outline (0 when it is inside)."""
+    centre = (zone.data[0], zone.data[1])
+    if in_hull(centre, outline):
+        return 0
+    return min(square_distance(centre, a, b) for a, b in pairwise([*outline, outline[0]]))
+
+
+def circle_far(outline: list[Point], zone: Zone) -> int:
+    """The square of the distance between a circle's centre and the farthest corner of an outline."""
+    return max((x - zone.data[0]) ** 2 + (y - zone.data[1]) ** 2 for x, y in outline)

@@ -1,0 +1,342 @@
+"""A world for the runtime: a vehicle that flies at once, a clock that is set by hand, and one whole run over both.
+
+It fakes the port, never the calls: the bundle is sealed, loaded and decided by the real code.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from msgspec.structs import replace
+from reference.flat_case import (
+    BATTERY,
+    FIX,
+    HEIGHT,
+    ISSUED,
+    LINK,
+    MISSION,
+    OBSTACLE,
+    POLICY,
+    POSITION_X,
+    POSITION_Y,
+    WIND,
+    M,
+    S,
+)
+
+from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.ports import (
+    Action,
+    AirState,
+    Append,
+    Command,
+    Dispatch,
+    Ending,
+    Event,
+    Failed,
+    Readings,
+    Ready,
+    Release,
+    Sent,
+    Succeeded,
+)
+from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.runtime import Runtime
+from rtshcua.wire import binding, bundle
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.request import CONTINGENCY_LINK, Request, encode
+from rtshcua.wire.response import Answer, Status, Unusable, decode
+from rtshcua.wire.trust import TrustRoot
+
+VEHICLE = POLICY.vehicle.identity
+SESSION_KEY = bytes(range(32))
+START = Now(monotonic_us=500 * S, utc_us=ISSUED + 60 * S, utc_error_us=20_000)
+TICK = 50_000  # us
+SKILL_US = 2 * S  # how long the fake vehicle takes for anything
+
+POLICY_KEY, MISSION_KEY, LOG_KEY = (
+    SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True)
+    for number, duty in enumerate((Duty.POLICY, Duty.MISSION, Duty.LOG), 1)
+)
+ROOT = TrustRoot(
+    version=1,
+    development=True,
+    issued_at_us=0,
+    expires_at_us=ISSUED * 2,
+    keys=(
+        POLICY_KEY.verification(vehicles=(VEHICLE,)),
+        MISSION_KEY.verification(roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,)),
+        LOG_KEY.verification(vehicles=(VEHICLE,)),
+    ),
+)
+
+
+def sealed(policy: Policy = POLICY, mission: Mission = MISSION) -> bytes:
+    """A bundle of both, bound and signed."""
+    payload = bundle.policy_payload(policy)
+    bound = binding.bind(mission, bundle.policy_digest(payload))
+    return bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY_KEY, mission_key=MISSION_KEY)
+
+
+def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = False) -> Loaded | LoadRefusal:
+    """`load` with the keys of this world."""
+    return load(
+        data,
+        root=ROOT,
+        vehicle=VEHICLE,
+        now=START,
+        mode=mode,
+        session_key=SESSION_KEY,
+        peer_is_own_simulator=own_simulator,
+    )
+
+
+def loaded(policy: Policy = POLICY, mission: Mission = MISSION, mode: Mode = Mode.SOFTWARE) -> Loaded:
+    """The bundle of both, in force."""
+    result = try_load(sealed(policy, mission), mode, own_simulator=True)
+    assert isinstance(result, Loaded), result
+    return result
+
+
+class ManualClock:
+    """Moves when it is told to."""
+
+    def __init__(self, start: Now = START) -> None:
+        self._now = start
+
+    def now(self) -> Now:
+        return self._now
+
+    def advance(self, us: int) -> None:
+        now = self._now
+        self._now = Now(now.monotonic_us + us, now.utc_us + us, now.utc_error_us)
+
+
+@dataclass
+class FakeVehicle:
+    """Does what it is told within `SKILL_US`, and says so; `values` is its telemetry, by state slot.
+
+    Skills in `fails` fail, those in `deaf` never end; slots in `silent` are not reported.
+    """
+
+    values: dict[int, int | None] = field(
+        default_factory=lambda: {
+            BATTERY: 9_000,
+            HEIGHT: 0,
+            WIND: 4 * M,
+            LINK: 9_000,
+            FIX: 3,
+            POSITION_X: 0,
+            POSITION_Y: 0,
+            OBSTACLE: 20 * M,
+        }
+    )
+    fails: set[str] = field(default_factory=set)
+    deaf: set[str] = field(default_factory=set)
+    silent: set[int] = field(default_factory=set)
+    mute: bool = False
+    armed: bool = False
+    airborne: bool = False
+    commands: list[Command] = field(default_factory=list)
+    released: bool = False
+    _ends_us: int = 0
+    _current: Command | None = None
+
+    def begin(self, command: Command, now_us: int) -> None:
+        assert not self.released, "nothing is sent after standing down"
+        self.commands.append(command)
+        self._current, self._ends_us = command, now_us + SKILL_US
+        self.armed = True
+        if command.path and command.kind in (MotionKind.FLY, MotionKind.COVER):
+            self.values |= {POSITION_X: command.path[-2], POSITION_Y: command.path[-1]}
+
+    def poll(self, now_us: int) -> list[Event]:
+        if self.mute:
+            return []
+        values = tuple((slot, value) for slot, value in self.values.items() if slot not in self.silent)
+        events: list[Event] = [Readings(now_us, values)]
+        command = self._current
+        if command is not None and now_us >= self._ends_us and command.skill not in self.deaf:
+            self._current = None
+            if command.skill in self.fails:
+                events.append(Failed(now_us, command.token, "no-effect", "because"))
+            else:
+                self._arrive(command)
+                events += [AirState(now_us, self.armed, self.airborne), Succeeded(now_us, command.token)]
+        return events
+
+    def _arrive(self, command: Command) -> None:
+        if command.kind == MotionKind.CLIMB:
+            self.airborne = True
+            self.values[HEIGHT] = command.altitude
+        elif command.kind in (MotionKind.HOME, MotionKind.LAND):
+            self.airborne = self.armed = False
+            self.values[HEIGHT] = 0
+            if command.kind == MotionKind.HOME:
+                self.values |= {POSITION_X: 0, POSITION_Y: 0}
+
+
+class Run:
+    """One run: the shell's loop over a fake vehicle, with everything it did kept for asserting."""
+
+    def __init__(
+        self,
+        of: Loaded | None = None,
+        vehicle: FakeVehicle | None = None,
+        *,
+        limits: Limits | None = None,
+        resumed: bool = False,
+        ready: bool = True,
+    ) -> None:
+        self.loaded = of or loaded()
+        self.vehicle = vehicle or FakeVehicle()
+        self.clock = ManualClock()
+        recorder = Recorder(lambda data: LOG_KEY.sign(data, duty=Duty.LOG), LOG_KEY.public)
+        self.lines = [
+            recorder.genesis(
+                START,
+                bundle=b"b",
+                root=b"r",
+                boot=bytes(16),
+                vehicle=VEHICLE,
+                mission=self.loaded.bundle.mission.name,
+                mode=self.loaded.mode,
+            )
+        ]
+        self.recorder = recorder
+        self.runtime = Runtime(self.loaded, recorder, limits=limits, resumed=resumed)
+        self.actions: list[Action] = []
+        if ready:
+            self.step(AirState(0, False, self.vehicle.airborne), *self.vehicle.poll(START.monotonic_us), Ready(0))
+
+    @property
+    def ending(self) -> Ending | None:
+        return self.runtime.ending
+
+    @property
+    def flown(self) -> list[str]:
+        """The skills that were sent, in order."""
+        return [command.skill for command in self.vehicle.commands]
+
+    @property
+    def records(self) -> list[dict[str, object]]:
+        return [json.loads(line) for line in self.lines]
+
+    @property
+    def events(self) -> list[str]:
+        """The effects that were recorded, in order."""
+        return [str(record["event"]) for record in self.records if record["type"] == "effect"]
+
+    @property
+    def decisions(self) -> list[tuple[object, ...]]:
+        """(kind, step, link, outcome, reason) of each recorded decision."""
+        keys = ("kind", "step", "link", "outcome", "reason")
+        return [tuple(record[key] for key in keys) for record in self.records if record["type"] == "decision"]
+
+    def step(self, *events: Event) -> list[Action]:
+        """One step of the shell at the present moment."""
+        now = self.clock.now()
+        actions = self.runtime.step(now, events)
+        sent: list[Event] = []
+        for action in actions:
+            match action:
+                case Append():
+                    self.lines.append(action.line)
+                case Dispatch():
+                    assert self.clock.now().monotonic_us <= action.not_after_us
+                    self.vehicle.begin(action.command, now.monotonic_us)
+                    sent.append(Sent(now.monotonic_us + 1_500, action.command.token))
+                case Release():
+                    self.vehicle.released = True
+        self.actions += actions
+        if sent:
+            actions += self.step(*sent)
+        return actions
+
+    def tick(self, *events: Event) -> list[Action]:
+        """Time goes on by one tick, telemetry arrives, then `events`."""
+        self.clock.advance(TICK)
+        return self.step(*self.vehicle.poll(self.clock.now().monotonic_us), *events)
+
+    def until(self, done: Callable[["Run"], bool], seconds: int = 120) -> "Run":
+        """Tick until `done`; a run that never gets there fails the test."""
+        for _ in range(seconds * S // TICK):
+            if done(self):
+                return self
+            self.tick()
+        raise AssertionError(f"not reached in {seconds} s: {self.flown}, {self.events}, {self.decisions}")
+
+    def until_flies(self, skill: str) -> "Run":
+        return self.until(lambda run: skill in run.flown[-1:])
+
+    def until_over(self, seconds: int = 240) -> "Run":
+        return self.until(lambda run: run.ending is not None, seconds)
+
+
+def dispatches(actions: Sequence[Action]) -> list[Command]:
+    """The commands that were to be sent."""
+    return [action.command for action in actions if isinstance(action, Dispatch)]
+
+
+def assert_covered(run: Run) -> None:
+    """Every command was sent after a record that covers it, and one effect says that it was sent."""
+    allowed: set[tuple[object, ...]] = set()
+    lines = iter(run.lines[1:])
+    tokens = []
+    for action in run.actions:
+        if isinstance(action, Append):
+            record = json.loads(action.line)
+            assert action.line == next(lines)
+            if record["type"] == "decision" and record["outcome"] == "allow":
+                allowed.add((record["kind"], record["step"], record["link"]))
+            if record.get("event") == "dispatched":
+                assert record["token"] == tokens[-1], "the effect follows its dispatch"
+                key = (record["kind"], record["step"], record["link"])
+                step_allowed = (0, record["step"], -1) in allowed
+                any_allowed = any(kind == 0 for kind, _, _ in allowed)
+                assert key in allowed or (record["kind"] == 1 and step_allowed) or (record["kind"] == 2 and any_allowed)
+        elif isinstance(action, Dispatch):
+            tokens.append(action.command.token)
+            assert allowed, "nothing is sent before a recorded decision"
+    assert len(set(tokens)) == len(tokens)
+    assert run.events.count("dispatched") == len(tokens)
+
+
+def request_for(of: Loaded, kind: int = 0, step: int = 0, link: int = -1, **changed: object) -> bytes:
+    """A request that an honest runtime would send on the ground (step 0) or in the air, but for what is `changed`."""
+    invocations = of.bundle.mission.invocations
+    invocation = invocations[min(max(step, 0), len(invocations) - 1)]
+    values = FakeVehicle().values | ({HEIGHT: 20 * M, POSITION_X: 110 * M, POSITION_Y: -20 * M} if step else {})
+    honest = Request(
+        kind,
+        step,
+        link,
+        of.bundle.policy_digest if kind == CONTINGENCY_LINK else invocation.binding,
+        START,
+        State(tuple(values[slot] for slot in range(len(values))), (0,) * len(values)),
+        START.monotonic_us,
+        invocation.phase,
+        20_000,
+    )
+    return encode(replace(honest, **changed))
+
+
+def answer_to(of: Loaded, request: bytes) -> Answer | Status:
+    """What the boundary answers."""
+    answer = decode(of.boundary.enforce(request))
+    assert not isinstance(answer, Unusable)
+    return answer
+
+
+def allowed(of: Loaded, kind: int = 0, step: int = 0, link: int = -1) -> bytes:
+    """The permit of a request that must be allowed."""
+    answer = answer_to(of, request_for(of, kind, step, link))
+    assert isinstance(answer, Answer)
+    assert answer.outcome is Outcome.ALLOW, answer
+    return answer.permit

@@ -1,0 +1,108 @@
+"""`decide` and the choice of links against the oracle, and `possible` against `decide`, in random worlds."""
+
+from random import Random
+
+import pytest
+from hypothesis import assume, given, settings
+from reference import worlds
+from reference.naive_code import TooNear
+from reference.oracle import Oracle
+
+from rtshcua.decision.case import is_situation, situation
+from rtshcua.decision.decide import decide, possible
+from rtshcua.decision.links import START, choose_contingency, choose_fallback, link_admissible
+from rtshcua.decision.prepare import prepare, prepare_invocation
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.model.outcome import Outcome
+
+MANY = settings(max_examples=500)
+
+
+def prepared(of: Random) -> tuple[PreparedPolicy, PreparedInvocation]:
+    policy = prepare(worlds.policy(of))
+    assert isinstance(policy, PreparedPolicy), policy
+    invocation = prepare_invocation(worlds.invocation(of, policy.policy), policy)
+    assert isinstance(invocation, PreparedInvocation), invocation
+    return policy, invocation
+
+
+def decides_the_same(of: Random) -> None:
+    policy, invocation = prepared(of)
+    state, now, context = worlds.state(of), worlds.now(of), worlds.context(of, invocation.invocation)
+    oracle = Oracle(policy.policy, state, now)
+    try:
+        outcome, reason, step = oracle.decide(invocation.invocation, context)
+        target = oracle.target(invocation.invocation) if outcome is Outcome.FALLBACK else None
+    except TooNear:
+        assume(False)
+    decision = decide(invocation, state, policy, context, now)
+    assert (decision.outcome, decision.reason, decision.step) == (outcome, reason, step)
+    assert (decision.link, decision.target) == (target or (None, None))
+
+
+def holds_what_is_decided(of: Random) -> None:
+    policy, invocation = prepared(of)
+    sets, context = worlds.sets(of), worlds.context(of, invocation.invocation)
+    answers = possible(invocation, sets, policy, context)
+    assert answers
+    for _ in range(8):
+        state, now = worlds.situation(of, sets)
+        decision = decide(invocation, state, policy, context, now)
+        assert (decision.outcome, decision.reason, decision.target) in answers
+
+
+@MANY
+@given(worlds.CHANCES)
+def test_the_oracle_decides_the_same(of: Random) -> None:
+    decides_the_same(of)
+
+
+@MANY
+@given(worlds.CHANCES)
+def test_the_oracle_chooses_the_same_links(of: Random) -> None:
+    policy, invocation = prepared(of)
+    state, now, after = worlds.state(of), worlds.now(of), of.randrange(START, 3)
+    oracle = Oracle(policy.policy, state, now)
+    try:
+        fallback = oracle.first(invocation.invocation.contract.fallback, after)
+        contingency = oracle.first(policy.policy.contingency, after)
+        may = [oracle.may_fly(link) for link in policy.policy.contingency]
+    except TooNear:
+        assume(False)
+    if after > START:
+        choice = choose_fallback(invocation, state, policy, now, after)
+        assert (choice and (choice.index, choice.link)) == fallback
+    choice = choose_contingency(state, policy, now, after)
+    assert (choice and (choice.index, choice.link)) == contingency
+    assert [link_admissible(link, state, policy, now) for link in policy.contingency] == may
+
+
+@MANY
+@given(worlds.CHANCES)
+def test_what_is_possible_holds_what_is_decided(of: Random) -> None:
+    holds_what_is_decided(of)
+
+
+@given(worlds.CHANCES)
+def test_one_situation_has_one_answer(of: Random) -> None:
+    policy, invocation = prepared(of)
+    state, now, context = worlds.state(of), worlds.now(of), worlds.context(of, invocation.invocation)
+    decision = decide(invocation, state, policy, context, now)
+    sets = situation(state, policy, now)
+    assert is_situation(sets)
+    answers = possible(invocation, sets, policy, context)
+    assert answers == {(decision.outcome, decision.reason, decision.target)}
+
+
+@pytest.mark.soak
+@settings(max_examples=20_000, derandomize=False)
+@given(worlds.CHANCES)
+def test_the_oracle_decides_the_same_for_long(of: Random) -> None:
+    decides_the_same(of)
+
+
+@pytest.mark.soak
+@settings(max_examples=20_000, derandomize=False)
+@given(worlds.CHANCES)
+def test_what_is_possible_holds_what_is_decided_for_long(of: Random) -> None:
+    holds_what_is_decided(of)

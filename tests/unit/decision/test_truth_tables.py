@@ -1,0 +1,39 @@
+"""Kleene's tables by hand, and their lifting to sets by definition."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, NOT, OR, TRUE, UNKNOWN, members
+
+T, F, U = TRUE, FALSE, UNKNOWN
+KLEENE_AND = {(T, T): T, (T, F): F, (T, U): U, (F, F): F, (F, U): F, (U, U): U}
+KLEENE_OR = {(T, T): T, (T, F): T, (T, U): T, (F, F): F, (F, U): U, (U, U): U}
+
+
+@pytest.mark.parametrize(("pair", "result"), KLEENE_AND.items())
+def test_and(pair: tuple[int, int], result: int) -> None:
+    assert AND[pair[0]][pair[1]] == AND[pair[1]][pair[0]] == result
+
+
+@pytest.mark.parametrize(("pair", "result"), KLEENE_OR.items())
+def test_or(pair: tuple[int, int], result: int) -> None:
+    assert OR[pair[0]][pair[1]] == OR[pair[1]][pair[0]] == result
+
+
+def test_not() -> None:
+    assert (NOT[T], NOT[F], NOT[U]) == (F, T, U)
+
+
+@given(st.integers(1, 7), st.integers(1, 7))
+def test_sets_hold_what_their_members_give_and_no_more(a: int, b: int) -> None:
+    assert set(members(AND[a][b])) == {AND[x][y] for x in members(a) for y in members(b)}
+    assert set(members(OR[a][b])) == {OR[x][y] for x in members(a) for y in members(b)}
+    assert set(members(NOT[a])) == {NOT[x] for x in members(a)}
+
+
+@pytest.mark.parametrize(
+    ("truth", "result"), [(T, T), (F, F), (U, U), (T | F, F), (T | U, U), (F | U, F), (T | F | U, F)]
+)
+def test_false_and_unknown_together_are_false_everywhere(truth: int, result: int) -> None:
+    assert EVERYWHERE[truth] == result

@@ -1,0 +1,144 @@
+"""Zones against geometry in rationals, and cases by hand on the boundary."""
+
+from math import cos, pi, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
+
+from rtshcua.decision.places import Place, Sweep
+from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.zones import PreparedZone
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
+
+T, F = TRUE, FALSE
+SMALL = st.integers(-12, 12)
+POINTS = st.tuples(SMALL, SMALL)
+BOXES = st.tuples(st.integers(-4, 0), st.integers(-4, 0), st.integers(0, 4), st.integers(0, 4))
+
+
+def polygon(*data: int, floor: int = LOWEST, ceiling: int = HIGHEST) -> Zone:
+    return Zone("p", POLYGON, floor, ceiling, data)
+
+
+def flat(points: list[tuple[int, int]]) -> tuple[int, ...]:
+    return tuple(coordinate for point in points for coordinate in point)
+
+
+#: any closed outline: the rule is even-odd, so crossing itself does not matter
+OUTLINES = st.lists(POINTS, min_size=3, max_size=24, unique=True).map(lambda points: polygon(*flat(points)))
+STARS = st.lists(st.integers(3, 30), min_size=17, max_size=40).map(
+    lambda radii: polygon(
+        *flat([(int(r * cos(2 * pi * n / len(radii))), int(r * sin(2 * pi * n / len(radii)))) for n, r in enumerate(radii)])
+    )
+)
+CIRCLES = st.builds(lambda c, r: Zone("c", CIRCLE, LOWEST, HIGHEST, (*c, r)), POINTS, st.integers(1, 200))
+
+
+@given(OUTLINES | STARS | CIRCLES, POINTS)
+def test_a_point(zone: Zone, point: tuple[int, int]) -> None:
+    assert PreparedZone(0, zone).along(point, (0, 0, 0, 0)) == (T if in_shape(point, zone) else F)
+
+
+@given(OUTLINES | STARS, POINTS, POINTS, BOXES)
+def test_a_widened_leg_and_a_polygon(
+    zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]
+) -> None:
+    expected = T | F if touches(widened(a, b, box), zone) else T if in_shape(a, zone) else F
+    assert PreparedZone(0, zone).along((*a, *b), box) == expected
+
+
+@given(CIRCLES, POINTS, POINTS, BOXES)
+def test_a_widened_leg_and_a_circle(
+    zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]
+) -> None:
+    """Exact inside; outside it may say both when the leg comes nearer than 3 mm and the difference of box and disc."""
+    answer = PreparedZone(0, zone).along((*a, *b), box)
+    outline = widened(a, b, box)
+    if circle_far(outline, zone) < zone.data[2]:
+        assert answer == T
+    elif circle_near(outline, zone) < zone.data[2]:
+        assert answer == T | F
+    else:
+        reach = max(-box[0], box[2]) ** 2 + max(-box[1], box[3]) ** 2
+        clear = circle_near(widened(a, b, (0, 0, 0, 0)), zone) > (zone.data[2] ** 0.5 + reach**0.5 + 4) ** 2
+        assert answer in ((F,) if clear else (F, T | F))
+
+
+@given(OUTLINES, st.lists(POINTS, min_size=2, max_size=6), BOXES)
+def test_a_path_is_its_legs(zone: Zone, path: list[tuple[int, int]], box: tuple[int, int, int, int]) -> None:
+    prepared = PreparedZone(0, zone)
+    legs = [prepared.along((*a, *b), box) for a, b in zip(path, path[1:], strict=False)]
+    assert prepared.along(flat(path), box) == (T | F if T | F in legs else legs[0])
+
+
+SQUARE = polygon(0, 0, 10, 0, 10, 10, 0, 10, floor=5, ceiling=20)
+
+
+@pytest.mark.parametrize(
+    ("path", "answer"),
+    [
+        ((5, 5), T),
+        ((0, 5), F),  # on an edge
+        ((10, 10), F),  # on a corner
+        ((5, 0), F),
+        ((11, 5), F),
+        ((1, 1, 9, 9), T),
+        ((5, 5, 10, 5), T | F),  # ends on the edge
+        ((5, 5, 15, 5), T | F),
+        ((-5, 5, 15, 5), T | F),  # through, both ends outside
+        ((-5, 0, 15, 0), T | F),  # along an edge
+        ((10, 10, 12, 12), T | F),  # touches a corner from outside
+        ((11, 0, 11, 10), F),
+        ((5, 5, 5, 5), T),  # a leg of no length
+    ],
+)
+def test_by_hand(path: tuple[int, ...], answer: int) -> None:
+    assert PreparedZone(0, SQUARE).along(path, (0, 0, 0, 0)) == answer
+
+
+@pytest.mark.parametrize(
+    ("box", "answer"),
+    [((-4, -4, 4, 4), T), ((-5, -4, 4, 4), T | F), ((0, 0, 0, 5), T | F), ((0, 0, 4, 4), T)],
+)
+def test_a_place_in_a_box(box: tuple[int, int, int, int], answer: int) -> None:
+    assert PreparedZone(0, SQUARE).along((5, 5), box) == answer
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "answer"),
+    [(6, 19, T), (5, 19, T | F), (6, 20, T | F), (0, 5, F), (20, 30, F), (0, 30, T | F), (6, 6, T)],
+)
+def test_floor_and_ceiling_are_outside(low: int, high: int, answer: int) -> None:
+    zone = PreparedZone(0, SQUARE)
+    assert zone.between(low, high) == answer
+    assert Place(((Sweep((5, 5), (0, 0, 0, 0)), low, high),), 0).inside(zone) == answer
+
+
+def test_a_place_is_the_union_of_its_parts_and_of_what_is_unknown() -> None:
+    zone = PreparedZone(0, SQUARE)
+    inside = (Sweep((5, 5), (0, 0, 0, 0)), 6, 7)
+    outside = (Sweep((15, 5), (0, 0, 0, 0)), 6, 7)
+    assert Place((inside, outside), 0).inside(zone) == T | F
+    assert Place((inside,), UNKNOWN).inside(zone) == T | UNKNOWN
+    assert Place((), UNKNOWN).inside(zone) == UNKNOWN
+
+
+def test_the_largest_coordinates_stay_within_64_bits() -> None:
+    """A witness for the bound in the module's docstring: the extreme cross product."""
+    far = MAX_COORDINATE
+    zone = PreparedZone(0, polygon(-far, -far, far, -far, far, far, -far, far))
+    assert zone.along((-far + 1, -far + 1, far - 1, far - 1), (0, 0, 0, 0)) == T
+    assert 2 * (2 * far) * (2 * far) <= 1 << 61
+
+
+def test_many_vertices_are_read_a_band_at_a_time() -> None:
+    count, radius = 4_096, 1_000_000
+    ring = [(round(radius * cos(2 * pi * n / count)), round(radius * sin(2 * pi * n / count))) for n in range(count)]
+    zone = PreparedZone(0, polygon(*flat(ring)))
+    assert zone.along((0, 0), (0, 0, 0, 0)) == T
+    assert zone.along((0, radius - 2_000), (0, 0, 0, 0)) == T
+    assert zone.along((0, radius + 1), (0, 0, 0, 0)) == F
+    assert zone.along((-radius // 2, 0, radius // 2, 10), (0, 0, 0, 0)) == T
+    assert zone.along((0, -2 * radius, 0, 2 * radius), (0, 0, 0, 0)) == T | F

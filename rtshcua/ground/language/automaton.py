@@ -1,0 +1,91 @@
+"""Runs the LALR table over a text: reads a token, shifts it or reduces, and stops at the first that does not fit.
+
+Lark's own driver makes an object of each token and a tree of each rule. This one keeps offsets, hands the parts of a
+rule straight to the builder, and leaves its stacks as they are when it stops, so that `recovery` can go on from there.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language.reduce import reduction
+from rtshcua.ground.language.table import END, Table
+
+
+class Failure(NamedTuple):
+    """The token at `[start, end)` does not fit: `kind` is its kind, empty for a character that begins no token."""
+
+    start: int
+    end: int
+    kind: str
+
+
+@dataclass(slots=True)
+class Automaton:
+    """The stacks of the parser: `values` and `starts` (offsets) have one entry for each state above the first.
+
+    `actions` is an object with a method for each rule's action; it is called with the rule's span and the kept values.
+    """
+
+    table: Table
+    source: Source
+    actions: object
+    states: list[int] = field(default_factory=lambda: [0])
+    values: list[Any] = field(default_factory=list)
+    starts: list[int] = field(default_factory=list)
+
+    def run(self, offset: int) -> Failure | None:
+        """Parses from `offset` on; None when the text was read to its end."""
+        rows, lexers, last = self.table.rows, self.table.lexers, self.table.end
+        rules = [reduction(rule, self.source.file, self.actions) for rule in self.table.rules]
+        states, values, starts = self.states, self.values, self.starts
+        text, skip = self.source.text, self.table.skip
+        end = offset  # of the last token that was shifted
+        while True:
+            match, kinds = lexers[states[-1]]
+            token = match(text, end)
+            if token:
+                group = token.lastindex or 0
+                word, kind = token[group], kinds[group]
+                start, after = token.span(group)
+            else:
+                blank = skip.match(text, end)
+                start = after = blank.end() if blank else end
+                word = kind = END
+                if start < len(text):
+                    return self._failure(start)
+            while True:
+                row = rows[states[-1]]
+                step = row.get(word)  # a word or a mark of the language, where it may stand here
+                if step is None:
+                    step = row.get(kind)
+                    if step is None:
+                        return Failure(start, after, kind or word)
+                if step >= 0:
+                    states.append(step)
+                    values.append(word)
+                    starts.append(start)
+                    end = after
+                    break
+                origin, length, make = rules[~step]
+                base = len(values) - length
+                if length:
+                    value = make(values, base, starts[base], end)
+                    del states[-length:], values[base:], starts[base + 1 :]
+                else:
+                    value = make(values, base, end, end)
+                    starts.append(end)
+                state = rows[states[-1]][origin]
+                states.append(state)
+                values.append(value)
+                if word is END and state == last:
+                    return None
+
+    def _failure(self, start: int) -> Failure:
+        """No token that fits begins at `start`; perhaps one of another kind does."""
+        lexer = self.table.any
+        token = lexer.match(self.source.text, start)
+        if token and token.start(token.lastindex or 0) == start:
+            group = token.lastindex or 0
+            return Failure(start, token.end(), lexer.kinds[group] or token[group])
+        return Failure(start, start + 1, "")

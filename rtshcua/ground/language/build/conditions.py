@@ -1,0 +1,95 @@
+"""Values that are computed, and conditions."""
+
+from typing import Any, Literal
+
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.language.build.literals import Literals
+from rtshcua.model.ir.expression import (
+    Arithmetic,
+    Comparison,
+    Condition,
+    Grow,
+    Inside,
+    Junction,
+    Not,
+    OneOf,
+    Quantity,
+    Range,
+    Reference,
+    Value,
+    Within,
+)
+from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.skills import Clause
+
+
+class Conditions(Literals):
+    """Values and conditions."""
+
+    def reference(self, span: Span, text: str) -> Reference:
+        """A name that stands for a value."""
+        return Reference(span=span, name=text)
+
+    def local_time(self, span: Span, text: str) -> Reference:
+        """`local time`, one name however it is spaced."""
+        return Reference(span=span, name="local time")
+
+    def sum(self, span: Span, left: Value, operator: Literal["+", "-"], right: Value) -> Node:
+        """`left + right`, `left - right`."""
+        return self.nested(Arithmetic(span=span, operator=operator, left=left, right=right), left, right)
+
+    def product(self, span: Span, left: Value, operator: Literal["*"], right: Value) -> Node:
+        """`left * right`."""
+        return self.nested(Arithmetic(span=span, operator=operator, left=left, right=right), left, right)
+
+    def bracket(self, span: Span, value: Node) -> Node:
+        """Parentheses leave what is in them as it is, and count as a level."""
+        return self.nested(value, value)
+
+    group = bracket
+
+    def range(self, span: Span, low: Value, high: Value) -> Range:
+        """`low .. high`."""
+        return Range(span=span, low=low, high=high)
+
+    def comparison(self, span: Span, left: Value, operator: Any, right: Value) -> Comparison:
+        """`left < right` and the like."""
+        return Comparison(span=span, operator=operator, left=left, right=right)
+
+    def within(self, span: Span, subject: Value, range: Range) -> Within:
+        """`subject in low .. high`."""
+        return Within(span=span, subject=subject, range=range)
+
+    def one_of_names(self, span: Span, subject: Value, names: tuple[Name, ...]) -> OneOf:
+        """`subject in {a, b}`."""
+        return OneOf(span=span, subject=subject, names=names)
+
+    def inside(self, span: Span, subject: Value, region: Reference | Grow) -> Inside:
+        """`subject inside region`."""
+        return Inside(span=span, subject=subject, region=region, negated=False)
+
+    def outside(self, span: Span, subject: Value, region: Reference | Grow) -> Inside:
+        """`subject outside region`."""
+        return Inside(span=span, subject=subject, region=region, negated=True)
+
+    def grow(self, span: Span, zone: Reference, margin: Quantity) -> Grow:
+        """`grow(zone, margin)`."""
+        return Grow(span=span, zone=zone, margin=margin)
+
+    def negation(self, span: Span, operand: Condition) -> Node:
+        """`not operand`."""
+        return self.nested(Not(span=span, operand=operand), operand)
+
+    def conjunction(self, span: Span, *operands: Condition) -> Node:
+        """`a and b and c`."""
+        return self.nested(Junction(span=span, operator="and", operands=operands), *operands)
+
+    def disjunction(self, span: Span, *operands: Condition) -> Node:
+        """`a or b or c`."""
+        return self.nested(Junction(span=span, operator="or", operands=operands), *operands)
+
+    def clauses(self, condition: Condition) -> tuple[Clause, ...]:
+        """Splits a top-level `and`, so that a refusal can name the one operand that decided."""
+        if isinstance(condition, Junction) and condition.operator == "and":
+            return tuple(clause for operand in condition.operands for clause in self.clauses(operand))
+        return (Clause(span=condition.span, condition=condition),)

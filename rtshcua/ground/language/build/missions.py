@@ -1,0 +1,69 @@
+"""Missions and imports: with these the builder is whole."""
+
+from typing import Any
+
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.language.build.base import Part
+from rtshcua.ground.language.build.policies import Policies
+from rtshcua.model.ir.missions import MissionDecl, Phase, Step
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.program import Import
+from rtshcua.model.ir.skills import ArgumentValue
+
+
+class Builder(Policies):
+    """Every action of the grammar."""
+
+    def file(self, span: Span, *declarations: None) -> None:
+        """The whole text; its declarations were kept as they ended."""
+
+    def import_file(self, span: Span, path: str) -> None:
+        """`import "lib:skills/goto.rts"`."""
+        self.declare(Import(span=span, path=path))
+
+    def argument(self, span: Span, *parts: Any) -> ArgumentValue:
+        """`altitude = 20 m`, or a value by its place."""
+        name, value = parts if len(parts) == 2 else (None, *parts)
+        return ArgumentValue(span=span, name=name, value=value)
+
+    def arguments(self, span: Span, *arguments: ArgumentValue) -> tuple[ArgumentValue, ...]:
+        """Arguments with commas between them."""
+        return arguments
+
+    def step(self, span: Span, skill: Name, arguments: tuple[ArgumentValue, ...] | None, otherwise: Any) -> Step:
+        """`goto(bridge_a.entry, altitude = 20 m) on inadmissible skip`."""
+        return Step(span=span, skill=skill, arguments=arguments or (), on_inadmissible=otherwise or "abort")
+
+    def phase(self, span: Span, name: Name, *steps: Step) -> Phase:
+        """`phase inspection { ... }`."""
+        self.undotted(name, "phase")
+        return Phase(span=span, name=name, steps=steps)
+
+    def intent(self, span: Span, text: str) -> Part:
+        """`intent "Inspect bridge A."`."""
+        return Part("intent", span, text)
+
+    def proposed(self, span: Span, source: Name, proposer: Name, role: Name | None) -> Part:
+        """`proposed by agent openclaw for role operator`."""
+        return Part("proposed", span, (source, proposer, role))
+
+    def mission(self, span: Span, name: Name, policy: Name, version: int, vehicle: Name, *given: Phase | Part) -> None:
+        """`mission inspect_bridge_a under bridge_inspection@7 on quad { ... }`."""
+        self.undotted(name, "mission")
+        found = self.parts("mission", name, [part for part in given if isinstance(part, Part)])
+        source, proposer, role = found["proposed"].value if "proposed" in found else (None, None, None)
+        self.declare(
+            MissionDecl(
+                span=span,
+                name=name,
+                policy=policy,
+                policy_version=version,
+                vehicle=vehicle,
+                intent=found["intent"].value if "intent" in found else None,
+                source=source,
+                proposer=proposer,
+                role=role,
+                phases=tuple(phase for phase in given if isinstance(phase, Phase)),
+            ),
+            name,
+        )

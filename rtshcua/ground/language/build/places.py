@@ -1,0 +1,115 @@
+"""Zones and vehicles."""
+
+from rtshcua.diagnostics.codes import SYNTAX
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.language.build.base import Part
+from rtshcua.ground.language.build.signals import Signals
+from rtshcua.ground.language.wording import short
+from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.places import Circle, Polygon, VehicleDecl, ZoneDecl
+from rtshcua.model.quantity import UNITS, Dimension
+
+FULL = 100 * UNITS["%"].numerator
+
+VEHICLE_PARTS = ("identity", "home", "speed", "climb", "position error", "energy", "reserve")
+
+
+class Places(Signals):
+    """Where things are, and what flies."""
+
+    def circle(self, span: Span, center: Coordinates, radius: Quantity) -> Circle:
+        """`circle(47.3977 N, 8.5456 E, 120 m)`."""
+        return Circle(span=span, center=center, radius=radius)
+
+    def polygon(self, span: Span, *corners: Coordinates) -> Polygon:
+        """`polygon(47.3 N, 8.5 E, ...)`."""
+        return Polygon(span=span, corners=corners)
+
+    def floor(self, span: Span, altitude: Quantity) -> Part:
+        """`floor 0 m`."""
+        return Part("floor", span, altitude)
+
+    def ceiling(self, span: Span, altitude: Quantity) -> Part:
+        """`ceiling 60 m above home`."""
+        return Part("ceiling", span, altitude)
+
+    def entry(self, span: Span, place: Coordinates) -> Part:
+        """`entry 47.3982 N, 8.5466 E`."""
+        return Part("entry", span, place)
+
+    def zone(self, span: Span, name: Name, shape: Circle | Polygon, *given: Part) -> None:
+        """`zone bridge_a = polygon(...) floor 0 m ceiling 60 m entry ...`."""
+        self.undotted(name, "zone")
+        found = self.parts("zone", name, given)
+        floor, ceiling, entry = (found[key].value if key in found else None for key in ("floor", "ceiling", "entry"))
+        self.declare(ZoneDecl(span=span, name=name, shape=shape, floor=floor, ceiling=ceiling, entry=entry), name)
+
+    def identity(self, span: Span, text: str) -> Part:
+        """`identity "quad-07"`."""
+        return Part("identity", span, text)
+
+    def home(self, span: Span, place: Coordinates, within: Quantity) -> Part:
+        """`home 47.39774 N, 8.54559 E within 50 m`."""
+        return Part("home", span, (place, within))
+
+    def speed(self, span: Span, most: Quantity) -> Part:
+        """`speed at most 12 m/s`."""
+        return Part("speed", span, most)
+
+    def climb(self, span: Span, most: Quantity) -> Part:
+        """`climb at most 3 m/s`."""
+        return Part("climb", span, most)
+
+    def position_error(self, span: Span, error: Quantity) -> Part:
+        """`position error 3 m`."""
+        return Part("position error", span, error)
+
+    def endurance(self, span: Span, charge: Quantity, hover: Quantity) -> Part:
+        """`energy 100 % = 18 min hover`."""
+        if charge.dimension is not Dimension.RATIO or charge.value != FULL:
+            written = short(self._source.slice(charge.span))
+            self.report(
+                SYNTAX,
+                f"the hover time is that of a full battery, not of `{written}`",
+                charge.span,
+                "write it as in `energy 100 % = 18 min hover`",
+            )
+        return Part("energy", span, hover)
+
+    def reserve(self, span: Span, charge: Quantity) -> Part:
+        """`reserve 15 %`."""
+        return Part("reserve", span, charge)
+
+    def clock(self, span: Span, sign: str, offset: TimeOfDay) -> Part:
+        """`clock utc +02:00`."""
+        value = -offset.value if sign == "-" else offset.value
+        return Part("clock", span, Quantity(span=span, value=value, dimension=Dimension.DURATION))
+
+    def vehicle(self, span: Span, name: Name, *given: Part) -> None:
+        """`vehicle quad { ... }`."""
+        self.undotted(name, "vehicle")
+        found = self.parts("vehicle", name, given, VEHICLE_PARTS)
+        if self.sound:
+            self._finish_vehicle(span, name, found)
+        else:
+            self.abandon(name)
+
+    def _finish_vehicle(self, span: Span, name: Name, found: dict[str, Part]) -> None:
+        home, within = found["home"].value
+        self.declare(
+            VehicleDecl(
+                span=span,
+                name=name,
+                identity=found["identity"].value,
+                home=home,
+                within=within,
+                speed=found["speed"].value,
+                climb=found["climb"].value,
+                position_error=found["position error"].value,
+                endurance=found["energy"].value,
+                reserve=found["reserve"].value,
+                utc_offset=found["clock"].value if "clock" in found else None,
+            ),
+            name,
+        )

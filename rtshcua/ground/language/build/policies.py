@@ -1,0 +1,77 @@
+"""Authority policies."""
+
+from rtshcua.diagnostics.codes import NOT_WRITTEN
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.language.build.base import Part
+from rtshcua.ground.language.build.skills import Skills
+from rtshcua.model.ir.expression import Condition, Quantity
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.policies import Airspace, PolicyDecl, Rule
+from rtshcua.model.ir.skills import LinkDecl
+
+Names = tuple[Name, ...]
+
+
+class Policies(Skills):
+    """Who may have which skill done, where and when."""
+
+    def anyone(self, span: Span) -> Names:
+        """`any` skill, or `by any` role: no name in particular."""
+        return ()
+
+    def permit(self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None) -> Rule:
+        """`permit takeoff by role operator through agent when altitude <= 40 m`."""
+        return Rule(
+            span=span, kind="permit", skills=skills, roles=roles, through=through or (), when=when,
+            approver=None, within=None, target=None,
+        )  # fmt: skip
+
+    def forbid(self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None) -> Rule:
+        """`forbid track_target by any`."""
+        return Rule(
+            span=span, kind="forbid", skills=skills, roles=roles, through=through or (), when=when,
+            approver=None, within=None, target=None,
+        )  # fmt: skip
+
+    def confirm(
+        self, span: Span, skills: Names, when: Condition | None, approver: Name, within: Quantity | None
+    ) -> Rule:
+        """`confirm inspect_area when altitude < 10 m by role supervisor within 30 s`."""
+        return Rule(
+            span=span, kind="confirm", skills=skills, roles=(), through=(), when=when,
+            approver=approver, within=within, target=None,
+        )  # fmt: skip
+
+    def degrade(self, span: Span, skills: Names, when: Condition | None, target: LinkDecl) -> Rule:
+        """`degrade any when battery < 25 % to return_home`."""
+        return Rule(
+            span=span, kind="degrade", skills=skills, roles=(), through=(), when=when,
+            approver=None, within=None, target=target,
+        )  # fmt: skip
+
+    def airspace(self, span: Span, inside: Names | None, outside: Names | None) -> Part:
+        """`airspace inside city outside school`."""
+        if inside is None and outside is None:
+            help = "write `inside`, `outside` or both, as in `airspace inside city outside school`"
+            self.report(NOT_WRITTEN, "the airspace has no zone", span, help)
+        return Part("airspace", span, Airspace(span=span, inside=inside or (), outside=outside or ()))
+
+    def contingency(self, span: Span, links: tuple[LinkDecl, ...]) -> Part:
+        """`contingency hover for 10 s, return_home, emergency_land`."""
+        return Part("contingency", span, links)
+
+    def policy(self, span: Span, name: Name, version: int, *given: Rule | Part) -> None:
+        """`policy bridge_inspection version 7 { ... }`."""
+        self.undotted(name, "policy")
+        found = self.parts("policy", name, [part for part in given if isinstance(part, Part)])
+        self.declare(
+            PolicyDecl(
+                span=span,
+                name=name,
+                version=version,
+                rules=tuple(rule for rule in given if isinstance(rule, Rule)),
+                airspace=found["airspace"].value if "airspace" in found else None,
+                contingency=found["contingency"].value if "contingency" in found else (),
+            ),
+            name,
+        )

@@ -1,0 +1,176 @@
+"""Skill contracts."""
+
+from typing import Any, Literal, NamedTuple
+
+from rtshcua.diagnostics.codes import SYNTAX
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.language.build.base import Part
+from rtshcua.ground.language.build.places import Places
+from rtshcua.ground.language.wording import short
+from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, Value
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Motion, Parameter, SkillDecl
+
+
+class Choice(NamedTuple):
+    """A further name of the `one of` before it, perhaps with the default."""
+
+    span: Span
+    name: Name
+    default: Name | None
+
+
+class Skills(Places):
+    """Capabilities, what they need, and what flies when they end early."""
+
+    def parameter(self, span: Span, name: Name, type: Name, range: Range | None, default: Value | None) -> Parameter:
+        """`altitude: altitude in 5 m .. 60 m = 20 m`."""
+        self.undotted(name, "parameter")
+        return Parameter(span=span, name=name, type=type, range=range, choices=(), default=default)
+
+    def choice_type(self, span: Span) -> Name:
+        """`one of`, as a type."""
+        return Name(span=span, text="choice")
+
+    def one_of(self, span: Span, name: Name, type: Name, first: Name, default: Name | None) -> Parameter:
+        """`pattern: one of grid`, whose further names follow as items of their own."""
+        self.undotted(name, "parameter")
+        return self._choices(span, name, type, (first,), default)
+
+    def choice(self, span: Span, name: Name, default: Name | None) -> Choice:
+        """`, orbit = grid`, the next name of a `one of`."""
+        return Choice(span, name, default)
+
+    def parameters(self, span: Span, *items: Parameter | Choice) -> tuple[Parameter, ...]:
+        """The parameters, each `one of` with all its names."""
+        made: list[Parameter] = []
+        for item in items:
+            last = made[-1] if made else None
+            if isinstance(item, Parameter):
+                made.append(item)
+            elif last is not None and last.choices and last.default is None:
+                names = (*last.choices, item.name)
+                made[-1] = self._choices(last.span.to(item.span), last.name, last.type, names, item.default)
+            else:
+                name = short(item.name.text)
+                help = f"write its type, as in `{name}: speed`"
+                self.report(SYNTAX, f"the parameter `{name}` has no type", item.span, help)
+        return tuple(made)
+
+    def _choices(self, span: Span, name: Name, type: Name, names: tuple[Name, ...], default: Name | None) -> Parameter:
+        value = Reference(span=default.span, name=default.text) if default else None
+        return Parameter(span=span, name=name, type=type, range=None, choices=names, default=value)
+
+    def climb_to(self, span: Span, altitude: Name) -> Part:
+        """`motion climb to altitude`."""
+        return self._motion(span, "climb", altitude=altitude)
+
+    def fly_to(self, span: Span, target: Name, altitude: Name, speed: Name | None) -> Part:
+        """`motion fly to target at altitude speed speed`."""
+        return self._motion(span, "fly", target, altitude, speed)
+
+    def cover_area(self, span: Span, target: Name, altitude: Name, pattern: Name | None, speed: Name | None) -> Part:
+        """`motion cover area at altitude pattern pattern speed speed`."""
+        return self._motion(span, "cover", target, altitude, speed, pattern)
+
+    def hold_for(self, span: Span, kind: Any, time: Name) -> Part:
+        """`motion hold for time`."""
+        return self._motion(span, kind, time=time)
+
+    def stay(self, span: Span, kind: Any) -> Part:
+        """`motion home`, `motion hold`, `motion land`."""
+        return self._motion(span, kind)
+
+    def _motion(
+        self,
+        span: Span,
+        kind: Literal["climb", "fly", "cover", "home", "hold", "land"],
+        target: Name | None = None,
+        altitude: Name | None = None,
+        speed: Name | None = None,
+        pattern: Name | None = None,
+        time: Name | None = None,
+    ) -> Part:
+        motion = Motion(span=span, kind=kind, target=target, altitude=altitude, speed=speed, pattern=pattern, time=time)
+        return Part("motion", span, motion)
+
+    def timing_class(self, span: Span, name: Name) -> Part:
+        """`class tactical`."""
+        return Part("class", span, name)
+
+    def deadline(self, span: Span, time: Quantity) -> Part:
+        """`deadline 2 s`."""
+        return Part("deadline", span, time)
+
+    def validity(self, span: Span, time: Quantity, phases: tuple[Name, ...] | None) -> Part:
+        """`valid for 10 min during inspection`."""
+        return Part("valid", span, (time, phases or ()))
+
+    def duration(self, span: Span, time: Quantity) -> Part:
+        """`lasts at most 5 min`."""
+        return Part("lasts", span, time)
+
+    def grace(self, span: Span, time: Quantity) -> Part:
+        """`grace 500 ms`."""
+        return Part("grace", span, time)
+
+    def require(self, span: Span, condition: Condition) -> Part:
+        """`require battery > 35 %`."""
+        return Part("require", span, self.clauses(condition))
+
+    def assume(self, span: Span, condition: Condition) -> Part:
+        """`assume wind.speed < 10 m/s`."""
+        return Part("assume", span, self.clauses(condition))
+
+    def maintain(self, span: Span, condition: Condition) -> Part:
+        """`maintain height <= 60 m`."""
+        return Part("maintain", span, self.clauses(condition))
+
+    def fallback(self, span: Span, links: tuple[LinkDecl, ...]) -> Part:
+        """`fallback hover for 20 s, return_home, emergency_land`."""
+        return Part("fallback", span, links)
+
+    def energy(self, span: Span, charge: Quantity) -> Part:
+        """`energy at most 18 %`."""
+        return Part("energy", span, charge)
+
+    def record(self, span: Span, names: tuple[Name, ...]) -> Part:
+        """`record intent, decision`."""
+        return Part("record", span, names)
+
+    def links(self, span: Span, *links: LinkDecl) -> tuple[LinkDecl, ...]:
+        """A chain of links."""
+        return links
+
+    def link(
+        self, span: Span, skill: Name, arguments: tuple[ArgumentValue, ...] | None, limit: Quantity | None
+    ) -> LinkDecl:
+        """`hover for 20 s`."""
+        return LinkDecl(span=span, skill=skill, arguments=arguments or (), limit=limit)
+
+    def skill(self, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *given: Part) -> None:
+        """`skill hover() { ... }`."""
+        self.undotted(name, "skill")
+        found = {key: part.value for key, part in self.parts("skill", name, given).items()}
+        validity, phases = found.get("valid", (None, ()))
+        self.declare(
+            SkillDecl(
+                span=span,
+                name=name,
+                parameters=parameters or (),
+                motion=found.get("motion"),
+                timing_class=found.get("class"),
+                deadline=found.get("deadline"),
+                validity=validity,
+                phases=phases,
+                duration=found.get("lasts"),
+                grace=found.get("grace"),
+                require=found.get("require", ()),
+                assume=found.get("assume", ()),
+                maintain=found.get("maintain", ()),
+                fallback=found.get("fallback", ()),
+                energy=found.get("energy"),
+                record=found.get("record", ()),
+            ),
+            name,
+        )

@@ -1,0 +1,113 @@
+"""What the parser would take where it stands, in a person's words."""
+
+from collections.abc import Iterable
+
+from rtshcua.ground.language.automaton import Automaton
+from rtshcua.ground.language.recovery import open_block, pending, shifts
+from rtshcua.ground.language.table import END
+
+WORDS = {
+    "<NAME>": "a name",
+    "<NUMBER>": "a number",
+    "<STRING>": "a text in quotes",
+    "<TIME_OF_DAY>": "a time of day",
+    "<UNIT>": "a unit",
+    "<COMPARE>": "a comparison",
+    "<LOCAL_TIME>": "`local time`",
+    "<_GROW>": "`grow`",
+    "<_ONE_OF>": "`one of`",
+    "<_ON_INADMISSIBLE>": "`on inadmissible`",
+    END: "the end of the file",
+}
+
+VALUE = {"<NAME>", "<NUMBER>", "<TIME_OF_DAY>", "<LOCAL_TIME>", "-", "("}
+NUMBER = {"-", "<NUMBER>"}
+ARITHMETIC = {"+", "-", "*"}
+
+
+def accepted(automaton: Automaton) -> set[str]:
+    """Every word, mark and kind of token that would be taken next."""
+    row = automaton.table.rows[automaton.states[-1]]
+    return {symbol for symbol in row if _is_token(symbol) and _after(automaton, symbol) is not None}
+
+
+def beginnings(automaton: Automaton) -> set[str]:
+    """The words that begin a declaration."""
+    return {word for word in automaton.table.words if shifts(automaton.table.rows[0], word)}
+
+
+def parts(automaton: Automaton, symbols: Iterable[str]) -> set[str]:
+    """Those of `symbols` that begin a part of the innermost open block."""
+    block = open_block(automaton)
+    if block is None:
+        return set()
+    row = automaton.table.rows[automaton.states[block[0]]]
+    return {symbol for symbol in symbols if symbol.isalpha() and shifts(row, symbol)}
+
+
+def phrase(automaton: Automaton, word: str) -> str:
+    """`word` with the words that can only follow it: `stale after`, `lasts at most`."""
+    said, state = [word], _after(automaton, word)
+    while state is not None:
+        tokens = {symbol: step for symbol, step in automaton.table.rows[state].items() if _is_token(symbol)}
+        (only, state) = next(iter(tokens.items())) if len(tokens) == 1 else ("", None)
+        if state is not None and state >= 0 and only.isalpha():
+            said.append(only)
+        else:
+            state = None
+    return " ".join(said)
+
+
+def describe(automaton: Automaton, symbols: set[str]) -> str:
+    """`symbols` as a list for a sentence: groups by what they are, words and marks in backticks."""
+    rest = set(symbols)
+    said: list[str] = []
+    if beginnings(automaton) <= rest:
+        rest -= beginnings(automaton)
+        said.append("a declaration")
+    if rest >= VALUE:
+        said.append("a condition" if "not" in rest else "a value")
+        rest -= VALUE | {"not"}
+    if "<COMPARE>" in rest:
+        said.append("a comparison")
+        rest -= ARITHMETIC | {"<COMPARE>", "in", "inside", "outside"}
+    elif "+" in rest:
+        said.append("an operator")
+        rest -= ARITHMETIC | {"and", "or"}
+    if rest >= NUMBER:
+        said.append("a number")
+        rest -= NUMBER
+    items = parts(automaton, rest)
+    owner = pending(automaton)
+    if len(items) > 3 and owner is not None:
+        rest -= items
+        said.append(f"another part of the {owner[0]}")
+    if said:
+        rest.discard(END)
+    said += sorted(WORDS[symbol] for symbol in rest if symbol in WORDS)
+    said += sorted(f"`{phrase(automaton, symbol)}`" for symbol in rest if symbol not in WORDS)
+    return " or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
+
+
+def _is_token(symbol: str) -> bool:
+    return not symbol.startswith("<") or symbol.isupper()
+
+
+def _after(automaton: Automaton, symbol: str) -> int | None:
+    """The state in which `symbol` leaves the parser, None where it does not fit; on a copy of the states."""
+    rows, rules = automaton.table.rows, automaton.table.rules
+    popped = 0
+    pushed: list[int] = []  # on what is left of the states: the copy, without copying what stays as it is
+    while True:
+        state = pushed[-1] if pushed else automaton.states[len(automaton.states) - 1 - popped]
+        if symbol == END and state == automaton.table.end:
+            return state
+        step = rows[state].get(symbol)
+        if step is None or step >= 0:
+            return step
+        rule = rules[~step]
+        kept = max(0, len(pushed) - rule.length)
+        popped += rule.length - (len(pushed) - kept)
+        del pushed[kept:]
+        state = pushed[-1] if pushed else automaton.states[len(automaton.states) - 1 - popped]
+        pushed.append(rows[state][rule.origin])

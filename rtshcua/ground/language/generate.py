@@ -1,0 +1,106 @@
+"""Has Lark turn `grammar/rtshcua.lark` into `table.json`: `python -m rtshcua.ground.language.generate`.
+
+Making the LALR table takes Lark a fifth of a second, which every start would pay; reading it takes a few milliseconds.
+A test keeps the committed table current. States are numbered in the order in which they are reached, so that the same
+grammar gives the same bytes whatever the order of Lark's sets.
+"""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from lark import Lark
+from lark.grammar import Rule, Terminal
+from lark.lexer import PatternStr, TerminalDef
+from lark.parsers.lalr_analysis import Shift
+
+from rtshcua.ground.language.table import PATH
+
+START = "file"
+GRAMMAR = Path(__file__).parents[3] / "grammar" / "rtshcua.lark"
+
+Row = dict[str, tuple[Any, Any]]
+
+
+def lark(grammar: str) -> Lark:
+    """Lark's own parser of the grammar: what the table is made of, and the oracle of the tests and the benchmark."""
+    return Lark(grammar, start=START, parser="lalr", lexer="contextual", propagate_positions=True)
+
+
+def generate(grammar: str) -> str:
+    """The table as JSON text, ending in a newline; `rtshcua.ground.language.table.Table` says what is in it."""
+    made = lark(grammar)
+    fixed = {t.name: t.pattern.value for t in made.terminals if isinstance(t.pattern, PatternStr)}
+    ignored = [t for t in made.terminals if t.name in made.ignore_tokens]
+    patterns = [t for t in made.terminals if t.name not in fixed and t not in ignored]
+    names = re.compile(next(t.pattern.to_regexp() for t in patterns if t.name == "NAME"))
+    keys = fixed | {t.name: f"<{t.name}>" for t in patterns} | {"$END": "<END>"}
+    rules = sorted(made.rules, key=lambda rule: (rule.origin.name, [symbol.name for symbol in rule.expansion]))
+    automaton = made.parser.parser._parse_table
+    order = _reached(automaton.states, automaton.start_states[START])
+    table = {
+        "end": order[automaton.end_states[START]],
+        "ignored": [t.pattern.to_regexp() for t in sorted(ignored, key=lambda t: t.name)],
+        "patterns": [[keys[t.name], t.pattern.to_regexp()] for t in sorted(patterns, key=_first)],
+        "marks": sorted((text for text in fixed.values() if not text.isalpha()), key=lambda text: (-len(text), text)),
+        "words": {text: bool(names.fullmatch(text)) for text in sorted(fixed.values()) if text.isalpha()},
+        "rules": [_rule(rule) for rule in rules],
+        "states": [_row(automaton.states[state], keys, order, rules) for state in order],
+    }
+    return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in table.items()) + "\n}\n"
+
+
+def _first(terminal: TerminalDef) -> tuple[int, str]:
+    return -terminal.priority, terminal.name
+
+
+def _reached(states: dict[int, Row], start: int) -> dict[int, int]:
+    """Lark's number of each state, mapped to the place at which a walk from `start` in alphabetical order meets it."""
+    order = {start: 0}
+    queue = [start]
+    for state in queue:
+        for _, (action, to) in sorted(states[state].items(), key=lambda entry: entry[0]):
+            if action is Shift and to not in order:
+                order[to] = len(order)
+                queue.append(to)
+    return order
+
+
+def _row(row: Row, keys: dict[str, str], order: dict[int, int], rules: list[Rule]) -> dict[str, int]:
+    """What a state does with each symbol: go to a state (0 or more), or reduce by rule `~n` (negative)."""
+    return {
+        keys.get(symbol, f"<{symbol}>"): order[to] if action is Shift else ~rules.index(to)
+        for symbol, (action, to) in sorted(row.items())
+    }
+
+
+def _rule(rule: Rule) -> list[Any]:
+    """[origin, name of the action or "", length, kept]: `kept` lists positions, None for an absent `[...]`.
+
+    Lark makes the rules `__x_star_0` for repetitions; their value is a list that goes into its parent item by item,
+    which is written as the position's complement. A `?rule` with one child that is kept has no action.
+    """
+    absent = iter("".join(str(int(empty)) for empty in rule.options.empty_indices or ()).split("0"))
+    kept: list[int | None] = [None] * len(next(absent, ""))
+    for at, symbol in enumerate(rule.expansion):
+        if not (isinstance(symbol, Terminal) and symbol.filter_out):
+            kept.append(~at if not symbol.is_term and symbol.name.startswith("_") else at)
+        kept += [None] * len(next(absent, ""))
+    passes = rule.options.expand1 and not rule.alias and len(kept) == 1
+    helper = rule.origin.name.startswith("_")
+    action = "" if passes or helper else rule.alias or rule.origin.name
+    return [f"<{rule.origin.name}>", action, len(rule.expansion), kept]
+
+
+def _lines(value: Any) -> str:
+    """JSON with one line for each entry, so that a change of the grammar shows as a readable difference."""
+    if isinstance(value, dict):
+        return "{\n" + ",\n".join(f" {json.dumps(key)}: {json.dumps(item)}" for key, item in value.items()) + "\n}"
+    if isinstance(value, list):
+        return "[\n" + ",\n".join(f" {json.dumps(item)}" for item in value) + "\n]"
+    return json.dumps(value)
+
+
+if __name__ == "__main__":
+    PATH.write_text(generate(GRAMMAR.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,105 @@
+"""Parses one text into the IR; never raises for what the text says, and reports every error in it once."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE, TOO_MANY_FINDINGS
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.language.automaton import Automaton
+from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
+from rtshcua.ground.language.build.missions import Builder
+from rtshcua.ground.language.explain import explain
+from rtshcua.ground.language.recovery import file_level, pending, resume
+from rtshcua.ground.language.table import table
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.program import Import, Unit
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl
+from rtshcua.model.ir.skills import SkillDecl
+
+MAX_SIZE = 8 << 20  # bytes or characters of one file
+
+T = TypeVar("T", bound=Node)
+
+
+@dataclass(frozen=True, slots=True)
+class Parsed:
+    """The declarations without errors, all findings in the order of the text, and the names of what was dropped.
+
+    `broken` keeps the checker from reporting as unknown a name whose declaration is there, but has an error.
+    """
+
+    unit: Unit
+    diagnostics: tuple[Diagnostic, ...]
+    broken: frozenset[str]
+
+
+def parse(source: Source) -> Parsed:
+    """Parses `source`; a text that is too large, or no text, is one finding and no declarations."""
+    builder = Builder(source)
+    refused = _refused(source)
+    if refused is not None:
+        builder.note(refused)
+    else:
+        try:
+            _run(Automaton(table(), source, builder), builder)
+        except Enough:
+            help = f"correct the first {MAX_FINDINGS}, then look again"
+            last = builder.diagnostics[-1].span
+            builder.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "there are more findings than these", last, help))
+    found = tuple(sorted(builder.diagnostics, key=lambda d: d.span.start if d.span else 0))
+    return Parsed(_unit(source, builder.declarations), found, frozenset(builder.broken))
+
+
+def _refused(source: Source) -> Diagnostic | None:
+    if len(source.text) > MAX_SIZE:
+        return too_large(source.file, len(source.text))
+    nul = source.text.find("\0")
+    if nul >= 0:
+        help = "is this a compiled bundle? sources are plain text in UTF-8"
+        span = Span(source.file, nul, nul + 1)
+        return Diagnostic(NOT_TEXT, "the file holds a NUL character, so it is not text", span, help)
+    return None
+
+
+def too_large(file: str, size: int) -> Diagnostic:
+    """The finding for a file of `size` bytes or characters, which is not read at all."""
+    limit = MAX_SIZE >> 20
+    help = "split it into several files, and import them"
+    return Diagnostic(TOO_LARGE, f"`{file}` is {-(-size >> 20)} MiB large; at most {limit} MiB are read", None, help)
+
+
+def _run(automaton: Automaton, builder: Builder) -> None:
+    offset: int | None = 1 if automaton.source.text.startswith("\ufeff") else 0
+    while offset is not None:
+        failure = automaton.run(offset)
+        if failure is None:
+            return
+        builder.note(explain(automaton, failure))
+        begun = pending(automaton)
+        offset = resume(automaton, failure.start)
+        if offset is None or len(automaton.states) == file_level(automaton):
+            if begun is not None and begun[1] is not None:
+                builder.broken.add(begun[1].text)
+            builder.settle()
+
+
+def _unit(source: Source, declarations: list[Node]) -> Unit:
+    def of(kind: type[T]) -> tuple[T, ...]:
+        return tuple(node for node in declarations if isinstance(node, kind))
+
+    return Unit(
+        span=Span(source.file, 0, len(source.text)),
+        file=source.file,
+        imports=of(Import),
+        enums=of(EnumDecl),
+        signals=of(SignalDecl),
+        zones=of(ZoneDecl),
+        vehicles=of(VehicleDecl),
+        skills=of(SkillDecl),
+        policies=of(PolicyDecl),
+        missions=of(MissionDecl),
+    )

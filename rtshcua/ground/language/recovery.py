@@ -1,0 +1,99 @@
+"""Where to go on after a token that does not fit: the next part of the same block, its end, or the next declaration.
+
+A place to go on is a word at the start of a line that the parser can take where that block or the file stands, or the
+brace that closes the block. The word or brace is then taken, so every recovery makes progress and a text of any kind
+comes to its end.
+"""
+
+import re
+
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language.automaton import Automaton
+from rtshcua.ground.language.table import Row
+from rtshcua.model.ir.node import Name
+
+_SCAN = re.compile(
+    r"""(?P<line>\n[ \t\r\f]*+) | //[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | "(?:[^"\\\n]|\\.)*+"?
+      | (?P<word>[A-Za-z_][A-Za-z0-9_.]*+) | (?P<open>\{) | (?P<close>\}) | (?s:.)""",
+    re.VERBOSE,
+)
+_NOT_BEGUN = re.compile(r"\s*[:=,(){]")  # what follows a parameter or an argument, not the first word of a declaration
+
+
+def at_line_start(source: Source, offset: int) -> bool:
+    """Whether only blanks stand before `offset` on its line."""
+    text = source.text
+    while offset and text[offset - 1] in " \t\r\f":
+        offset -= 1
+    return not offset or text[offset - 1] == "\n"
+
+
+def shifts(row: Row, word: str) -> bool:
+    """Whether a state takes `word` as it is, without closing something first."""
+    return row.get(word, -1) >= 0
+
+
+def file_level(automaton: Automaton) -> int:
+    """How many states belong to the file itself: the first, and the list of declarations if there is one."""
+    rows, states = automaton.table.rows, automaton.states
+    return 2 if len(states) > 1 and shifts(rows[states[1]], "import") else 1
+
+
+def pending(automaton: Automaton) -> tuple[str, Name | None] | None:
+    """The first word and the name, if it was read, of the declaration that is not complete yet."""
+    begun = automaton.values[file_level(automaton) - 1 :]
+    if not begun:
+        return None
+    name = begun[1] if len(begun) > 1 and isinstance(begun[1], Name) else None
+    return str(begun[0]), name
+
+
+def open_braces(automaton: Automaton) -> list[int]:
+    """Where in the values the braces are that were opened and not closed, the innermost last."""
+    found: list[int] = []
+    for at, value in enumerate(automaton.values):
+        if value == "{":
+            found.append(at)
+        elif value == "}":
+            found.pop()
+    return found
+
+
+def open_block(automaton: Automaton) -> tuple[int, int] | None:
+    """The innermost open block: the place in the states where its next part is read, and how many braces lie deeper."""
+    rows, states = automaton.table.rows, automaton.states
+    for depth, brace in enumerate(reversed(open_braces(automaton))):
+        for at in (brace + 2, brace + 1):  # after the parts that were read, or after the brace
+            if at < len(states) and shifts(rows[states[at]], "}"):
+                return at, depth
+    return None
+
+
+def resume(automaton: Automaton, failed: int) -> int | None:
+    """Unwinds the stacks and gives the offset to go on from; None when nothing after `failed` can be taken."""
+    rows, states = automaton.table.rows, automaton.states
+    text, base = automaton.source.text, file_level(automaton)
+    block, depth = open_block(automaton) or (None, 0)
+    fresh = at_line_start(automaton.source, failed)
+    for token in _SCAN.finditer(text, failed):
+        kind, start = token.lastgroup, token.start()
+        if kind == "word" and fresh:
+            word = token[0]
+            if shifts(rows[states[base - 1]], word) and not _NOT_BEGUN.match(text, token.end()):
+                return _unwind(automaton, base, start)
+            if block is not None and depth == 0 and shifts(rows[states[block]], word):
+                return _unwind(automaton, block + 1, start)
+        elif kind == "open":
+            depth += 1
+        elif kind == "close":
+            if depth == 0 and block is not None:
+                return _unwind(automaton, block + 1, start)
+            depth = max(0, depth - 1)
+        fresh = kind == "line"
+    return None
+
+
+def _unwind(automaton: Automaton, keep: int, offset: int) -> int:
+    """Keeps `keep` states, and the values and offsets that belong to them."""
+    del automaton.states[keep:], automaton.values[keep - 1 :], automaton.starts[keep - 1 :]
+    return offset

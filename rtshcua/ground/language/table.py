@@ -1,0 +1,100 @@
+"""The LALR table that Lark made of the grammar (see `generate`), as the automaton reads it."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+PATH = Path(__file__).with_name("table.json")
+
+END = "<END>"
+NAME = "<NAME>"
+WORD = "[A-Za-z_][A-Za-z0-9_]*"
+
+Row = dict[str, int]
+
+
+class Rule(NamedTuple):
+    """A production: pop `length` values and hand those at `kept` to `action`; the result is an `origin`.
+
+    `kept` lists positions; None is an optional part that is absent, and the complement `~n` is a list that is handed on
+    item by item. Without an action the one value that is kept passes unchanged; `repeats` says that it is a list that
+    grows.
+    """
+
+    origin: str
+    action: str
+    length: int
+    kept: tuple[int | None, ...]
+
+    @property
+    def repeats(self) -> bool:
+        """Whether Lark made this rule for a repetition."""
+        return self.origin.startswith("<__")
+
+
+class Lexer(NamedTuple):
+    """Reads one token where the parser stands: `match(text, offset)` skips what is ignored and reads what follows.
+
+    The match's `lastindex` is the token's group and the index of its kind in `kinds`; empty for a word or a mark, which
+    is its own kind. There is no match at the end of the text, nor where no token begins.
+    """
+
+    match: Callable[[str, int], re.Match[str] | None]
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One row a state: from a symbol to the next state (0 or more) or to the rule `~n` to reduce by (negative).
+
+    A symbol is a word or mark as it is written (`deadline`, `{`), a kind of token (`<NAME>`), or a rule (`<skill>`).
+    `words` says of each word of the language whether it may also be a name. `lexers` has one entry a state,
+    `any` reads every kind of token, `skip` matches what is ignored.
+    """
+
+    rows: tuple[Row, ...]
+    rules: tuple[Rule, ...]
+    lexers: tuple[Lexer, ...]
+    end: int
+    words: dict[str, bool]
+    any: Lexer
+    skip: re.Pattern[str]
+
+
+@cache
+def table() -> Table:
+    """The committed table. Read once in a process, in a few milliseconds."""
+    raw = json.loads(PATH.read_text(encoding="utf-8"))
+    kinds = [kind for kind, _ in raw["patterns"]]
+    known: dict[tuple[str, ...], Lexer] = {}
+    lexers: list[Lexer] = []
+    for row in raw["states"]:
+        accepted = tuple(kind for kind in kinds if kind in row)
+        if accepted not in known:
+            known[accepted] = _lexer(raw, accepted)
+        lexers.append(known[accepted])
+    return Table(
+        rows=tuple(raw["states"]),
+        rules=tuple(Rule(origin, action, length, tuple(kept)) for origin, action, length, kept in raw["rules"]),
+        lexers=tuple(lexers),
+        end=raw["end"],
+        words=raw["words"],
+        any=_lexer(raw, tuple(kinds)),
+        skip=re.compile(_ignored(raw)),
+    )
+
+
+def _ignored(raw: dict[str, Any]) -> str:
+    return f"(?:{'|'.join(raw['ignored'])})*+"  # possessive: no input makes it backtrack
+
+
+def _lexer(raw: dict[str, Any], accepted: tuple[str, ...]) -> Lexer:
+    patterns = dict(raw["patterns"])
+    groups = [patterns[kind] for kind in accepted]
+    groups.append("|".join([*map(re.escape, raw["marks"]), WORD]))
+    pattern = _ignored(raw) + "(?:" + "|".join(f"({group})" for group in groups) + ")"
+    return Lexer(re.compile(pattern).match, ("", *accepted, ""))

@@ -1,0 +1,151 @@
+"""Whatever the text, parsing ends with findings, never with an exception; and it agrees with Lark on what fits."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lark import UnexpectedInput
+
+from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language import generate
+from rtshcua.ground.language.automaton import Automaton
+from rtshcua.ground.language.parse import MAX_SIZE, parse
+from rtshcua.ground.language.table import table
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+SHIPPED = [
+    path.read_text(encoding="utf-8")
+    for folder in ("skills", "policies", "missions")
+    for path in sorted((CHECKOUT / folder).glob("*.rts"))
+]
+LARK = generate.lark((CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8"))
+
+TOKENS = sorted({*table().words, *"(){},:=@+-*", "..", "<=", "==", '"t"', "08:00", "a", "a.b", "3", "2.5", "m", "%"})
+
+
+class Nothing:
+    """Takes every action and makes nothing."""
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *_: None
+
+
+def sound(text: str) -> None:
+    """Findings are in order, within the text, and speak."""
+    source = Source("x", text)
+    parsed = parse(source)
+    starts = []
+    for found in parsed.diagnostics:
+        assert found.message
+        if found.span is not None:
+            assert 0 <= found.span.start <= found.span.end <= len(text)
+            starts.append(found.span.start)
+        for fix in found.fixes:
+            assert 0 <= fix.span.start <= fix.span.end <= len(text)
+    assert starts == sorted(starts)
+
+
+def fits(text: str) -> bool:
+    return Automaton(table(), Source("x", text), Nothing()).run(0) is None
+
+
+def as_lark_reads_it(text: str) -> str | None:
+    """The tokens that Lark finds, with spaces between them; None where Lark finds an error."""
+    parser = LARK.parse_interactive(text)
+    try:
+        tokens = parser.exhaust_lexer()
+        parser.feed_eof()
+    except UnexpectedInput:
+        return None
+    return " ".join(tokens)
+
+
+def agree(text: str) -> None:
+    """We take what Lark takes, except that words must be apart: its contextual lexer reads `skillhover` as two."""
+    spaced = as_lark_reads_it(text)
+    if spaced is None:
+        assert not fits(text)
+    else:
+        assert fits(spaced)
+
+
+@given(st.text())
+def test_any_text(text: str) -> None:
+    sound(text)
+
+
+@given(st.lists(st.sampled_from(TOKENS), max_size=60))
+def test_any_tokens(words: list[str]) -> None:
+    sound("\n".join(words))
+    agree(" ".join(words))
+
+
+@given(st.data())
+def test_damaged_sources(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from(SHIPPED))
+    start = data.draw(st.integers(0, len(text)))
+    end = data.draw(st.integers(start, min(len(text), start + 20)))
+    damaged = text[:start] + data.draw(st.sampled_from(["", " ", *TOKENS]) | st.text(max_size=3)) + text[end:]
+    sound(damaged)
+    agree(damaged)
+
+
+@pytest.mark.parametrize("text", SHIPPED)
+def test_shipped_sources_fit(text: str) -> None:
+    assert fits(text)
+    agree(text)
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes(data: bytes) -> None:
+    sound(data.decode("utf-8", errors="replace"))
+    sound(data.decode("latin-1"))
+
+
+def test_no_text() -> None:
+    (found,) = parse(Source("x", "zone z \0\0")).diagnostics
+    assert found.code is NOT_TEXT
+    assert found.span is not None
+    assert found.span.start == 7
+
+
+def test_too_large() -> None:
+    (found,) = parse(Source("x", " " * (MAX_SIZE + 1))).diagnostics
+    assert found.code is TOO_LARGE
+    assert parse(Source("x", " " * MAX_SIZE)).diagnostics == ()
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "(",
+        "{",
+        "}",
+        '"',
+        '"\\"',
+        "/*",
+        "//",
+        "a",
+        "a.",
+        "1",
+        "1_",
+        ".",
+        "not ",
+        "\n",
+        "\r",
+        "\t",
+        ")\n",
+        "1 m\n",
+        "é",
+        "zone ",
+        "skill a() { x } ",
+    ],
+)
+@pytest.mark.parametrize(
+    "before", ["", "skill s() {\nrequire ", "zone z = circle(", 'import "', "mission m under p@1 on v { phase a {"]
+)
+def test_long_runs_of_one_thing(before: str, part: str) -> None:
+    sound(before + part * (200_000 // len(part)))

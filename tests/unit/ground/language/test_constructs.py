@@ -1,0 +1,272 @@
+"""Every declaration of the language, and the IR that it becomes. Spans and conditions have their own tests."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtshcua.model.ir.program import Unit
+
+Read = Callable[[str], Unit]
+Plain = Callable[[Any], Any]
+
+
+def test_empty_text(plain: Plain, unit: Read) -> None:
+    assert plain(unit("")) == {"file": "x.rts"}
+    assert plain(unit(" // nothing\n/* nor * here **/ \t\r\n")) == {"file": "x.rts"}
+
+
+def test_import(plain: Plain, unit: Read) -> None:
+    assert plain(unit('import "lib:skills/goto.rts" import "a \\"b\\" \\\\c.rts"').imports) == [
+        {"path": "lib:skills/goto.rts"},
+        {"path": 'a "b" \\c.rts'},
+    ]
+
+
+def test_enum(plain: Plain, unit: Read) -> None:
+    assert plain(unit("enum e = E_TYPE { a = 0, b = 2, } enum f { c = 1 } enum g { }").enums) == [
+        {
+            "name": "e",
+            "dialect": "E_TYPE",
+            "members": [{"name": "a", "value": 0}, {"name": "b", "value": 2}],
+        },
+        {"name": "f", "members": [{"name": "c", "value": 1}]},
+        {"name": "g"},
+    ]
+
+
+def test_signal(plain: Plain, unit: Read) -> None:
+    text = """
+    signal gps.fix : gps_fix = GPS_RAW_INT.fix_type unknown at -1, no_fix, 255 stale after 2 s
+    signal wind.speed : speed = WIND_COV.wind_x, WIND_COV.wind_y or WIND.speed stale after 10 s
+    """
+    assert plain(unit(text).signals) == [
+        {
+            "name": "gps.fix",
+            "type": "gps_fix",
+            "sources": [{"message": "GPS_RAW_INT", "fields": ["fix_type"]}],
+            "unknown_at": ["-1", "no_fix", "255"],
+            "stale_after": (2_000_000, "duration"),
+        },
+        {
+            "name": "wind.speed",
+            "type": "speed",
+            "sources": [
+                {"message": "WIND_COV", "fields": ["wind_x", "wind_y"]},
+                {"message": "WIND", "fields": ["speed"]},
+            ],
+            "stale_after": (10_000_000, "duration"),
+        },
+    ]
+
+
+def test_zone(plain: Plain, unit: Read) -> None:
+    text = """
+    zone a = circle(47.5 N, 8.25 E, 120 m)
+    zone b = polygon(1 N, 2 E, 1 S, 2 W, 0 N, 0.0000001 E,) entry 1 N, 1 E ceiling 60 m above home floor 0 m
+    """
+    assert plain(unit(text).zones) == [
+        {"name": "a", "shape": {"kind": "circle", "center": (475_000_000, 82_500_000), "radius": (120_000, "length")}},
+        {
+            "name": "b",
+            "shape": {
+                "kind": "polygon",
+                "corners": [(10_000_000, 20_000_000), (-10_000_000, -20_000_000), (0, 1)],
+            },
+            "floor": (0, "length"),
+            "ceiling": (60_000, "altitude", "home"),
+            "entry": (10_000_000, 10_000_000),
+        },
+    ]
+
+
+def test_vehicle(plain: Plain, unit: Read) -> None:
+    text = """vehicle quad {
+      identity "quad-07" home 47.39774 N, 8.54559 E within 50 m speed at most 12 m/s climb at most 3 m/s
+      position error 3 m energy 100 % = 18 min hover reserve 15 % clock utc -03:30
+    }"""
+    assert plain(unit(text).vehicles) == [
+        {
+            "name": "quad",
+            "identity": "quad-07",
+            "home": (473_977_400, 85_455_900),
+            "within": (50_000, "length"),
+            "speed": (12_000, "speed"),
+            "climb": (3_000, "speed"),
+            "position_error": (3_000, "length"),
+            "endurance": (1_080_000_000, "duration"),
+            "reserve": (1_500, "ratio"),
+            "utc_offset": (-12_600_000_000, "duration"),
+        }
+    ]
+
+
+def test_parameters(plain: Plain, unit: Read) -> None:
+    text = """skill s(
+      area: zone, altitude: altitude in 5 m .. 60 m = 20 m, pattern: one of grid, perimeter, orbit = grid,
+      mode: one of slow, fast, again: one of x, speed: speed,
+    ) { }"""
+    assert plain(unit(text).skills[0].parameters) == [
+        {"name": "area", "type": "zone"},
+        {
+            "name": "altitude",
+            "type": "altitude",
+            "range": {"kind": "range", "low": (5_000, "length"), "high": (60_000, "length")},
+            "default": (20_000, "length"),
+        },
+        {"name": "pattern", "type": "choice", "choices": ["grid", "perimeter", "orbit"], "default": "&grid"},
+        {"name": "mode", "type": "choice", "choices": ["slow", "fast"]},
+        {"name": "again", "type": "choice", "choices": ["x"]},
+        {"name": "speed", "type": "speed"},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("climb to a", {"kind": "climb", "altitude": "a"}),
+        ("fly to t at a", {"kind": "fly", "target": "t", "altitude": "a"}),
+        ("fly to t at a speed s", {"kind": "fly", "target": "t", "altitude": "a", "speed": "s"}),
+        ("cover t at a", {"kind": "cover", "target": "t", "altitude": "a"}),
+        (
+            "cover t at a pattern p speed s",
+            {"kind": "cover", "target": "t", "altitude": "a", "pattern": "p", "speed": "s"},
+        ),
+        ("home", {"kind": "home"}),
+        ("hold", {"kind": "hold"}),
+        ("hold for t", {"kind": "hold", "time": "t"}),
+        ("land", {"kind": "land"}),
+    ],
+)
+def test_motion(plain: Plain, unit: Read, text: str, expected: dict[str, str]) -> None:
+    assert plain(unit(f"skill s() {{ motion {text} }}").skills[0].motion) == expected
+
+
+def test_skill(plain: Plain, unit: Read) -> None:
+    text = """skill s() {
+      record intent, decision  energy at most 18 %
+      fallback hover for 20 s, goto(home_entry, altitude = 20 m), land()
+      class tactical deadline 2 s valid for 10 min during a, b lasts at most 5 min grace 500 ms
+      require a > 1 and b > 2 and (c > 3 or d > 4)
+      assume not e == f
+      maintain (g < 1 and h < 2)
+    }"""
+    skill = plain(unit(text).skills[0])
+    assert {name: skill[name] for name in skill if name not in ("require", "assume", "maintain")} == {
+        "name": "s",
+        "timing_class": "tactical",
+        "deadline": (2_000_000, "duration"),
+        "validity": (600_000_000, "duration"),
+        "phases": ["a", "b"],
+        "duration": (300_000_000, "duration"),
+        "grace": (500_000, "duration"),
+        "energy": (1_800, "ratio"),
+        "record": ["intent", "decision"],
+        "fallback": [
+            {"skill": "hover", "limit": (20_000_000, "duration")},
+            {
+                "skill": "goto",
+                "arguments": [{"value": "&home_entry"}, {"name": "altitude", "value": (20_000, "length")}],
+            },
+            {"skill": "land"},
+        ],
+    }
+    assert [len(skill[name]) for name in ("require", "assume", "maintain")] == [3, 1, 2]
+
+
+def test_policy(plain: Plain, unit: Read) -> None:
+    text = """policy p version 7 {
+      permit a, b by role operator, pilot through agent, operator when x < 3 m
+      permit any by any
+      forbid c by any through agent
+      confirm a when x < 1 m by role supervisor within 30 s
+      confirm b by role supervisor
+      degrade any when battery < 25 % to hover for 5 s
+      degrade a to land
+      airspace inside city, field outside school
+      contingency hover for 10 s, land
+    }
+    policy q version 1 { airspace outside z }
+    """
+    first, second = plain(unit(text).policies)
+    assert second == {"name": "q", "version": 1, "airspace": {"outside": ["z"]}}
+    less = {"kind": "comparison", "operator": "<", "left": "&x"}
+    assert first == {
+        "name": "p",
+        "version": 7,
+        "rules": [
+            {
+                "kind": "permit",
+                "skills": ["a", "b"],
+                "roles": ["operator", "pilot"],
+                "through": ["agent", "operator"],
+                "when": less | {"right": (3_000, "length")},
+            },
+            {"kind": "permit"},
+            {"kind": "forbid", "skills": ["c"], "through": ["agent"]},
+            {
+                "kind": "confirm",
+                "skills": ["a"],
+                "when": less | {"right": (1_000, "length")},
+                "approver": "supervisor",
+                "within": (30_000_000, "duration"),
+            },
+            {"kind": "confirm", "skills": ["b"], "approver": "supervisor"},
+            {
+                "kind": "degrade",
+                "when": {"kind": "comparison", "operator": "<", "left": "&battery", "right": (2_500, "ratio")},
+                "target": {"skill": "hover", "limit": (5_000_000, "duration")},
+            },
+            {"kind": "degrade", "skills": ["a"], "target": {"skill": "land"}},
+        ],
+        "airspace": {"inside": ["city", "field"], "outside": ["school"]},
+        "contingency": [{"skill": "hover", "limit": (10_000_000, "duration")}, {"skill": "land"}],
+    }
+
+
+def test_mission(plain: Plain, unit: Read) -> None:
+    text = """mission m under p@7 on quad {
+      intent "Look." proposed by agent openclaw for role operator
+      phase a { goto(z.entry, 1 N, 2 E, altitude = 20 m,) on inadmissible skip look() on   inadmissible hold }
+      phase b { land() on inadmissible abort land() }
+      phase c { }
+    }
+    mission n under q@1 on quad { }
+    """
+    first, second = plain(unit(text).missions)
+    assert second == {"name": "n", "policy": "q", "policy_version": 1, "vehicle": "quad"}
+    assert first == {
+        "name": "m",
+        "policy": "p",
+        "policy_version": 7,
+        "vehicle": "quad",
+        "intent": "Look.",
+        "source": "agent",
+        "proposer": "openclaw",
+        "role": "operator",
+        "phases": [
+            {
+                "name": "a",
+                "steps": [
+                    {
+                        "skill": "goto",
+                        "arguments": [
+                            {"value": "&z.entry"},
+                            {"value": (10_000_000, 20_000_000)},
+                            {"name": "altitude", "value": (20_000, "length")},
+                        ],
+                        "on_inadmissible": "skip",
+                    },
+                    {"skill": "look", "on_inadmissible": "hold"},
+                ],
+            },
+            {
+                "name": "b",
+                "steps": [
+                    {"skill": "land", "on_inadmissible": "abort"},
+                    {"skill": "land", "on_inadmissible": "abort"},
+                ],
+            },
+            {"name": "c"},
+        ],
+    }

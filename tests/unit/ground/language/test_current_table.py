@@ -1,0 +1,53 @@
+"""The committed table is the one that Lark makes of the committed grammar, and the grammar has no surprises."""
+
+import logging
+from pathlib import Path
+
+import pytest
+from lark import Lark, logger
+from lark.lexer import PatternStr
+
+from rtshcua.ground.language import generate
+from rtshcua.ground.language.build.missions import Builder
+from rtshcua.ground.language.expected import WORDS
+from rtshcua.ground.language.table import END, PATH, table
+
+
+@pytest.fixture
+def grammar(checkout: Path) -> str:
+    return (checkout / "grammar" / "rtshcua.lark").read_text(encoding="utf-8")
+
+
+def test_is_current(grammar: str) -> None:
+    assert PATH.read_text(encoding="utf-8") == generate.generate(grammar), "python -m rtshcua.ground.language.generate"
+
+
+def test_grammar_has_no_conflict(grammar: str, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.DEBUG, logger.name)
+    Lark(grammar, start=generate.START, parser="lalr", debug=True)
+    assert [record.message for record in caplog.records if "conflict" in record.message.lower()] == []
+
+
+def test_every_terminal_is_named(grammar: str) -> None:
+    names = [terminal.name for terminal in generate.lark(grammar).terminals]
+    assert [name for name in names if name.startswith("__")] == []
+
+
+def test_words_of_the_language_are_reserved_only_where_they_must_be(grammar: str) -> None:
+    assert {word for word, free in table().words.items() if not free} == {
+        "and", "or", "not", "in", "inside", "outside", "any",
+    }  # fmt: skip
+    fixed = {t.pattern.value for t in generate.lark(grammar).terminals if isinstance(t.pattern, PatternStr)}
+    assert set(table().words) == {text for text in fixed if text.isalpha()}
+
+
+def test_builder_has_exactly_the_actions_of_the_grammar() -> None:
+    asked = {rule.action for rule in table().rules if rule.action}
+    helpers = {
+        "report", "note", "declare", "abandon", "settle", "sound", "undotted", "nested", "parts", "clauses",
+    }  # fmt: skip
+    assert {name for name in dir(Builder) if not name.startswith("_")} == asked | helpers
+
+
+def test_every_kind_of_token_has_words_for_a_person() -> None:
+    assert set(WORDS) == {kind for kind in table().any.kinds if kind} | {END}

@@ -40,6 +40,7 @@ WRITTEN_TWICE = _code("E0106", "written-twice", "a part of a declaration is writ
 NOT_WRITTEN = _code("E0107", "not-written", "a declaration lacks a part that it must have")
 NO_SUCH_FILE = _code("E0108", "no-such-file", "a file that is asked for or imported cannot be read")
 IMPORT_PATH = _code("E0109", "import-path", "an import names its file in a way that means nothing elsewhere")
+TOO_MANY_FINDINGS = _code("E0110", "too-many-findings", "a file has more errors than are reported at once")
 
 # E02: names
 UNKNOWN_NAME = _code("E0201", "unknown-name", "a name is used that nothing declares")
@@ -111,6 +112,7 @@ NEEDY_LAST_LINK = _code("E0612", "needy-last-link", "the last link of a chain ne
 CHAIN_CYCLE = _code("E0613", "chain-cycle", "a skill is a link of its own fallback chain")
 BEYOND_VEHICLE = _code("E0614", "beyond-vehicle", "a step asks for more than the vehicle can do")
 COVERING_LINK = _code("E0615", "covering-link", "a link of a chain would fly a survey")
+NEVER_HOLDS = _code("E0616", "never-holds", "a clause of a step's contract cannot hold with these arguments")
 
 # E07: policies and authority
 POLICY_VERSION = _code("E0701", "policy-version", "a mission names another version of its policy than is declared")
@@ -132,6 +134,8 @@ EMPTY_MISSION = _code("E0712", "empty-mission", "a mission has no step")
 VALIDITY_TOO_SHORT = _code("E0801", "validity-too-short", "a step may come later than its validity lasts")
 UNKNOWN_PHASE = _code("E0802", "unknown-phase", "a skill is valid only in phases that the mission does not have")
 STEP_OUTSIDE_PHASES = _code("E0803", "step-outside-phases", "a step stands in a phase in which its skill is not valid")
+PLAN_TOO_LONG = _code("E0804", "plan-too-long", "a planned path takes longer than its skill lasts at most")
+ENDLESS_STEP = _code("E0805", "endless-step", "a step of a mission neither ends by itself nor has a longest duration")
 
 # E09: mission specifications (structured input of an agent)
 NOT_JSON = _code("E0901", "not-json", "the specification is not JSON")
@@ -147,3 +151,4 @@ CONDITION_SIZE = _code(
     "E1002", "condition-size", "a condition needs more instructions or a deeper stack than fit on board"
 )
 NUMBER_SIZE = _code("E1003", "number-size", "a number is larger than what is kept or computed on board")
+REFUSED_ON_BOARD = _code("E1004", "refused-on-board", "what the sources mean would be refused on board")

@@ -1,0 +1,73 @@
+"""One line of a source as a terminal shows it, with parts of it underlined."""
+
+from collections.abc import Sequence
+from unicodedata import category, east_asian_width
+
+from rtshcua.diagnostics.span import Source, Span
+
+TAB_WIDTH = 4
+#: a longer line is cut around what is underlined
+MAX_WIDTH = 110
+#: how much is shown before the underlined part of a line that is cut
+BEFORE = 30
+CUT = "..."
+
+
+def excerpt(source: Source, number: int, marks: Sequence[tuple[Span, str, str]]) -> tuple[str, list[str]]:
+    """The text of a line, and an underline for each mark: a span that begins on the line, a character, and words.
+
+    A span that goes on over further lines is underlined up to the end of this one; an empty one has one character.
+    """
+    text = source.line(number)
+    cells = [_cell(character) for character in text]
+    starts = [0]
+    for shown, width in cells:
+        starts.append(starts[-1] + (width if width >= 0 else TAB_WIDTH - starts[-1] % TAB_WIDTH))
+    offset = marks[0][0].start - (source.position(marks[0][0].start).column - 1)
+    columns = [(min(max(span.start - offset, 0), len(text)), min(span.end - offset, len(text))) for span, _, _ in marks]
+    first, last = _window(starts, columns[0])
+    rendered = "".join(
+        shown if width >= 0 else " " * (starts[at + 1] - starts[at])
+        for at, (shown, width) in enumerate(cells[first:last], start=first)
+    )
+    before, after = CUT if first > 0 else "", CUT if last < len(text) else ""
+    underlines = []
+    for (begin, end), (_, character, words) in zip(columns, marks, strict=True):
+        begin, end = min(max(begin, first), last), min(max(end, first), last)
+        indent = " " * (len(before) + starts[begin] - starts[first])
+        underline = character * max(starts[max(end, begin)] - starts[begin], 1)
+        underlines.append(f"{indent}{underline} {visible(words)}".rstrip())
+    return before + rendered + after, underlines
+
+
+def _window(starts: Sequence[int], column: tuple[int, int]) -> tuple[int, int]:
+    """The characters of a line to show: all, or those around a column that fit."""
+    count = len(starts) - 1
+    if starts[-1] <= MAX_WIDTH:
+        return 0, count
+    first = column[0]
+    while first > 0 and starts[column[0]] - starts[first - 1] <= BEFORE:
+        first -= 1
+    last = first
+    while last < count and starts[last + 1] - starts[first] <= MAX_WIDTH:
+        last += 1
+    return first, last
+
+
+def _cell(character: str) -> tuple[str, int]:
+    """How a character is shown, and how many columns it takes; -1 for a tab."""
+    if character == "\t":
+        return " ", -1
+    shown = visible(character)
+    if shown != character:
+        return shown, len(shown)
+    if category(character) in ("Mn", "Me"):
+        return character, 0
+    return character, 2 if east_asian_width(character) in ("W", "F") else 1
+
+
+def visible(text: str) -> str:
+    """The text with every character that a terminal would obey, or that hides others, written as `<U+202E>`."""
+    if text.isprintable():
+        return text
+    return "".join(each if each.isprintable() or each == " " else f"<U+{ord(each):04X}>" for each in text)

@@ -1,0 +1,66 @@
+"""Findings as plain text: what was found, the line it stands on, underlined, and what would be accepted.
+
+Nothing here is coloured; a caller may colour the lines by how they begin. A source is not trusted: control characters
+and those that change the direction of writing are shown by their number and never reach the terminal.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.excerpt import excerpt, visible
+from rtshcua.diagnostics.span import Source, Span
+
+PRIMARY, SECONDARY = "^", "-"
+
+
+def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> str:
+    """All findings, parted by empty lines; ends in a newline unless there are none."""
+    return "\n".join(render_one(diagnostic, sources) for diagnostic in diagnostics)
+
+
+def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
+    """One finding, ending in a newline."""
+    code = diagnostic.code
+    lines = [f"{diagnostic.severity.value}[{code.id}]: {visible(diagnostic.message)}"]
+    places = _places(diagnostic, sources)
+    gutter = max((len(str(line)) for _, line, _ in places), default=1)
+    margin = " " * gutter
+    shown: str | None = None
+    for file, line, marks in places:
+        source = sources[file]
+        if file != shown:
+            at = source.position(marks[0][0].start)
+            arrow = "-->" if shown is None else ":::"
+            lines.append(f"{margin}{arrow} {visible(file)}:{at.line}:{at.column}")
+            lines.append(f"{margin} |")
+        elif shown is not None:
+            lines.append(f"{margin} :")
+        shown = file
+        text, underlines = excerpt(source, line, marks)
+        lines.append(f"{line:>{gutter}} | {text}".rstrip())
+        lines += [f"{margin} | {underline}" for underline in underlines]
+    if diagnostic.span is not None and not places:
+        lines.append(f" --> {visible(diagnostic.span.file)}")
+    lines += [f"{margin} = at: {visible(diagnostic.pointer)}"] if diagnostic.pointer else []
+    lines += [f"{margin} = help: {visible(diagnostic.help)}"] if diagnostic.help is not None else []
+    return "\n".join(lines) + "\n"
+
+
+#: a span to underline, with which character, and the words after it
+Mark = tuple[Span, str, str]
+
+
+def _places(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> list[tuple[str, int, list[Mark]]]:
+    """The lines to show, the finding's own first, then those of its labels by file; each with its marks."""
+    marks: list[Mark] = [] if diagnostic.span is None else [(diagnostic.span, PRIMARY, "")]
+    marks += [(label.span, SECONDARY, label.text) for label in diagnostic.labels]
+    by_line: dict[tuple[str, int], list[Mark]] = {}
+    files: list[str] = []
+    for mark in marks:
+        file = mark[0].file
+        if file in sources:
+            line = sources[file].position(mark[0].start).line
+            by_line.setdefault((file, line), []).append(mark)
+            if file not in files:
+                files.append(file)
+    return [(file, line, found) for each in files for (file, line), found in by_line.items() if file == each]

@@ -1,0 +1,1 @@
+"""The ground wing: language, checker, compiler, auditor. Nothing here is ever imported on board."""

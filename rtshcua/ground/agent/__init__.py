@@ -1,0 +1,1 @@
+"""Mission specifications: missions as structured data, the way an agent proposes them."""

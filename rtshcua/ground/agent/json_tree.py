@@ -1,0 +1,183 @@
+"""JSON (RFC 8259) with the place of everything in it, strict: no key twice, no NaN, no number that is not written so.
+
+The depth and the size are bounded before anything is built, so that hostile input costs little.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from json.decoder import JSONDecodeError, scanstring  # type: ignore[attr-defined]
+from typing import Any, Final
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.codes import Code
+from rtshcua.diagnostics.diagnostic import Diagnostic, Label
+from rtshcua.diagnostics.span import Source, Span
+
+MAX_BYTES: Final = 1 << 20
+MAX_DEPTH: Final = 16
+MAX_DIGITS: Final = 18
+
+_SPACE = re.compile(r"[ \t\n\r]*")
+_NUMBER = re.compile(r"(-?(?:0|[1-9][0-9]*))(\.[0-9]+)?([eE][-+]?[0-9]+)?")
+_LITERALS = {"true": True, "false": False, "null": None}
+
+#: where a value stands: the keys and indexes that lead to it
+Path = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """A JSON value, and where each of its parts is written: `spans` by path, `keys` the keys of objects by path."""
+
+    value: Any
+    spans: dict[Path, Span]
+    keys: dict[Path, Span]
+
+
+class _Stop(Exception):
+    """The text cannot be read any further."""
+
+    def __init__(self, code: Code, message: str, start: int, end: int, help: str | None = None) -> None:
+        super().__init__(message)
+        self.code, self.message, self.start, self.end, self.help = code, message, start, end, help
+
+
+def read_json(file: str, data: bytes) -> tuple[Source, Tree | None, tuple[Diagnostic, ...]]:
+    """The source text, its tree (None where it is no JSON), and what is wrong with it."""
+    if len(data) > MAX_BYTES:
+        message = f"the specification has {len(data)} bytes, and at most {MAX_BYTES} are read"
+        return Source(file, ""), None, (Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0)),)
+    try:
+        source = Source(file, data.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        source = Source(file, data.decode("utf-8", "replace"))
+        at = source.text.find("\ufffd")
+        message = f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8"
+        return source, None, (Diagnostic(codes.NOT_JSON, message, Span(file, at, at + 1)),)
+    reader = _Reader(source)
+    try:
+        value = reader.document()
+    except _Stop as stop:
+        span = Span(file, stop.start, stop.end)
+        found = Diagnostic(stop.code, stop.message, span, stop.help)
+        return source, None, (*reader.found, found)
+    return source, Tree(value, reader.spans, reader.keys), tuple(reader.found)
+
+
+class _Reader:
+    """Reads one text from left to right."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.text = source.text
+        self.spans: dict[Path, Span] = {}
+        self.keys: dict[Path, Span] = {}
+        self.found: list[Diagnostic] = []
+
+    def document(self) -> Any:
+        """The one value that the text is."""
+        value, at = self._value(self._skip(0), ())
+        at = self._skip(at)
+        if at < len(self.text):
+            raise self._unexpected(at, "the end of the text")
+        return value
+
+    def _skip(self, at: int) -> int:
+        matched = _SPACE.match(self.text, at)
+        assert matched is not None
+        return matched.end()
+
+    def _value(self, at: int, path: Path) -> tuple[Any, int]:
+        if len(path) > MAX_DEPTH:
+            message = f"the specification is nested more than {MAX_DEPTH} deep"
+            raise _Stop(codes.SPECIFICATION_SIZE, message, at, at + 1)
+        first = self.text[at : at + 1]
+        value: Any
+        if first == "{":
+            value, end = self._object(at, path)
+        elif first == "[":
+            value, end = self._array(at, path)
+        elif first == '"':
+            value, end = self._string(at)
+        else:
+            value, end = self._scalar(at)
+        self.spans[path] = Span(self.source.file, at, end)
+        return value, end
+
+    def _object(self, start: int, path: Path) -> tuple[dict[str, Any], int]:
+        value: dict[str, Any] = {}
+
+        def member(at: int) -> int:
+            if self.text[at : at + 1] != '"':
+                raise self._unexpected(at, "a key in double quotes")
+            key, end = self._string(at)
+            here = (*path, key)
+            span = Span(self.source.file, at, end)
+            if key in value:
+                first = Label(self.keys[here], "first written here")
+                self.found.append(
+                    Diagnostic(codes.DUPLICATE_KEY, f"the key `{key}` is written twice", span, labels=(first,))
+                )
+            else:
+                self.keys[here] = span
+            end = self._skip(end)
+            if self.text[end : end + 1] != ":":
+                raise self._unexpected(end, "`:`")
+            value[key], end = self._value(self._skip(end + 1), here)
+            return end
+
+        return value, self._items(start, "}", member)
+
+    def _array(self, start: int, path: Path) -> tuple[list[Any], int]:
+        value: list[Any] = []
+
+        def item(at: int) -> int:
+            element, end = self._value(at, (*path, len(value)))
+            value.append(element)
+            return end
+
+        return value, self._items(start, "]", item)
+
+    def _items(self, start: int, closing: str, item: Callable[[int], int]) -> int:
+        """Read items separated by commas up to the closing bracket; gives the offset after it."""
+        at = self._skip(start + 1)
+        if self.text[at : at + 1] == closing:
+            return at + 1
+        while True:
+            at = self._skip(item(at))
+            following = self.text[at : at + 1]
+            if following == closing:
+                return at + 1
+            if following != ",":
+                raise self._unexpected(at, f"`,` or `{closing}`")
+            at = self._skip(at + 1)
+
+    def _string(self, at: int) -> tuple[str, int]:
+        try:
+            value, end = scanstring(self.text, at + 1, True)
+        except JSONDecodeError as error:
+            raise _Stop(codes.NOT_JSON, error.msg[0].lower() + error.msg[1:], error.pos, error.pos + 1) from error
+        if any("\ud800" <= character <= "\udfff" for character in value):
+            raise _Stop(codes.NOT_JSON, "the text has half of a surrogate pair", at, end)
+        return value, end
+
+    def _scalar(self, at: int) -> tuple[Any, int]:
+        for word, value in _LITERALS.items():
+            if self.text.startswith(word, at):
+                return value, at + len(word)
+        matched = _NUMBER.match(self.text, at)
+        if matched is None:
+            raise self._unexpected(at, "a value")
+        if matched[2] or matched[3]:
+            help = 'quantities are written as texts with their unit, such as "12.5 m"'
+            raise _Stop(codes.NOT_JSON, f"`{matched[0][:40]}` is not a whole number", *matched.span(), help)
+        if len(matched[0]) > MAX_DIGITS:
+            raise _Stop(codes.SPECIFICATION_SIZE, f"the number has more than {MAX_DIGITS} digits", *matched.span())
+        return int(matched[0]), matched.end()
+
+    def _unexpected(self, at: int, expected: str) -> _Stop:
+        found = self.text[at : at + 1]
+        if not found:
+            return _Stop(codes.NOT_JSON, f"the text ends where {expected} is expected", len(self.text), len(self.text))
+        return _Stop(codes.NOT_JSON, f"`{found}` stands where {expected} is expected", at, at + 1)

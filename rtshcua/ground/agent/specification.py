@@ -1,0 +1,121 @@
+"""A mission specification to the same IR that a source gives, every finding with a JSON Pointer (RFC 6901).
+
+Spans are places in the JSON text itself. A specification comes from an agent, so it may import from the shipped library
+only: the policy's own sources are named by whoever runs the compiler, never by the agent that is bound by them.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from pydantic import ValidationError
+
+from rtshcua.diagnostics.codes import NO_SUCH_FILE
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.agent.json_tree import Tree, read_json
+from rtshcua.ground.agent.mission import mission_of
+from rtshcua.ground.agent.pointers import innermost, pointer
+from rtshcua.ground.agent.schema import SpecificationShape
+from rtshcua.ground.agent.shape import shape_errors
+from rtshcua.ground.language.load import Listing, Program, Read, load
+from rtshcua.ground.language.paths import imported, shown, stable
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.program import Import, Unit
+
+
+@dataclass(frozen=True, slots=True)
+class Specification:
+    """A specification as a unit of a program; the unit has no mission where the specification has errors."""
+
+    source: Source
+    tree: Tree | None
+    unit: Unit
+    diagnostics: tuple[Diagnostic, ...]
+
+    def pointed(self, diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+        """The findings, those on this specification with a JSON Pointer to the value they are about."""
+        return tuple(self._pointed(diagnostic) for diagnostic in diagnostics)
+
+    def _pointed(self, diagnostic: Diagnostic) -> Diagnostic:
+        span = diagnostic.span
+        if span is None or span.file != self.source.file or diagnostic.pointer is not None:
+            return diagnostic
+        return replace(diagnostic, pointer="" if self.tree is None else pointer(innermost(self.tree, span)))
+
+
+def parse_specification(file: str, data: bytes) -> Specification:
+    """The specification that `data` is; never raises for what it says."""
+    source, tree, found = read_json(file, data)
+    if tree is None or found:
+        return _specification(source, tree, None, found)
+    try:
+        shape = SpecificationShape.model_validate(tree.value)
+    except ValidationError as error:
+        return _specification(source, tree, None, tuple(shape_errors(error, tree)))
+    mission, found = mission_of(shape, tree, source)
+    imports = tuple(Import(span=tree.spans["imports", number], path=path) for number, path in enumerate(shape.imports))
+    unit = _unit(Span(file, 0, len(source.text)), imports, () if mission is None else (mission,))
+    return _specification(source, tree, unit, found)
+
+
+def load_specification(
+    path: str, policies: Sequence[str], read: Read, library: str | None, listing: Listing | None = None
+) -> tuple[Program, Specification]:
+    """A program of a specification and the sources that it is checked against.
+
+    `policies` are sources named by the caller, beside what the specification imports from the library. The program's
+    findings include the specification's; pass what compiling it finds through `Specification.pointed`.
+    """
+    name = shown(path)
+    try:
+        specification = parse_specification(name, read(path))
+    except OSError as error:
+        message = f"cannot read `{path}`: {(error.strerror or 'it is unreadable').lower()}"
+        specification = _specification(Source(name, ""), None, None, (Diagnostic(NO_SUCH_FILE, message),))
+    found = list(specification.diagnostics)
+    wanted: list[str] = []
+    for each in specification.unit.imports:
+        resolved = imported(each.path, path, library)
+        try:
+            if resolved is not None:
+                read(resolved)
+                wanted.append(resolved)
+                continue
+            why = "there is no library here"
+        except OSError as error:
+            why = (error.strerror or "it is unreadable").lower()
+        found += specification.pointed([Diagnostic(NO_SUCH_FILE, f"cannot read `{each.path}`: {why}", each.span)])
+    program = load([*wanted, *policies], read, library, listing)
+    return (
+        Program(
+            units=(specification.unit, *program.units),
+            sources={name: specification.source, **program.sources},
+            diagnostics=(*found, *program.diagnostics),
+            broken=program.broken,
+            stable={name: stable(path, library, path), **program.stable},
+        ),
+        specification,
+    )
+
+
+def _specification(
+    source: Source, tree: Tree | None, unit: Unit | None, found: tuple[Diagnostic, ...]
+) -> Specification:
+    whole = Span(source.file, 0, len(source.text))
+    specification = Specification(source, tree, unit or _unit(whole, (), ()), ())
+    return replace(specification, diagnostics=specification.pointed(found))
+
+
+def _unit(span: Span, imports: tuple[Import, ...], missions: tuple[MissionDecl, ...]) -> Unit:
+    return Unit(
+        span=span,
+        file=span.file,
+        imports=imports,
+        enums=(),
+        signals=(),
+        zones=(),
+        vehicles=(),
+        skills=(),
+        policies=(),
+        missions=missions,
+    )

@@ -1,0 +1,51 @@
+"""Evidence before effect: nothing was dispatched without an earlier record that permits it (design 4.5, 6)."""
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.records import Decision, Effect
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
+
+DISPATCHED = "dispatched"
+
+
+class Cover:
+    """Follows permits through a log. What is kept is bounded by the steps and links of the bundle.
+
+    An `allow` covers one dispatch of what it was asked for, up to its `valid_until_us`. The `allow` of a step covers
+    the links of its fallback chain and of the contingency too: these are standing permits.
+    """
+
+    def __init__(self) -> None:
+        self.dispatches = 0
+        self._until_us: dict[tuple[int, int, int], int] = {}
+        self._standing: set[int] = set()
+
+    def decided(self, record: Decision) -> None:
+        """Takes note of a decision that was derived again."""
+        key = (record.kind, record.step, record.link)
+        if record.outcome != "allow":
+            self._until_us.pop(key, None)
+            return
+        self._until_us[key] = record.valid_until_us
+        if record.kind == STEP:
+            self._standing.add(record.step)
+
+    def check(self, record: Effect) -> Flaw | None:
+        """What is wrong with an effect, or None."""
+        if record.event != DISPATCHED:
+            return None
+        self.dispatches += 1
+        until_us = self._until_us.pop((record.kind, record.step, record.link), None)
+        if until_us is not None:
+            if record.at_us <= until_us or self._stands(record):
+                return None
+            text = "it was sent when its permit was over"
+            return Flaw("dispatch/late", text, f"{record.at_us} us", f"at most {until_us} us")
+        if self._stands(record):
+            return None
+        text = "it was sent without an earlier record that permits it"
+        return Flaw("dispatch/not-permitted", text, f"kind {record.kind}, step {record.step}, link {record.link}")
+
+    def _stands(self, record: Effect) -> bool:
+        if record.kind == FALLBACK_LINK:
+            return record.step in self._standing and record.link != DEGRADE
+        return record.kind == CONTINGENCY_LINK and bool(self._standing)

@@ -1,0 +1,153 @@
+"""E0601 to E0605: the arguments of a step or a link against the parameters of its skill."""
+
+from collections.abc import Sequence
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.scope import Argument, Entry, Scope
+from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.types import Kind
+from rtshcua.ground.checker.values import typed
+from rtshcua.model.ir.expression import Coordinates, Reference, Value
+from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.skills import ArgumentValue, SkillDecl
+from rtshcua.model.quantity import display
+
+
+def bind_arguments(
+    context: Context, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span
+) -> tuple[Bound, ...] | None:
+    """The value of every parameter of `skill`, defaults filled in; None after a finding. `span` is the whole call."""
+    pairs = _pair(context, skill, written, span)
+    if pairs is None:
+        return None
+    known = context.arguments(skill)
+    scope = context.scope()
+    bound: list[Bound | None] = []
+    for parameter in skill.parameters:
+        argument = known.get(parameter.name.text)
+        value = pairs.get(parameter.name.text, parameter.default)
+        if argument is None or value is None:  # reported where the parameter is declared, or as missing
+            return None
+        bound.append(bind_value(scope, argument, value))
+    return None if None in bound else tuple(item for item in bound if item is not None)
+
+
+def _pair(context: Context, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span) -> dict[str, Value] | None:
+    """The written arguments by the name of their parameter; None after a finding."""
+    names = [parameter.name.text for parameter in skill.parameters]
+    known = set(names)
+    report = context.report
+    declared = [(skill.name.span, f"`{skill.name.text}` is declared here")]
+    pairs: dict[str, ArgumentValue] = {}
+    before = len(report.found)
+    named = False
+    for position, argument in enumerate(written):
+        if argument.name is not None:
+            named = True
+            name = argument.name.text
+            if name not in known:
+                takes = "it takes " + ", ".join(f"`{each}`" for each in names) if names else "it takes no arguments"
+                report.add(
+                    codes.UNKNOWN_ARGUMENT,
+                    argument.name.span,
+                    f"`{skill.name.text}` has no parameter `{name}`",
+                    help=suggestion(name, known) or takes,
+                    labels=declared,
+                )
+                continue
+        elif named or position >= len(names):
+            report.add(
+                codes.TOO_MANY_ARGUMENTS,
+                argument.span,
+                "an argument without a name stands after a named one"
+                if named
+                else f"`{skill.name.text}` takes {_count(len(names))}, and this is one more",
+                help="write its name before it" if named else None,
+                labels=declared,
+            )
+            continue
+        else:
+            name = names[position]
+        first = pairs.setdefault(name, argument)
+        if first is not argument:
+            report.add(
+                codes.DUPLICATE_ARGUMENT,
+                argument.span,
+                f"`{name}` is given twice",
+                labels=[(first.span, "first given here")],
+            )
+    missing = [p for p in skill.parameters if p.name.text not in pairs and p.default is None]
+    if missing and len(report.found) == before:
+        report.add(
+            codes.MISSING_ARGUMENT,
+            span,
+            f"`{skill.name.text}` is called without " + " and ".join(f"`{p.name.text}`" for p in missing),
+            help="add " + ", ".join(f"`{p.name.text} = ...`" for p in missing),
+            labels=[(p.span, f"`{p.name.text}` is declared here, without a default") for p in missing],
+        )
+    return None if len(report.found) > before else {name: argument.value for name, argument in pairs.items()}
+
+
+def _count(number: int) -> str:
+    return {0: "no arguments", 1: "1 argument"}.get(number, f"{number} arguments")
+
+
+def bind_value(scope: Scope, argument: Argument, value: Value) -> Bound | None:
+    """A constant of the parameter's type and within its range; None after a finding."""
+    name = argument.declaration.name.text
+    found = typed(scope, value, argument.type, (argument.declaration.span, f"`{name}` is declared here"))
+    if found is None:
+        return None
+    if argument.type.kind in (Kind.ZONE, Kind.POSITION):
+        return _place(scope, value)
+    if found.constant is None:
+        scope.report.add(
+            codes.NOT_CONSTANT,
+            value.span,
+            f"`{scope.report.text(value.span)}` is not known before the flight",
+            help="an argument is written out, such as a number with its unit",
+        )
+        return None
+    if argument.type.kind is Kind.NUMBER:
+        in_range(scope, argument, value, found.constant)
+    return found.constant
+
+
+def _place(scope: Scope, value: Value) -> Bound | None:
+    if isinstance(value, Coordinates):
+        return value
+    found = scope.find(value.name) if isinstance(value, Reference) else None
+    if isinstance(found, Entry):
+        return found.place
+    if isinstance(found, ZoneDecl):
+        return found
+    scope.report.add(
+        codes.NOT_CONSTANT,
+        value.span,
+        f"`{scope.report.text(value.span)}` is not known before the flight",
+        help="write coordinates, or a zone's entry such as `bridge.entry`",
+    )
+    return None
+
+
+def in_range(scope: Scope, argument: Argument, value: Value, constant: int) -> None:
+    """Report a number outside of its parameter's range, and the nearest one inside."""
+    low, high = argument.low, argument.high
+    if low is None or high is None or low <= constant <= high:
+        return
+    dimension = argument.type.dimension
+    assert dimension is not None
+    nearest = display(low if constant < low else high, dimension)
+    parameter = argument.declaration
+    assert parameter.range is not None
+    scope.report.add(
+        codes.ARGUMENT_RANGE,
+        value.span,
+        f"`{display(constant, dimension)}` is outside of `{parameter.name.text}`'s range "
+        f"{display(low, dimension)} .. {display(high, dimension)}",
+        help=f"the nearest value inside is `{nearest}`",
+        labels=[(parameter.range.span, "the range is declared here")],
+        fix=(value.span, nearest, f"write `{nearest}`"),
+    )

@@ -1,0 +1,95 @@
+"""E0611 to E0613, E0615: a chain of links ends, and its last link needs nothing."""
+
+from collections.abc import Sequence
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.arguments import bind_arguments
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.fields import quantity
+from rtshcua.ground.checker.lookup import find_skill
+from rtshcua.model.flat.limits import MAX_LINKS
+from rtshcua.model.ir.skills import LinkDecl, SkillDecl
+from rtshcua.model.quantity import Dimension
+
+
+def check_link(context: Context, link: LinkDecl) -> SkillDecl | None:
+    """The skill of one link, whose arguments and limit were checked and bound; None where there is no such skill."""
+    skill = find_skill(context, link.skill)
+    if skill is None:
+        return None
+    bound = bind_arguments(context, skill, link.arguments, link.span)
+    if bound is not None:
+        context.bound[id(link)] = bound
+    quantity(context, link.limit, Dimension.DURATION)
+    if skill.motion is not None and skill.motion.kind == "cover":
+        context.report.add(
+            codes.COVERING_LINK,
+            link.span,
+            f"`{skill.name.text}` flies a survey, and a chain leads to the ground",
+            labels=[(skill.motion.span, "its motion")],
+        )
+    return skill
+
+
+def check_chain(context: Context, links: Sequence[LinkDecl], owner: SkillDecl | None, span: Span) -> None:
+    """Report a chain that might not end; `owner` is the skill whose fallback it is, `span` the whole chain."""
+    if len(links) > MAX_LINKS:
+        context.report.add(
+            codes.TOO_MANY, span, f"the chain has {len(links)} links, and at most {MAX_LINKS} fit on board"
+        )
+    for index, link in enumerate(links):
+        skill = check_link(context, link)
+        if skill is None:
+            continue
+        if skill is owner:
+            context.report.add(
+                codes.CHAIN_CYCLE,
+                link.skill.span,
+                f"`{skill.name.text}` is a link of its own fallback chain",
+                help="what has just failed is no way out: leave the link away",
+                labels=[(skill.name.span, "the chain belongs to this skill")],
+            )
+        elif index == len(links) - 1:
+            _last(context, link, skill)
+        elif link.limit is None and not _ends(skill):
+            context.report.add(
+                codes.ENDLESS_LINK,
+                link.span,
+                f"`{skill.name.text}` does not end by itself, so the links after it would never run",
+                help=f"say for how long, as in `{context.report.text(link.span)} for 20 s`",
+                labels=[(skill.name.span, f"`{skill.name.text}` declares no `lasts at most`")],
+                fix=(link.span, f"{context.report.raw(link.span)} for 20 s", "hold for 20 s"),
+            )
+
+
+def _ends(skill: SkillDecl) -> bool:
+    return skill.duration is not None or (skill.motion is not None and skill.motion.kind != "hold")
+
+
+def _last(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
+    """The last link is always possible, and leaves the vehicle on the ground."""
+    needs = [*skill.require, *skill.assume]
+    if needs:
+        context.report.add(
+            codes.NEEDY_LAST_LINK,
+            link.span,
+            f"the last link `{skill.name.text}` needs something that may be missing",
+            help="end the chain in a skill without `require` and `assume`, such as a landing on the spot",
+            labels=[(need.span, "it needs this") for need in needs],
+        )
+    elif skill.motion is not None and skill.motion.kind != "land":
+        context.report.add(
+            codes.NEEDY_LAST_LINK,
+            link.span,
+            f"the last link `{skill.name.text}` does not land on the spot, so it needs a position",
+            help="end the chain in a skill whose motion is `land`",
+            labels=[(skill.motion.span, "its motion")],
+        )
+    elif link.limit is not None:
+        context.report.add(
+            codes.NEEDY_LAST_LINK,
+            link.limit.span,
+            "the last link has a time limit, and nothing comes after it",
+            help="leave the limit out",
+        )

@@ -1,0 +1,22 @@
+"""All checks of declarations, in the order in which a reader wants to hear of them."""
+
+from rtshcua.ground.checker.checks import (
+    contracts,
+    fallbacks,
+    missions,
+    names,
+    parameters,
+    policies,
+    signals,
+    vehicles,
+    zones,
+)
+from rtshcua.ground.checker.context import Context
+
+CHECKS = (names, signals, zones, vehicles, parameters, contracts, fallbacks, policies, missions)
+
+
+def check_declarations(context: Context) -> None:
+    """Report everything that is wrong with the declarations of a program."""
+    for each in CHECKS:
+        each.check(context)

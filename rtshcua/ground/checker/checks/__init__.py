@@ -1,0 +1,1 @@
+"""One file a check; the first line of each says which codes it reports. Each has `check(context)`."""

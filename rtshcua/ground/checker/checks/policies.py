@@ -1,0 +1,111 @@
+"""E0707 to E0710: the rules of a policy name what exists, and its contingency ends on the ground."""
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.chains import check_chain, check_link
+from rtshcua.ground.checker.conditions import check_condition, references
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.fields import one_of, quantity
+from rtshcua.ground.checker.lookup import find_skill, find_zone
+from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.ir.policies import PolicyDecl, Rule
+from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.quantity import Dimension
+
+SOURCES = tuple(each.name.lower() for each in SourceKind)
+
+
+def check(context: Context) -> None:
+    """Report every rule that could not be decided, and every policy that leaves the vehicle in the air."""
+    for policy in context.symbols.policies.values():
+        for rule in policy.rules:
+            _rule(context, rule)
+        if policy.airspace is not None:
+            for name in (*policy.airspace.inside, *policy.airspace.outside):
+                find_zone(context, name)
+        _contingency(context, policy)
+
+
+def _contingency(context: Context, policy: PolicyDecl) -> None:
+    links = policy.contingency
+    if links:
+        check_chain(context, links, None, links[0].span.to(links[-1].span))
+        return
+    context.report.add(
+        codes.NO_CONTINGENCY,
+        policy.name.span,
+        f"the policy `{policy.name.text}` has no contingency",
+        help="say what flies when a step is denied in the air, as in "
+        "`contingency hover for 10 s, return_home, emergency_land`",
+    )
+
+
+def _rule(context: Context, rule: Rule) -> None:
+    skills = [skill for skill in (find_skill(context, name) for name in rule.skills) if skill is not None]
+    for source in rule.through:
+        one_of(context, codes.UNKNOWN_SOURCE, source, SOURCES, "source")
+    if rule.kind == "confirm":
+        _confirm(context, rule)
+    if rule.target is not None:
+        check_link(context, rule.target)
+    if rule.when is not None and len(skills) == len(rule.skills):
+        shared = _shared(context, rule, skills)
+        if shared is not None:
+            check_condition(Scope(context.symbols, context.report, shared), rule.when)
+
+
+def _confirm(context: Context, rule: Rule) -> None:
+    if rule.within is not None:
+        quantity(context, rule.within, Dimension.DURATION)
+        return
+    context.report.add(
+        codes.CONFIRM_WITHOUT_WITHIN,
+        rule.span,
+        "the rule does not say how long an approval is awaited",
+        help="add `within` and a duration, as in `within 30 s`; after that the step is denied",
+    )
+
+
+def _shared(context: Context, rule: Rule, skills: list[SkillDecl]) -> dict[str, Argument] | None:
+    """The arguments that a rule's condition may read: those that all its skills have; None after a finding."""
+    assert rule.when is not None
+    signatures = [context.arguments(skill) for skill in skills]
+    shared = dict(signatures[0]) if signatures else {}
+    failed = False
+    for reference in references(rule.when):
+        name = reference.name
+        if name in context.symbols.signals or name in context.symbols.zones:
+            continue
+        if not rule.skills:
+            owners = [skill for skill in context.symbols.skills.values() if name in context.arguments(skill)]
+            if owners:
+                context.report.add(
+                    codes.RULE_ARGUMENT,
+                    reference.span,
+                    f"a rule about any skill cannot read the argument `{name}`, which not every skill has",
+                    help="name the skills that the rule is about",
+                    labels=[(rule.span, "this rule is about any skill")],
+                )
+                failed = True
+            continue
+        having = [signature[name] for signature in signatures if name in signature]
+        if not having:
+            continue  # an enumerator, a zone's entry, or unknown: the condition's check tells
+        if len(having) < len(skills) or any(each.type != having[0].type for each in having):
+            lacking = next(
+                skill
+                for skill, signature in zip(skills, signatures, strict=True)
+                if name not in signature or signature[name].type != having[0].type
+            )
+            context.report.add(
+                codes.RULE_ARGUMENT,
+                reference.span,
+                f"`{lacking.name.text}` has no argument `{name}` of this type, so the rule cannot be about it",
+                help="write one rule for each skill",
+                labels=[
+                    (lacking.name.span, "declared here"),
+                    (having[0].declaration.span, f"`{name}` is declared here"),
+                ],
+            )
+            failed = True
+    return None if failed else shared

@@ -1,0 +1,219 @@
+"""E0401 to E0412: enumerations and signals against the MAVLink dialect."""
+
+from collections.abc import Mapping
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.dialect import DATUM, UNITS, Field
+from rtshcua.ground.checker.fields import quantity
+from rtshcua.ground.checker.scope import signal_type
+from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SignalSource
+from rtshcua.model.quantity import Dimension
+
+#: what an integer field can hold
+INTEGERS: Mapping[str, tuple[int, int]] = {
+    f"{sign}int{bits}_t": (0, (1 << bits) - 1) if sign else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    for sign in ("", "u")
+    for bits in (8, 16, 32, 64)
+}
+PLACE_UNIT = "degE7"
+
+
+def check(context: Context) -> None:
+    """Report every enumeration and signal that the dialect does not bear out."""
+    for enum in context.symbols.enums.values():
+        _enum(context, enum)
+    for signal in context.symbols.signals.values():
+        _signal(context, signal)
+
+
+def _enum(context: Context, enum: EnumDecl) -> None:
+    report = context.report
+    values: dict[int, Name] = {}
+    for member in enum.members:
+        first = values.setdefault(member.value, member.name)
+        if first is not member.name:
+            report.add(
+                codes.ENUM_VALUE,
+                member.span,
+                f"`{member.name.text}` has the value of `{first.text}`",
+                labels=[(first.span, "this one")],
+            )
+    if enum.dialect is None:
+        return
+    entries = context.dialect.enums.get(enum.dialect.text)
+    if entries is None:
+        report.add(
+            codes.UNKNOWN_ENUM,
+            enum.dialect.span,
+            f"the dialect has no enumeration `{enum.dialect.text}`",
+            help=suggestion(enum.dialect.text, context.dialect.enums),
+        )
+        return
+    known = set(entries.values())
+    for member in enum.members:
+        if member.value not in known:
+            listed = ", ".join(f"{value} ({name})" for name, value in sorted(entries.items(), key=lambda e: e[1])[:12])
+            report.add(
+                codes.ENUM_VALUE,
+                member.span,
+                f"`{enum.dialect.text}` has no value {member.value}",
+                help=f"its values are {listed}",
+            )
+
+
+def _signal(context: Context, signal: SignalDecl) -> None:
+    quantity(context, signal.stale_after, Dimension.DURATION)
+    name = signal.type.text
+    known = NAMED.get(name)
+    if known == ZONE or (known is None and name not in context.symbols.enums):
+        types = [*(each for each in NAMED if NAMED[each] != ZONE), *context.symbols.enums]
+        context.report.add(
+            codes.SIGNAL_TYPE,
+            signal.type.span,
+            f"no signal can be of the type `{name}`",
+            help=suggestion(name, types) or "the types of signals are " + ", ".join(f"`{each}`" for each in types),
+        )
+        return
+    type = signal_type(context.symbols, signal)
+    for source in signal.sources:
+        _source(context, signal, source, type)
+
+
+def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Type | None) -> None:
+    report, dialect = context.report, context.dialect
+    message = dialect.messages.get(source.message.text)
+    if message is None:
+        report.add(
+            codes.UNKNOWN_MESSAGE,
+            source.message.span,
+            f"the dialect has no message `{source.message.text}`",
+            help=suggestion(source.message.text, dialect.messages),
+        )
+        return
+    if not _count(context, signal, source, type):
+        return
+    for name in source.fields:
+        field = message.fields.get(name.text)
+        if field is None:
+            report.add(
+                codes.UNKNOWN_FIELD,
+                name.span,
+                f"`{source.message.text}` has no field `{name.text}`",
+                help=suggestion(name.text, message.fields)
+                or "its fields are " + ", ".join(f"`{each}`" for each in message.fields),
+            )
+        elif field.length or field.type == "char":
+            report.add(
+                codes.FIELD_TYPE,
+                name.span,
+                f"`{name.text}` is {'text' if field.type == 'char' else f'an array of {field.length} numbers'}",
+                help="a signal is read from a field that is one number",
+            )
+        else:
+            _field(context, signal, source, name, field, type)
+            _sentinels(context, signal, field)
+
+
+def _count(context: Context, signal: SignalDecl, source: SignalSource, type: Type | None) -> bool:
+    """A position is read from two fields, a speed from one or two, everything else from one."""
+    given = len(source.fields)
+    allowed = (2,) if type == POSITION else (1, 2) if type == SPEED else (1,)
+    if given in allowed:
+        return True
+    what = "latitude and longitude" if type == POSITION else "one field"
+    context.report.add(
+        codes.FIELD_COUNT,
+        source.span,
+        f"the type `{signal.type.text}` is read from {what}, and here {'is' if given == 1 else 'are'} {given}",
+        labels=[(signal.type.span, "this type")],
+    )
+    return False
+
+
+def _field(
+    context: Context, signal: SignalDecl, source: SignalSource, name: Name, field: Field, type: Type | None
+) -> None:
+    """The field measures what the signal does."""
+    if signal.type.text == Dimension.ALTITUDE.value:
+        _altitude(context, signal, source, name, field, type)
+    elif type == POSITION:
+        if field.unit != PLACE_UNIT:
+            _unit(context, signal, name, field, (PLACE_UNIT,))
+    elif type is not None and type.kind is Kind.ENUMERATION:
+        enum = context.symbols.enums[signal.type.text]
+        mirrored = None if enum.dialect is None else enum.dialect.text
+        if field.unit or field.type in ("float", "double") or (mirrored is not None and field.enum != mirrored):
+            has = f"has values of `{field.enum}`" if field.enum else "has no enumeration"
+            context.report.add(
+                codes.FIELD_ENUM,
+                name.span,
+                f"`{name.text}` {has}, and the signal is a `{signal.type.text}`",
+                labels=[(enum.name.span, f"`{enum.name.text}` is declared here")],
+            )
+    elif type is not None and type.dimension is not None and field.unit not in UNITS[type.dimension]:
+        _unit(context, signal, name, field, tuple(UNITS[type.dimension]))
+
+
+def _altitude(
+    context: Context, signal: SignalDecl, source: SignalSource, name: Name, field: Field, type: Type | None
+) -> None:
+    if field.unit not in UNITS[Dimension.LENGTH]:
+        _unit(context, signal, name, field, tuple(UNITS[Dimension.LENGTH]))
+        return
+    datum = DATUM.get((source.message.text, name.text))
+    if datum is None:
+        context.report.add(
+            codes.FIELD_DATUM,
+            name.span,
+            f"it is not known what `{source.message.text}.{name.text}` is measured from",
+            help="read altitudes from "
+            + ", ".join(f"`{message}.{each}`" for message, each in list(DATUM)[:2])
+            + ", or declare a `length`",
+        )
+    elif type is not None and type.datum is not datum:
+        context.report.add(
+            codes.FIELD_DATUM,
+            name.span,
+            f"`{source.message.text}.{name.text}` is above {datum.value}, and the source before it is not",
+            labels=[(signal.sources[0].span, "this one")],
+        )
+
+
+def _unit(context: Context, signal: SignalDecl, name: Name, field: Field, accepted: tuple[str, ...]) -> None:
+    fits = [each.value for each, units in UNITS.items() if field.unit in units]
+    has = f"is in `{field.unit}`" if field.unit else "has no unit"
+    words = ", ".join(f"`{unit}`" for unit in accepted if unit) or "no unit"
+    context.report.add(
+        codes.FIELD_UNIT,
+        name.span,
+        f"`{name.text}` {has}, which does not measure `{signal.type.text}`",
+        help=f"declare the signal as `{fits[0]}`, or read a field in {words}" if fits else f"read a field in {words}",
+        labels=[(signal.type.span, "this type")],
+    )
+
+
+def _sentinels(context: Context, signal: SignalDecl, field: Field) -> None:
+    enum = context.symbols.enums.get(signal.type.text)
+    members = {} if enum is None else {member.name.text: member.value for member in enum.members}
+    low, high = INTEGERS.get(field.type, (-(1 << 53), 1 << 53))
+    for name in signal.unknown_at:
+        value = sentinel(name.text, members)
+        if value is None or not low <= value <= high:
+            context.report.add(
+                codes.UNKNOWN_AT,
+                name.span,
+                f"`{name.text}` is no value of a field of type `{field.type}`",
+                help=suggestion(name.text, members) or f"its values go from {low} to {high}",
+            )
+
+
+def sentinel(text: str, members: Mapping[str, int]) -> int | None:
+    """The raw value that a mark for `not known` stands for, or None."""
+    if text in members:
+        return members[text]
+    digits = text.removeprefix("-")
+    return int(text) if digits.isascii() and digits.isdigit() and len(digits) <= 20 else None

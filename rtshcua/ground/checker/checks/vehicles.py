@@ -1,0 +1,30 @@
+"""E0310, E0319, E0502: what a vehicle declares of itself."""
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.fields import on_globe, quantity
+from rtshcua.model.flat.limits import FULL
+from rtshcua.model.quantity import Dimension
+
+MAX_OFFSET_US = 14 * 3_600_000_000  # local times are at most 14 h from UTC
+
+
+def check(context: Context) -> None:
+    """Report every field of a vehicle that is of the wrong dimension or size."""
+    for vehicle in context.symbols.vehicles.values():
+        on_globe(context, vehicle.home)
+        quantity(context, vehicle.within, Dimension.LENGTH)
+        quantity(context, vehicle.speed, Dimension.SPEED)
+        quantity(context, vehicle.climb, Dimension.SPEED)
+        quantity(context, vehicle.position_error, Dimension.LENGTH, positive=False)
+        quantity(context, vehicle.endurance, Dimension.DURATION)
+        quantity(context, vehicle.reserve, Dimension.RATIO, positive=False)
+        if vehicle.reserve.dimension is Dimension.RATIO and vehicle.reserve.value >= FULL:
+            context.report.add(
+                codes.NUMBER_SIZE,
+                vehicle.reserve.span,
+                "the reserve leaves nothing to fly with: it must be below 100 %",
+            )
+        offset = vehicle.utc_offset
+        if offset is not None and abs(offset.value) > MAX_OFFSET_US:
+            context.report.add(codes.NUMBER_SIZE, offset.span, "local times are at most 14 h before or after UTC")

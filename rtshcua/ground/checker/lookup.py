@@ -1,0 +1,74 @@
+"""Declarations by the names that refer to them; what is not found is reported."""
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.symbols import WORDS, Declaration, suggestion
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.skills import SkillDecl
+
+D = TypeVar("D", bound=Declaration)
+
+
+def find_skill(context: Context, name: Name) -> SkillDecl | None:
+    """The skill of that name."""
+    return _find(context, name, context.symbols.skills, SkillDecl)
+
+
+def find_zone(context: Context, name: Name) -> ZoneDecl | None:
+    """The zone of that name."""
+    return _find(context, name, context.symbols.zones, ZoneDecl)
+
+
+def find_policy(context: Context, name: Name) -> PolicyDecl | None:
+    """The policy of that name."""
+    return _find(context, name, context.symbols.policies, PolicyDecl)
+
+
+def find_vehicle(context: Context, name: Name) -> VehicleDecl | None:
+    """The vehicle of that name."""
+    return _find(context, name, context.symbols.vehicles, VehicleDecl)
+
+
+def find_mission(context: Context, name: str) -> MissionDecl | None:
+    """The mission of that name, asked for on the command line: there is no place to point at."""
+    found = context.symbols.missions.get(name)
+    if found is None and name not in context.symbols.broken:
+        context.report.add(
+            codes.UNKNOWN_NAME,
+            None,
+            f"nothing declares a mission `{name}`",
+            help=suggestion(name, context.symbols.missions),
+        )
+    return found
+
+
+def _find(context: Context, name: Name, table: Mapping[str, D], kind: type[D]) -> D | None:
+    found = table.get(name.text)
+    if found is not None:
+        return found
+    if name.text in context.symbols.broken:
+        return None
+    asked = WORDS[kind]
+    other = context.symbols.declared.get(name.text)
+    if other is None:
+        context.report.add(
+            codes.UNKNOWN_NAME,
+            name.span,
+            f"nothing declares {asked} `{name.text}`",
+            help=suggestion(name.text, table),
+        )
+    else:
+        context.report.add(
+            codes.WRONG_KIND,
+            name.span,
+            f"`{name.text}` is {WORDS[type(other)]}, where {asked} is asked",
+            help=suggestion(name.text, table),
+            labels=[(other.name.span, "declared here")],
+        )
+    return None

@@ -1,0 +1,130 @@
+"""What a name means at one place: a parameter of the skill in hand, a signal, a zone, a zone's entry."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.dialect import DATUM
+from rtshcua.ground.checker.report import Report
+from rtshcua.ground.checker.symbols import Symbols, suggestion
+from rtshcua.ground.checker.types import NAMED, POSITION, ZONE, Enumeration, Kind, Type, number
+from rtshcua.model.ir.expression import Coordinates
+from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl
+from rtshcua.model.ir.skills import Parameter
+from rtshcua.model.quantity import Dimension
+
+LOCAL_TIME = "local time"
+ENTRY = ".entry"
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """A parameter as seen inside its skill, or by a rule about it; `low`, `high` where it has a range."""
+
+    declaration: Parameter
+    type: Type
+    low: int | None = None
+    high: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """The declared entry of a zone, a place."""
+
+    zone: ZoneDecl
+    place: Coordinates
+
+
+@dataclass(slots=True)
+class Scope:
+    """The names that are visible at one place; a parameter is found first, and is never also something else."""
+
+    symbols: Symbols
+    report: Report
+    arguments: Mapping[str, Argument] = field(default_factory=dict)
+
+    def find(self, name: str) -> Argument | SignalDecl | ZoneDecl | Entry | None:
+        """What `name` stands for as a value, or None."""
+        argument = self.arguments.get(name)
+        if argument is not None:
+            return argument
+        signal = self.symbols.signals.get(name)
+        if signal is not None:
+            return signal
+        zone = self.symbols.zones.get(name)
+        if zone is not None:
+            return zone
+        if name.endswith(ENTRY):
+            zone = self.symbols.zones.get(name.removesuffix(ENTRY))
+            if zone is not None and zone.entry is not None:
+                return Entry(zone, zone.entry)
+        return None
+
+    def type_of(self, found: Argument | SignalDecl | ZoneDecl | Entry) -> Type | None:
+        """The type of what was found; None where its own declaration is wrong, which is reported there."""
+        if isinstance(found, Argument):
+            return found.type
+        if isinstance(found, SignalDecl):
+            return signal_type(self.symbols, found)
+        return ZONE if isinstance(found, ZoneDecl) else POSITION
+
+    def unknown(self, span: Span, name: str) -> None:
+        """Report a name that stands for no value here."""
+        if name in self.symbols.broken or name.removesuffix(ENTRY) in self.symbols.broken:
+            return
+        kind = self.symbols.kind_of(name)
+        if kind is not None:
+            self.report.add(
+                codes.WRONG_KIND,
+                span,
+                f"`{name}` is {kind}, not a value",
+                labels=[(self.symbols.declared[name].name.span, "declared here")],
+            )
+            return
+        zone = self.symbols.zones.get(name.removesuffix(ENTRY)) if name.endswith(ENTRY) else None
+        if zone is not None:
+            self.report.add(
+                codes.NO_ENTRY,
+                span,
+                f"the zone `{zone.name.text}` declares no entry",
+                help="add `entry` and its coordinates to the zone",
+                labels=[(zone.name.span, "declared here")],
+            )
+            return
+        known = [*self.arguments, *self.symbols.signals, *self.symbols.zones, LOCAL_TIME]
+        self.report.add(codes.UNKNOWN_NAME, span, f"nothing declares `{name}`", help=suggestion(name, known))
+
+
+def enumeration_of(declaration: EnumDecl) -> Enumeration:
+    """An `enum` as a set of values, ordered by value."""
+    members = {member.name.text: member.value for member in declaration.members}
+    return Enumeration(declaration.name.text, members, True, declaration.name.span)
+
+
+def choices_of(parameter: Parameter) -> Enumeration:
+    """The choices of a `one of` parameter, numbered in the order in which they are written."""
+    members = {choice.text: ordinal for ordinal, choice in enumerate(parameter.choices)}
+    return Enumeration(parameter.name.text, members, False, parameter.name.span)
+
+
+def signal_type(symbols: Symbols, signal: SignalDecl) -> Type | None:
+    """The type of a signal; an altitude's datum is that of the field it is read from."""
+    name = signal.type.text
+    if name == Dimension.ALTITUDE.value:
+        source = signal.sources[0]
+        datum = DATUM.get((source.message.text, source.fields[0].text))
+        return None if datum is None else number(Dimension.ALTITUDE, datum)
+    named = NAMED.get(name)
+    if named is not None:
+        return None if named == ZONE else named
+    declaration = symbols.enums.get(name)
+    return None if declaration is None else Type(Kind.ENUMERATION, enumeration=enumeration_of(declaration))
+
+
+def parameter_type(parameter: Parameter) -> Type | None:
+    """The type of a parameter, or None where nothing is called so."""
+    if parameter.choices:
+        return Type(Kind.ENUMERATION, enumeration=choices_of(parameter))
+    return NAMED.get(parameter.type.text)

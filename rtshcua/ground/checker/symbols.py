@@ -1,0 +1,87 @@
+"""What each name of a program stands for: one name, one meaning."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import nearest
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.program import Unit
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl
+from rtshcua.model.ir.skills import SkillDecl
+
+Declaration = EnumDecl | SignalDecl | ZoneDecl | VehicleDecl | SkillDecl | PolicyDecl | MissionDecl
+
+#: how a kind of declaration is called in a message
+WORDS: Mapping[type, str] = {
+    EnumDecl: "an enumeration",
+    SignalDecl: "a signal",
+    ZoneDecl: "a zone",
+    VehicleDecl: "a vehicle",
+    SkillDecl: "a skill",
+    PolicyDecl: "a policy",
+    MissionDecl: "a mission",
+}
+
+
+@dataclass(slots=True)
+class Symbols:
+    """The declarations of a program by name, all kinds in one name space, and once more by kind.
+
+    `broken` are the names whose declarations have a syntax error: nothing is known of them, and nothing is said.
+    """
+
+    declared: dict[str, Declaration] = field(default_factory=dict)
+    duplicates: list[tuple[Declaration, Declaration]] = field(default_factory=list)
+    enums: dict[str, EnumDecl] = field(default_factory=dict)
+    signals: dict[str, SignalDecl] = field(default_factory=dict)
+    zones: dict[str, ZoneDecl] = field(default_factory=dict)
+    vehicles: dict[str, VehicleDecl] = field(default_factory=dict)
+    skills: dict[str, SkillDecl] = field(default_factory=dict)
+    policies: dict[str, PolicyDecl] = field(default_factory=dict)
+    missions: dict[str, MissionDecl] = field(default_factory=dict)
+    broken: frozenset[str] = frozenset()
+
+    def _declare(self, declarations: Sequence[Declaration], table: dict[str, Declaration]) -> None:
+        for declaration in declarations:
+            name = declaration.name.text
+            first = self.declared.setdefault(name, declaration)
+            if first is declaration:
+                table[name] = declaration
+            else:
+                self.duplicates.append((first, declaration))
+
+    def kind_of(self, name: str) -> str | None:
+        """What `name` stands for, in words, or None."""
+        declaration = self.declared.get(name)
+        return None if declaration is None else WORDS[type(declaration)]
+
+
+def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symbols:
+    """The symbol table of a program; of two declarations of one name the first counts, the second is a duplicate."""
+    symbols = Symbols(broken=broken)
+    for unit in units:
+        for declarations, table in (
+            (unit.enums, symbols.enums),
+            (unit.signals, symbols.signals),
+            (unit.zones, symbols.zones),
+            (unit.vehicles, symbols.vehicles),
+            (unit.skills, symbols.skills),
+            (unit.policies, symbols.policies),
+            (unit.missions, symbols.missions),
+        ):
+            symbols._declare(declarations, table)  # type: ignore[arg-type]
+    return symbols
+
+
+def suggestion(word: str, known: Iterable[str]) -> str | None:
+    """`did you mean ...?` for a word that is not among the known ones."""
+    near = nearest(word, known)
+    return None if near is None else f"did you mean `{near}`?"
+
+
+def declared_at(declaration: Declaration) -> tuple[Span, str]:
+    """A label that points at a declaration's name."""
+    return declaration.name.span, "declared here"

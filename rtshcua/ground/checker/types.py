@@ -1,0 +1,95 @@
+"""What a value is: a number with its dimension and datum, an enumeration, a zone, a place, a time of day."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from rtshcua.diagnostics.span import Span
+from rtshcua.model.quantity import Datum, Dimension
+
+
+class Kind(Enum):
+    """The kinds of values; only numbers have a dimension."""
+
+    NUMBER = "number"
+    ENUMERATION = "enumeration"
+    ZONE = "zone"
+    POSITION = "position"
+    TIME_OF_DAY = "time of day"
+
+
+@dataclass(frozen=True, slots=True)
+class Enumeration:
+    """A named set of values: of an `enum` (ordered by value), or of a parameter's `one of` (in no order)."""
+
+    name: str
+    members: Mapping[str, int]
+    ordered: bool
+    declared: Span = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Type:
+    """A value's type; two types are the same where they compare equal."""
+
+    kind: Kind
+    dimension: Dimension | None = None
+    datum: Datum | None = None
+    enumeration: Enumeration | None = None
+
+    def describe(self) -> str:
+        """The type in words, for a message: `an altitude above home`."""
+        if self.kind is Kind.NUMBER:
+            return _WORDS[self.dimension] + ("" if self.datum is None else f" above {self.datum.value}")
+        if self.kind is Kind.ENUMERATION:
+            assert self.enumeration is not None
+            return f"a value of `{self.enumeration.name}`"
+        return f"a {self.kind.value}"
+
+
+_WORDS = {
+    Dimension.LENGTH: "a length",
+    Dimension.ALTITUDE: "an altitude",
+    Dimension.SPEED: "a speed",
+    Dimension.DURATION: "a duration",
+    Dimension.ANGLE: "an angle",
+    Dimension.RATIO: "a ratio",
+    Dimension.COUNT: "a plain number",
+    None: "a number",
+}
+
+#: a literal of each dimension, to show what would be accepted
+EXAMPLES = {
+    Dimension.LENGTH: "20 m",
+    Dimension.ALTITUDE: "20 m",
+    Dimension.SPEED: "5 m/s",
+    Dimension.DURATION: "10 s",
+    Dimension.ANGLE: "90 deg",
+    Dimension.RATIO: "25 %",
+    Dimension.COUNT: "3",
+}
+
+
+def number(dimension: Dimension, datum: Datum | None = None) -> Type:
+    """A number's type; an altitude is one above home unless said otherwise."""
+    if dimension is Dimension.ALTITUDE and datum is None:
+        datum = Datum.HOME
+    return Type(Kind.NUMBER, dimension, datum)
+
+
+LENGTH = number(Dimension.LENGTH)
+HEIGHT = number(Dimension.ALTITUDE, Datum.HOME)
+SPEED = number(Dimension.SPEED)
+DURATION = number(Dimension.DURATION)
+COUNT = number(Dimension.COUNT)
+RATIO = number(Dimension.RATIO)
+ZONE = Type(Kind.ZONE)
+POSITION = Type(Kind.POSITION)
+TIME_OF_DAY = Type(Kind.TIME_OF_DAY)
+
+#: types by the names that a declaration may write; enumerations are declared
+NAMED: Mapping[str, Type] = {
+    **{dimension.value: number(dimension) for dimension in Dimension},
+    "zone": ZONE,
+    "position": POSITION,
+}

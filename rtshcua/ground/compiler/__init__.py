@@ -1,0 +1,1 @@
+"""From checked sources to the flat form: `program.compile_program` is the way in."""

@@ -1,0 +1,61 @@
+"""What a policy is made of: the declarations in its own file and in all that this file imports.
+
+A mission may bring declarations of its own, but nothing that it brings may speak in the policy's name: the policy is
+signed on its own, and is the same for every mission under it.
+"""
+
+import posixpath
+from collections.abc import Iterator, Mapping, Sequence
+
+from rtshcua.ground.checker.symbols import Declaration
+from rtshcua.ground.language.paths import LIBRARY, imported, shown
+from rtshcua.model.ir.program import Unit
+
+
+class Imports:
+    """The files of a program by what they import."""
+
+    def __init__(self, units: Sequence[Unit], stable: Mapping[str, str]) -> None:
+        self._units = {unit.file: unit for unit in units}
+        self._by_stable = {stable.get(unit.file, unit.file): unit.file for unit in units}
+
+    def closure(self, file: str) -> frozenset[str]:
+        """A file and everything that it imports, directly or not."""
+        seen = {file}
+        waiting = [file]
+        while waiting:
+            for found in self._imported(waiting.pop()):
+                if found not in seen:
+                    seen.add(found)
+                    waiting.append(found)
+        return frozenset(seen)
+
+    def _imported(self, file: str) -> Iterator[str]:
+        unit = self._units.get(file)
+        for each in () if unit is None else unit.imports:
+            if each.path.startswith(LIBRARY):
+                inside = posixpath.normpath(each.path.removeprefix(LIBRARY).lstrip("/"))
+                name = self._by_stable.get(LIBRARY + inside)
+            else:
+                path = imported(each.path, file, None)
+                name = None if path is None else shown(path)
+            if name in self._units:
+                yield name
+
+
+def declared_in(declaration: Declaration, files: frozenset[str]) -> bool:
+    """Whether a declaration stands in one of some files."""
+    return declaration.span.file in files
+
+
+def beside(name: str, other: str) -> str:
+    """The stable name of a file as seen from the folder of another, so that it does not depend on who asked first."""
+    if name.startswith(LIBRARY) or other.startswith(LIBRARY):
+        return name
+    parts, folder = name.split("/"), other.split("/")[:-1]
+    common = 0
+    while common < min(len(parts) - 1, len(folder)) and parts[common] == folder[common]:
+        common += 1
+    if ".." in folder[common:]:
+        return name
+    return "/".join([".."] * (len(folder) - common) + parts[common:])

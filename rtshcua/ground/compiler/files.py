@@ -1,0 +1,45 @@
+"""The table of source files that spans on board refer to, with the digest of each."""
+
+from collections.abc import Mapping
+from hashlib import sha256
+
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.checker.report import Report
+
+#: a clause's text is for a person; what is longer is cut
+MAX_TEXT = 400
+
+
+class Files:
+    """File names by index, in the order in which they are first referred to; `stable` are the names that are signed."""
+
+    def __init__(self, report: Report, stable: Mapping[str, str]) -> None:
+        self._report = report
+        self._stable = stable
+        self._index: dict[str, int] = {}
+
+    def index(self, file: str) -> int:
+        """The index of a file."""
+        return self._index.setdefault(file, len(self._index))
+
+    def place(self, span: Span) -> tuple[str, int, int, int]:
+        """A span as it is carried on board: its text, its file's index, its start and its end."""
+        text = self._report.text(span)
+        if len(text) > MAX_TEXT:
+            text = text[: MAX_TEXT - 3] + "..."
+        return text, self.index(span.file), span.start, span.end
+
+    def span(self, file: int, start: int, end: int) -> Span:
+        """The span that a place on board came from."""
+        return Span(tuple(self._index)[file], start, end)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The files' names, as they are signed."""
+        return tuple(self._stable.get(name, name) for name in self._index)
+
+    @property
+    def digests(self) -> tuple[bytes, ...]:
+        """The SHA-256 of each file's text in UTF-8."""
+        sources: Mapping[str, Source] = self._report.sources
+        return tuple(sha256(sources[name].text.encode("utf-8", "surrogatepass")).digest() for name in self._index)

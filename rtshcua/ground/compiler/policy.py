@@ -1,0 +1,171 @@
+"""A policy and its whole closure to the flat form, for one vehicle.
+
+The policy holds every skill that its rules and chains name (where a permit is for any: all that its files declare),
+every signal that these read, and every zone that its files declare, for a mission may name any as an argument.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.conditions import POSITION_SIGNAL
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.scope import signal_type
+from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, Type
+from rtshcua.ground.compiler.belonging import belongs
+from rtshcua.ground.compiler.conditions import Conditions
+from rtshcua.ground.compiler.contracts import Contracts
+from rtshcua.ground.compiler.files import Files
+from rtshcua.ground.compiler.projection import projection_at
+from rtshcua.ground.compiler.rules import Rules
+from rtshcua.ground.compiler.slots import Slots
+from rtshcua.ground.compiler.zones import ZoneTable
+from rtshcua.model.flat.policy import Airspace, Policy, Vehicle
+from rtshcua.model.ir.places import VehicleDecl
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.skills import LinkDecl, SkillDecl
+
+#: the signals that every decision reads, in the order of their slots: where the vehicle is, how high, how much energy
+WELL_KNOWN: Mapping[str, Type] = {POSITION_SIGNAL: POSITION, "height": HEIGHT, "battery": RATIO}
+
+
+@dataclass(frozen=True, slots=True)
+class LoweredPolicy:
+    """A flat policy with what its missions are lowered and checked by: indexes by name, zones, files."""
+
+    policy: Policy
+    declaration: PolicyDecl
+    vehicle: VehicleDecl
+    skills: Mapping[str, int]
+    roles: Mapping[str, int]
+    zones: ZoneTable
+    contracts: Contracts
+    files: Files
+
+
+def lower_policy(
+    context: Context, policy: PolicyDecl, vehicle: VehicleDecl, files: frozenset[str], names: Mapping[str, str]
+) -> LoweredPolicy | None:
+    """The policy for a vehicle; `files` is its import closure, `names` what a file is called in what is signed.
+
+    None after a finding.
+    """
+    before = len(context.report.found)
+    skills = _skills(context, policy, files)
+    if not _well_known(context, policy, files) or not belongs(context, policy, skills, vehicle, files):
+        return None
+    table = Files(context.report, names)
+    table.index(policy.span.file)
+    slots = Slots(context)
+    position, height, battery = (slots.of(name) for name in WELL_KNOWN)
+    declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
+    zones = ZoneTable(projection_at(vehicle.home.latitude, vehicle.home.longitude), declared, context.report)
+    conditions = Conditions(context, slots, zones, table)
+    flat_vehicle = _vehicle(vehicle, position, height, battery)
+    numbers = {skill.name.text: number for number, skill in enumerate(skills)}
+    contracts = Contracts(context, numbers, conditions, zones, table, flat_vehicle)
+    roles = _roles(policy)
+    lowered = [contracts.contract(skill) for skill in skills]
+    rules = Rules(context, numbers, roles, conditions, contracts, table).lowered(policy)
+    contingency = contracts.chain(policy.contingency)
+    airspace = _airspace(policy, zones, table)
+    if len(context.report.found) > before:
+        return None
+    flat = Policy(
+        name=policy.name.text,
+        version=policy.version,
+        vehicle=flat_vehicle,
+        projection=zones.projection,
+        roles=roles,
+        signals=tuple(slots.signals),
+        slots=slots.count,
+        zones=zones.flat(),
+        declared=len(zones.regions),
+        tables=tuple(zones.tables),
+        sets=tuple(conditions.sets),
+        contracts=tuple(lowered),
+        rules=rules,
+        airspace=airspace,
+        contingency=contingency,
+        sources=table.names,
+        source_digests=table.digests,
+    )
+    by_name = {role: number for number, role in enumerate(roles)}
+    return LoweredPolicy(flat, policy, vehicle, numbers, by_name, zones, contracts, table)
+
+
+def _skills(context: Context, policy: PolicyDecl, files: frozenset[str]) -> list[SkillDecl]:
+    """The skills of a policy, sorted by name."""
+    table = context.symbols.skills
+    links: list[LinkDecl] = [*policy.contingency, *(rule.target for rule in policy.rules if rule.target is not None)]
+    waiting = [name.text for rule in policy.rules for name in rule.skills] + [link.skill.text for link in links]
+    if any(rule.kind == "permit" and not rule.skills for rule in policy.rules):
+        waiting += [name for name, skill in table.items() if skill.span.file in files]
+    found: dict[str, SkillDecl] = {}
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found[name] = table[name]
+            waiting += [link.skill.text for link in table[name].fallback]
+    return [found[name] for name in sorted(found)]
+
+
+def _roles(policy: PolicyDecl) -> tuple[str, ...]:
+    named = {role.text for rule in policy.rules for role in rule.roles}
+    return tuple(sorted(named | {rule.approver.text for rule in policy.rules if rule.approver is not None}))
+
+
+def _well_known(context: Context, policy: PolicyDecl, files: frozenset[str]) -> bool:
+    """Whether the signals are declared that every decision reads."""
+    good = True
+    for name, type in WELL_KNOWN.items():
+        signal = context.symbols.signals.get(name)
+        if signal is None or signal.span.file not in files:
+            good = False
+            context.report.add(
+                codes.WELL_KNOWN_SIGNAL,
+                policy.name.span,
+                f"the policy `{policy.name.text}` neither declares nor imports a signal `{name}`",
+                help=f"every flight needs it: declare it as {type.describe()}, or import `lib:skills/signals.rts`",
+            )
+        elif signal_type(context.symbols, signal) != type:
+            good = False
+            context.report.add(
+                codes.WELL_KNOWN_SIGNAL,
+                signal.type.span,
+                f"the signal `{name}` must be {type.describe()}, for every decision reads it as that",
+                help="give the signal another name, or read it from a fitting field",
+            )
+    return good
+
+
+def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | None:
+    airspace = policy.airspace
+    if airspace is None:
+        return None
+    text, source, start, end = files.place(airspace.span)
+    return Airspace(
+        inside=tuple(sorted(zones.index[name.text] for name in airspace.inside)),
+        outside=tuple(sorted(zones.index[name.text] for name in airspace.outside)),
+        text=text,
+        source=source,
+        start=start,
+        end=end,
+    )
+
+
+def _vehicle(vehicle: VehicleDecl, position: int, height: int, battery: int) -> Vehicle:
+    return Vehicle(
+        name=vehicle.name.text,
+        identity=vehicle.identity,
+        home_within=vehicle.within.value,
+        speed=vehicle.speed.value,
+        climb=vehicle.climb.value,
+        position_error=vehicle.position_error.value,
+        endurance_us=vehicle.endurance.value,
+        reserve=vehicle.reserve.value,
+        utc_offset_us=0 if vehicle.utc_offset is None else vehicle.utc_offset.value,
+        position=position,
+        height=height,
+        battery=battery,
+    )

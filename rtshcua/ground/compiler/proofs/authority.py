@@ -1,0 +1,173 @@
+"""E0702 to E0704, E0706: the policy permits each step with the arguments that it has.
+
+A permit's clauses over arguments and zones must be true; those over signals, the time and the vehicle's position are
+left for on board.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from rtshcua.decision import tree
+from rtshcua.decision.authority import authority
+from rtshcua.decision.case import Case
+from rtshcua.decision.change import Changes
+from rtshcua.decision.evaluate import Environment, build
+from rtshcua.decision.offer import Nearest, offer
+from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.rules import PreparedRule
+from rtshcua.decision.truth import TRUE
+from rtshcua.decision.verdict import PASS
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.conditions import references
+from rtshcua.ground.compiler.mission import argument_span
+from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.model.flat.contract import SourceKind, TimingClass
+from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.ir.expression import Condition, Junction
+from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.outcome import Reason
+from rtshcua.model.quantity import Dimension, display
+
+
+class Unmet(NamedTuple):
+    """A clause of a permit that is not true: where it is written, the parameters it reads, what would do."""
+
+    span: Span
+    parameters: tuple[str, ...]
+    accepted: tuple[Nearest, ...]
+
+
+def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
+    """Whether some state of the vehicle makes a step permitted; reports it where none does."""
+    case = ground.case(invocation)
+    found = authority(case)
+    if PASS in found or not found:
+        return True
+    verdict = found[0]
+    match verdict.reason:
+        case Reason.CLASS_NOT_PERMITTED:
+            _class(ground, mission, step, invocation)
+        case Reason.FORBIDDEN:
+            assert isinstance(verdict.clause, Rule)
+            ground.context.report.add(
+                codes.FORBIDDEN,
+                step.span,
+                f"the policy `{ground.prepared.policy.name}` forbids this step",
+                labels=[(ground.span(verdict.clause), "by this rule")],
+            )
+        case Reason.NOT_PERMITTED:
+            _not_permitted(ground, mission, step, invocation)
+        case _:
+            _out_of_scope(ground, step, invocation, case)
+    return False
+
+
+def _class(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
+    skill = ground.context.symbols.skills[step.skill.text]
+    assert mission.source is not None
+    assert skill.timing_class is not None
+    timing = TimingClass(invocation.invocation.contract.timing_class).name.lower()
+    ground.context.report.add(
+        codes.SOURCE_CLASS,
+        step.skill.span,
+        f"`{mission.source.text}` may not ask for a skill of the class `{timing}`",
+        help="an agent and an operator may ask for `semantic` and `tactical` skills",
+        labels=[
+            (skill.timing_class.span, "the class is declared here"),
+            (mission.source.span, "proposed by this source"),
+        ],
+    )
+
+
+def _not_permitted(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
+    policy, flat = ground.prepared.policy, invocation.invocation
+    assert mission.role is not None
+    may: list[str] = []
+    for rule in policy.rules:
+        if rule.kind == RuleKind.PERMIT and flat.skill in rule.skills:
+            roles = " or ".join(f"`{policy.roles[role]}`" for role in rule.roles) or "any role"
+            through = " or ".join(f"`{SourceKind(source).name.lower()}`" for source in rule.sources) or "any source"
+            may.append(f"{roles} through {through}")
+    source = SourceKind(flat.source).name.lower()
+    ground.context.report.add(
+        codes.NOT_PERMITTED,
+        step.skill.span,
+        f"no rule permits `{step.skill.text}` to the role `{mission.role.text}` through `{source}`",
+        help="it is permitted to " + "; to ".join(dict.fromkeys(may)) if may else "it is permitted to nobody",
+        labels=[(ground.lowered.declaration.name.span, "the policy is declared here")],
+    )
+
+
+def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, case: Case) -> None:
+    """Explain by the permit that is nearest to permitting."""
+    permits = [_unmet(ground, permit, invocation, case.at) for permit in invocation.candidates.permits]
+    nearest = min(permits, key=len)
+    report, flat = ground.context.report, invocation.invocation
+    names = list(dict.fromkeys(name for unmet in nearest for name in unmet.parameters))
+    span = argument_span(ground.context, step, names[0]) if names else step.span
+    written = "" if span == step.span else f" = {report.text(span)}"
+    subject = f"`{names[0]}{written}`" if names else f"`{flat.contract.name}`"
+    accepted = {each.subject: _words(each) for unmet in nearest for each in unmet.accepted}
+    fix = None
+    if names and len(nearest) == 1 and names[0] in accepted and span != step.span:
+        first = nearest[0].accepted[0]
+        replacement = first.choices[0] if first.choices else display(first.value, Dimension(first.dimension))
+        fix = (span, replacement, f"write `{replacement}`")
+    report.add(
+        codes.OUT_OF_SCOPE,
+        span,
+        f"{subject} is outside of what `{ground.prepared.policy.name}` permits for `{flat.contract.name}`",
+        help="nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in accepted.items())
+        if accepted
+        else None,
+        labels=[(unmet.span, "this does not hold") for unmet in nearest],
+        fix=fix,
+    )
+
+
+def _words(nearest: Nearest) -> str:
+    if nearest.choices:
+        return "` or `".join(nearest.choices)
+    return display(nearest.value, Dimension(nearest.dimension))
+
+
+def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation, at: Environment) -> list[Unmet]:
+    """The clauses of a permit that cannot be true, in source order."""
+    rule = permit.rule
+    declared = _declaration(ground, rule)
+    node = ground.prepared.compiler.when(rule)
+    if declared is None or node is None:
+        return []
+    contract, policy = invocation.invocation.contract, ground.prepared.policy
+    changes = Changes(at, ground.prepared.tables)
+    parameters = {parameter.name for parameter in contract.parameters}
+    found: list[Unmet] = []
+    for clause, part in _pairs(declared, node):
+        if build(part, ground.prepared.tables)(at) & TRUE:
+            continue
+        wanted = changes.find(part, True) or ()
+        offers = [offer(change, contract, policy, at) for change in wanted if change.argument]
+        reads = dict.fromkeys(each.name for each in references(clause) if each.name in parameters)
+        found.append(Unmet(clause.span, tuple(reads), tuple(each for each in offers if each is not None)))
+    return found
+
+
+def _declaration(ground: Ground, rule: Rule) -> Condition | None:
+    """The condition of the rule that was lowered to this one."""
+    span = ground.span(rule)
+    return next((each.when for each in ground.lowered.declaration.rules if each.span == span), None)
+
+
+def _pairs(condition: Condition, node: tree.Node) -> Iterator[tuple[Condition, tree.Node]]:
+    """Each conjunct of a condition as it is written, with what it was lowered to."""
+    if not isinstance(condition, Junction) or condition.operator != "and":
+        yield condition, node
+        return
+    nodes: list[tree.Node] = []
+    for _ in condition.operands[1:]:
+        assert isinstance(node, tree.Both)
+        nodes.append(node.right)
+        node = node.left
+    for operand, part in zip(condition.operands, [node, *reversed(nodes)], strict=True):
+        yield from _pairs(operand, part)

@@ -1,0 +1,88 @@
+"""The rules of a policy to the flat form, one for each layout of the arguments that it reads."""
+
+from collections.abc import Iterable, Mapping
+
+from rtshcua.ground.checker.conditions import references
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.compiler.conditions import Conditions, Place
+from rtshcua.ground.compiler.contracts import Contracts, cells_of
+from rtshcua.ground.compiler.files import Files
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import Rule as RuleDecl
+from rtshcua.model.ir.skills import SkillDecl
+
+
+class Rules:
+    """Lowers the rules of one policy; `numbers` are the indexes of its skills, `roles` its roles in order."""
+
+    def __init__(
+        self,
+        context: Context,
+        numbers: Mapping[str, int],
+        roles: tuple[str, ...],
+        conditions: Conditions,
+        contracts: Contracts,
+        files: Files,
+    ) -> None:
+        self._context = context
+        self._numbers = numbers
+        self._roles = {role: number for number, role in enumerate(roles)}
+        self._conditions = conditions
+        self._contracts = contracts
+        self._files = files
+
+    def lowered(self, policy: PolicyDecl) -> tuple[Rule, ...]:
+        """All rules in source order; one whose skills keep its arguments in different cells becomes several."""
+        return tuple(flat for rule in policy.rules for flat in self._rule(rule))
+
+    def _rule(self, rule: RuleDecl) -> Iterable[Rule]:
+        if not rule.skills:
+            yield self._flat(rule, ())
+            return
+        groups: dict[tuple[tuple[str, int], ...], list[SkillDecl]] = {}
+        read = set() if rule.when is None else {reference.name for reference in references(rule.when)}
+        for name in rule.skills:
+            skill = self._context.symbols.skills[name.text]
+            layout = tuple(sorted((each, cell) for each, cell in cells_of(skill).items() if each in read))
+            groups.setdefault(layout, []).append(skill)
+        for skills in groups.values():
+            yield self._flat(rule, skills)
+
+    def _flat(self, rule: RuleDecl, skills: Iterable[SkillDecl]) -> Rule:
+        skills = tuple(skills)
+        kind = RuleKind[rule.kind.upper()]
+        arguments = self._context.arguments(skills[0]) if skills else {}
+        cells = cells_of(skills[0]) if skills else {}
+        place = Place(
+            Scope(self._context.symbols, self._context.report, arguments), cells, strict=kind is RuleKind.PERMIT
+        )
+        text, source, start, end = self._files.place(rule.span)
+        return Rule(
+            kind=int(kind),
+            skills=tuple(sorted({self._numbers[skill.name.text] for skill in skills})),
+            roles=tuple(sorted({self._roles[role.text] for role in rule.roles})),
+            sources=_sources(rule, kind),
+            when=None if rule.when is None else self._conditions.clause(rule.when, place),
+            approver=-1 if rule.approver is None else self._roles[rule.approver.text],
+            within_us=0 if rule.within is None else rule.within.value,
+            target=None if rule.target is None else self._contracts.link(rule.target),
+            text=text,
+            source=source,
+            start=start,
+            end=end,
+        )
+
+
+def _sources(rule: RuleDecl, kind: RuleKind) -> tuple[int, ...]:
+    """The sources that a rule is about: a permit to a role is to an operator, unless it says who may speak for them.
+
+    What stops a skill stops it whoever speaks, unless the rule names its sources.
+    """
+    if rule.through:
+        return tuple(sorted({int(SourceKind[name.text.upper()]) for name in rule.through}))
+    if kind is RuleKind.PERMIT and rule.roles:
+        return (int(SourceKind.OPERATOR),)
+    return ()

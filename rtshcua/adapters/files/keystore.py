@@ -1,0 +1,136 @@
+"""The user's signing keys and trust root: `<data folder>/keys/`, one file a duty and `root.trust`.
+
+A key file is readable by its owner alone and encrypted, unless its key is for development. The folder appears whole,
+with every key and the root that names them, or not at all.
+"""
+
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, sync_folder, write_new
+from rtshcua.wire import cose
+from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
+from rtshcua.wire.keys import ANY, Duty, SigningKey
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot
+from rtshcua.wire.untrusted import Untrusted
+
+ROOT = "root.trust"
+
+_SOURCES = ("agent", "operator")
+
+
+class KeyStoreError(Untrusted):
+    """A key store that does not serve: `no-keys`, `exists`, `exposed`, `too-large`."""
+
+
+class KeyStore:
+    """The keys in one folder."""
+
+    def __init__(self, data: Path) -> None:
+        self.folder = data / "keys"
+
+    def exists(self) -> bool:
+        """Whether keys were made here."""
+        return self.folder.is_dir()
+
+    def key_path(self, duty: Duty) -> Path:
+        """Where the key of a duty is."""
+        return self.folder / f"{duty}.key"
+
+    @property
+    def root_path(self) -> Path:
+        """Where the signed trust root is."""
+        return self.folder / ROOT
+
+    def create(
+        self,
+        seed: Callable[[], bytes],
+        *,
+        development: bool,
+        passphrase: bytes | None,
+        now_us: int,
+        expires_us: int,
+    ) -> TrustRoot:
+        """Makes a key for each duty, from 32 secret bytes of `seed` each, and the root that names them.
+
+        The root trusts the mission and approval keys for every role, through agent and operator, on every vehicle.
+        Raises `KeyStoreError` (`exists`), and `KeyFileError` for keys that are neither encrypted nor for development.
+        """
+        if self.exists():
+            raise KeyStoreError("exists", f"there are keys already in `{self.folder}`")
+        keys = {duty: SigningKey.from_seed(seed(), duty=duty, development=development) for duty in Duty}
+        root = TrustRoot(
+            version=1,
+            development=development,
+            issued_at_us=now_us,
+            expires_at_us=expires_us,
+            keys=tuple(
+                key.verification(
+                    roles=(ANY,) if duty in (Duty.MISSION, Duty.APPROVAL) else (),
+                    sources=_SOURCES if duty in (Duty.MISSION, Duty.APPROVAL) else (),
+                    vehicles=() if duty is Duty.ROOT else (ANY,),
+                )
+                for duty, key in keys.items()
+            ),
+        )
+        make_folder(self.folder.parent, mode=PRIVATE_FOLDER)
+        with self._appearing() as folder:
+            for duty, key in keys.items():
+                data = dump_signing_key(key, passphrase=passphrase)
+                write_new(folder / self.key_path(duty).name, data, mode=PRIVATE_FILE)
+            write_new(folder / ROOT, root.sign(keys[Duty.ROOT]), mode=PRIVATE_FILE)
+        return root
+
+    @contextmanager
+    def _appearing(self) -> Iterator[Path]:
+        """A folder that takes its place once it is filled, and is gone if that fails."""
+        folder = Path(tempfile.mkdtemp(prefix="keys.", dir=self.folder.parent))  # mode 0700
+        try:
+            yield folder
+            sync_folder(folder)
+            folder.rename(self.folder)
+            sync_folder(self.folder.parent)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def signing_key(self, duty: Duty, *, passphrase: bytes | None = None) -> SigningKey:
+        """The key of a duty. Raises `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`."""
+        self._expect()
+        return read_key(self.key_path(duty), duty, passphrase=passphrase)
+
+    def root(self) -> bytes:
+        """The signed trust root. Raises `KeyStoreError` (`no-keys`)."""
+        self._expect()
+        return read_root(self.root_path)
+
+    def pin(self) -> bytes:
+        """The `kid` of the root key that signed the root: what `open_root` pins. Raises `KeyStoreError` (`no-keys`)."""
+        return cose.unverified(self.root(), limit=MAX_ROOT).kid
+
+    def _expect(self) -> None:
+        if not self.exists():
+            raise KeyStoreError("no-keys", f"there are no keys in `{self.folder}`")
+
+
+def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:
+    """The signing key in a file. Raises `KeyStoreError` (`exposed`), `KeyFileError`, `WrongDuty` and OSError."""
+    with path.open("rb") as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if os.name == "posix" and stat.S_IMODE(mode) & 0o077:
+            raise KeyStoreError("exposed", f"others may read the key `{path}`: its mode is {stat.S_IMODE(mode):04o}")
+        data = file.read(MAX_KEY_FILE + 1)
+    return load_signing_key(data, duty=duty, passphrase=passphrase)
+
+
+def read_root(path: Path) -> bytes:
+    """The signed trust root in a file, not verified. Raises `KeyStoreError` (`too-large`) and OSError."""
+    with path.open("rb") as file:
+        data = file.read(MAX_ROOT + 1)
+    if len(data) > MAX_ROOT:
+        raise KeyStoreError("too-large", f"`{path}` is larger than a trust root may be")
+    return data

@@ -1,0 +1,81 @@
+"""Which bundles were opened on a vehicle: `ReplayStore` of `rtshcua.onboard.ports`, as files that survive a crash.
+
+    <state folder>/replay/vehicle-<identity>/<digest>   one marker a bundle: its expiry in us, UTC
+    <state folder>/replay/vehicle-<identity>/floor      the latest expiry among markers that were pruned
+
+One process at a time looks and writes. Markers of expired bundles are pruned; a bundle that expires no later than one
+that was pruned is refused, so setting the clock back opens nothing again.
+"""
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, sync_folder, write_new
+
+_FLOOR = "floor"
+
+
+class FileReplayStore:
+    """The bundles that were opened on the vehicle called `vehicle` (its identity)."""
+
+    def __init__(self, state: Path, vehicle: str) -> None:
+        self.folder = state / "replay" / f"vehicle-{quote(vehicle, safe='')}"
+        make_folder(self.folder, mode=PRIVATE_FOLDER)
+
+    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int) -> bool:
+        """True once for a bundle, after that is on the disk; False when it was opened before, or might have been.
+
+        `expires_us` is when nothing of the bundle is valid any more. Raises OSError when the disk cannot take it: the
+        bundle must not fly then.
+        """
+        marker = self.folder / digest.hex()
+        with _alone(self.folder):
+            if marker.exists() or expires_us <= self._floor():
+                return False
+            self._prune(now_utc_us)
+            write_new(marker, b"%d\n" % expires_us, mode=PRIVATE_FILE)
+        return True
+
+    def _floor(self) -> int:
+        try:
+            return int((self.folder / _FLOOR).read_bytes())
+        except FileNotFoundError:
+            return -1
+
+    def _prune(self, now_utc_us: int) -> None:
+        expired = {}
+        for marker in self.folder.iterdir():
+            expires_us = _expiry(marker)
+            if expires_us is not None and expires_us < now_utc_us:
+                expired[marker] = expires_us
+        if not expired:
+            return
+        replace(self.folder / _FLOOR, b"%d\n" % max(self._floor(), *expired.values()), mode=PRIVATE_FILE)
+        for marker in expired:
+            marker.unlink(missing_ok=True)
+        sync_folder(self.folder)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Holds the folder's lock, which the system drops when its holder dies."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _expiry(marker: Path) -> int | None:
+    """When a marker's bundle expires; None for one that a crash left without it: it is kept for ever."""
+    if marker.name.startswith(_FLOOR):
+        return None
+    try:
+        return int(marker.read_bytes())
+    except ValueError:
+        return None

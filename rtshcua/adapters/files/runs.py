@@ -1,0 +1,55 @@
+"""The folder of one run: `runs/<utc>-<bundle>/`."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+
+from rtshcua.adapters.files.durable import make_folder, replace, sync_folder, write_new
+from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.files.telemetry import TelemetryFile
+
+BUNDLE, LOG, TELEMETRY, SUMMARY = "mission.bundle", "log.jsonl", "telemetry.tlog", "summary.json"
+
+_PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-")
+
+
+class RunFolder:
+    """A new folder that holds the bundle, and makes room for its log, its telemetry and its summary."""
+
+    def __init__(self, runs: Path, *, name: str, bundle: bytes, utc_us: int) -> None:
+        self.path = _new_folder(runs, _folder_name(name, utc_us))
+        write_new(self.path / BUNDLE, bundle)
+
+    def log(self) -> EvidenceFile:
+        """The evidence log, opened for its first line; once."""
+        return EvidenceFile(self.path / LOG)
+
+    def telemetry(self) -> TelemetryFile:
+        """The telemetry log, opened for its first frame; once."""
+        return TelemetryFile(self.path / TELEMETRY)
+
+    def write_summary(self, summary: dict[str, object]) -> None:
+        """Writes the summary, for a person and for scripts; it proves nothing, the log does."""
+        replace(self.path / SUMMARY, msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
+
+
+def _folder_name(name: str, utc_us: int) -> str:
+    stamp = datetime.fromtimestamp(utc_us // 1_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
+    plain = "".join(letter if letter in _PLAIN else "_" for letter in name)
+    return f"{stamp}-{plain[:80] or 'run'}"
+
+
+def _new_folder(runs: Path, name: str) -> Path:
+    """A folder that was not there before: the second run within a second gets `-2`."""
+    make_folder(runs)
+    number = 1
+    while True:
+        path = runs / (name if number == 1 else f"{name}-{number}")
+        try:
+            path.mkdir()
+        except FileExistsError:
+            number += 1
+            continue
+        sync_folder(runs)
+        return path

@@ -1,0 +1,116 @@
+"""`rtshcua compile`: check a mission and sign it into a bundle."""
+
+import os
+import tempfile
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.faults import fail
+from rtshcua.cli.findings import Findings
+from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.unlock import unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.compiler.sign import sign
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.digest import BUNDLE, digest
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def compile(
+    source: Annotated[Path, typer.Argument(help="a source with a mission (.rts), or a mission specification (.json)")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="the bundle [default: SOURCE.bundle]")] = None,
+    mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
+    at: Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")] = None,
+    policy_key: Annotated[Path | None, typer.Option(help="the policy key [default: the key store's]")] = None,
+    mission_key: Annotated[Path | None, typer.Option(help="the mission key [default: the key store's]")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")] = None,
+    with_: Annotated[
+        list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
+    ] = None,
+    deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors."""
+    issued_at = _moment(at)
+    if issued_at is None:
+        return fail(ExitCode.USAGE, f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
+    findings = Findings(json=as_json, deny_warnings=deny_warnings)
+    compiled, sources = compile_sources([source, *(with_ or [])], mission=mission, issued_at_us=issued_at)
+    if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
+        return findings.finish(ExitCode.DIAGNOSTICS)
+    store = KeyStore(data_folder())
+    try:
+        signers = (
+            unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
+            unlock(store, Duty.MISSION, path=mission_key, passphrase_file=passphrase_file),
+        )
+        data = sign(compiled.policy, compiled.mission, policy_key=signers[0], mission_key=signers[1])
+    except Untrusted as error:
+        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
+        return findings.refuse(ExitCode.UNTRUSTED, error.slug, str(error), help)
+    target = output or source.with_suffix(".bundle")
+    _replace(target, data)
+    if not as_json:
+        print(_told(compiled.policy, compiled.mission, target))
+    return findings.finish(ExitCode.OK, bundle=_described(compiled.policy, compiled.mission, target, data, signers))
+
+
+def _moment(text: str | None) -> int | None:
+    """UTC in us; None for a text that is no time."""
+    if text is None:
+        return time.time_ns() // 1_000
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    if moment.tzinfo is None:
+        return None
+    since = moment.astimezone(UTC) - datetime(1970, 1, 1, tzinfo=UTC)
+    return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
+
+
+def _replace(target: Path, data: bytes) -> None:
+    """Write the whole bundle or nothing: a full disk leaves no half of one under its name."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(name).chmod(0o644)
+        Path(name).replace(target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _told(policy: Policy, mission: Mission, target: Path) -> str:
+    steps = len(mission.invocations)
+    head = f"{mission.name}: {steps} step{'s' * (steps > 1)} under {policy.name}@{policy.version}"
+    return f"{head} for {policy.vehicle.identity}, signed into {target}"
+
+
+def _described(
+    policy: Policy, mission: Mission, target: Path, data: bytes, signers: tuple[SigningKey, SigningKey]
+) -> dict[str, str | int]:
+    return {
+        "path": str(target),
+        "bytes": len(data),
+        "digest": digest(BUNDLE, data).hex(),
+        "mission": mission.name,
+        "policy": f"{policy.name}@{policy.version}",
+        "vehicle": policy.vehicle.identity,
+        "steps": len(mission.invocations),
+        "policy_key": signers[0].kid.hex(),
+        "mission_key": signers[1].kid.hex(),
+    }

@@ -1,0 +1,84 @@
+"""How commands that read sources report: findings for a person, or one JSON object for a machine."""
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from rtshcua.cli.faults import fail, say
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.render import render
+from rtshcua.diagnostics.serialise import as_json
+from rtshcua.diagnostics.span import Source
+
+_BOLD, _RED, _YELLOW, _BLUE, _CYAN, _END = "\033[1m", "\033[1;31m", "\033[1;33m", "\033[1;34m", "\033[36m", "\033[0m"
+
+
+class Findings:
+    """Collects what a command has to say. With `json` nothing else is on the standard output."""
+
+    def __init__(self, *, json: bool, deny_warnings: bool = False) -> None:
+        self._json = json
+        self._deny_warnings = deny_warnings
+        self._object: dict[str, Any] = as_json((), {})
+
+    def report(self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> bool:
+        """Report findings; true when they forbid going on."""
+        found = tuple(diagnostics)
+        if self._json:
+            self._object = as_json(found, sources)
+        elif found:
+            text = render(found, sources)
+            say((_coloured(text) if _wants_colour() else text).rstrip("\n"))
+            say(_count(found))
+        return (self._deny_warnings and bool(found)) or any(each.severity is Severity.ERROR for each in found)
+
+    def refuse(self, code: ExitCode, slug: str, message: str, help: str | None = None) -> ExitCode:
+        """End with a refusal that is about no source."""
+        if not self._json:
+            return fail(code, message, help)
+        return self.finish(code, error={"slug": slug, "message": message, "help": help})
+
+    def finish(self, code: ExitCode, **result: Any) -> ExitCode:
+        """End; with `json`, print everything."""
+        if self._json:
+            print(json.dumps(self._object | {"exit": code.slug} | result, indent=2, ensure_ascii=False))
+        return code
+
+
+def _count(found: tuple[Diagnostic, ...]) -> str:
+    errors = sum(each.severity is Severity.ERROR for each in found)
+    warnings = len(found) - errors
+    parts = [
+        f"{number} {word}{'s' * (number > 1)}" for number, word in ((errors, "error"), (warnings, "warning")) if number
+    ]
+    return f"\n{' and '.join(parts)}"
+
+
+def _wants_colour() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
+
+
+def _coloured(text: str) -> str:
+    return "\n".join(_line(line) for line in text.split("\n"))
+
+
+def _line(line: str) -> str:
+    """Colour one rendered line by how it begins; the text itself stays as it is."""
+    head, bar, rest = line.partition(" | ")
+    if line.startswith("error["):
+        kind, _, message = line.partition(": ")
+        return f"{_RED}{kind}{_END}{_BOLD}: {message}{_END}"
+    if line.startswith("warning["):
+        kind, _, message = line.partition(": ")
+        return f"{_YELLOW}{kind}{_END}{_BOLD}: {message}{_END}"
+    if bar and not head.strip() and set(rest.lstrip()[:1]) <= {"^", "-"}:
+        return f"{_BLUE}{head}{bar}{_END}{_RED if '^' in rest else _BLUE}{rest}{_END}"
+    if bar and (not head.strip() or head.strip().isdigit()):
+        return f"{_BLUE}{head}{bar}{_END}{rest}"
+    if line.lstrip().startswith(("= help:", "= at:")):
+        return f"{_CYAN}{line}{_END}"
+    return f"{_BLUE}{line}{_END}" if line.lstrip().startswith(("-->", ":::", "|", ":")) else line

@@ -1,0 +1,206 @@
+"""One flight of a verified bundle, put together: link, runtime, evidence, raw frames, view, and the summary."""
+
+import secrets
+import shlex
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.files.runs import LOG, RunFolder
+from rtshcua.adapters.loop import Loop
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.interrupts import Interrupts, Wish
+from rtshcua.cli.live.feed import Feed
+from rtshcua.cli.live.story import Happened, Note, Snapshot, Summary
+from rtshcua.cli.live.telling import Teller, plan_of
+from rtshcua.cli.tape import Tape
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Action, Append, Ending, Event, Interrupted
+from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.runtime.runtime import Runtime
+from rtshcua.wire.keys import Duty, SigningKey
+
+BOOT_BYTES = 16
+
+EXIT_CODES = {
+    Ending.COMPLETED: ExitCode.OK,
+    Ending.ABORTED: ExitCode.ABORTED,
+    Ending.REFUSED: ExitCode.REFUSED,
+    Ending.STOOD_DOWN: ExitCode.STOOD_DOWN,
+    Ending.LINK_LOST: ExitCode.LINK,
+    Ending.INTERRUPTED: ExitCode.INTERRUPTED,
+    Ending.EVIDENCE_LOST: ExitCode.FULL,
+}
+
+_SNAPSHOT_S = 0.1
+_WAITING_NOTE_S = 5.0
+_WAIT_US = 50_000
+_FASTEST_WAIT_S = 0.002
+
+_LANDING = "interrupted: it falls back and lands first, and the log is closed then"
+_KNOWING = "it is on its way down; Ctrl-C once more within 3 s stops watching, and closes the log at once"
+
+
+class Flight:
+    """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off."""
+
+    def __init__(
+        self, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts, tape: Tape,
+        *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
+        events: Sequence[Event],
+    ) -> None:  # fmt: skip
+        self._loaded = loaded
+        self._vehicle = vehicle
+        self._clock = clock
+        self._feed = feed
+        self._interrupts = interrupts
+        self._tape = tape
+        self._run = run
+        self._speed = speed
+        self._live = live
+        self._early = list(events)
+        self._recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
+        self._sink = run.log()
+        self._frames = run.telemetry()
+        tape.attach(self._frames)
+        now = clock.now()
+        self._start_us = now.monotonic_us
+        policy, mission = loaded.bundle.policy, loaded.bundle.mission
+        self._teller = Teller(policy, mission, self._start_us)
+        self._sink.append(
+            self._recorder.genesis(
+                now, bundle=bundle, root=root, boot=secrets.token_bytes(BOOT_BYTES), vehicle=loaded.vehicle,
+                mission=mission.name, mode=loaded.mode,
+            ),
+            True,
+        )  # fmt: skip
+        self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
+        self._feed.post(plan_of(policy, mission, mode=loaded.mode, speed=speed))
+        self._shown_s = self._waited_s = time.monotonic()
+
+    def fly(self) -> tuple[ExitCode, Summary]:
+        """Fly to the end, whatever it is, and close the log."""
+        try:
+            ending = self._follow()
+        except BaseException:
+            self._close(None)
+            raise
+        self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
+        whole = self._close(ending)
+        code = EXIT_CODES[ending]
+        if code is ExitCode.OK and not whole:
+            code = ExitCode.FULL
+        summary = self._summary(ending, code, whole)
+        with suppress(OSError):
+            self._run.write_summary(msgspec.structs.asdict(summary))
+        return code, summary
+
+    def _follow(self) -> Ending:
+        wait_us = max(_WAIT_US, int(_FASTEST_WAIT_S * 1_000_000 * self._speed))
+        loop = Loop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us)
+        also, self._early = self._early, []
+        while True:
+            match self._interrupts.wish():
+                case Wish.LAND:
+                    self._feed.post(Note(_LANDING))
+                    also.append(Interrupted(self._clock.now().monotonic_us))
+                case Wish.KNOW:
+                    self._feed.post(Note(_KNOWING))
+                case Wish.LEAVE:
+                    return self._leave()
+                case None:
+                    pass
+            ending = loop.turn(also)
+            if ending is not None:
+                return ending
+            also = []
+
+    def _leave(self) -> Ending:
+        """Stop watching: send nothing more, and say so in the log."""
+        now = self._clock.now()
+        self._vehicle.release()
+        line = self._recorder.effect(now, "left", detail="the operator stopped watching; nothing more is sent")
+        with suppress(OSError):
+            self._sink.append(line, True)
+        self._feed.post(Note("left: the vehicle lands by itself"))
+        return Ending.INTERRUPTED
+
+    def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Append):
+                what = self._teller.tell(action.line)
+                if what is not None:
+                    self._feed.post(Happened(what))
+        moment_s = time.monotonic()
+        if moment_s - self._shown_s >= _SNAPSHOT_S:
+            self._shown_s = moment_s
+            self._show(now, moment_s)
+
+    def _show(self, now: Now, moment_s: float) -> None:
+        self._feed.flush()
+        if not self._live and moment_s - self._waited_s < _WAITING_NOTE_S:
+            return
+        view = self._runtime.view(now)
+        if self._live:
+            self._feed.post(Snapshot(view), keep=False)
+        if moment_s - self._waited_s >= _WAITING_NOTE_S:
+            self._waited_s = moment_s
+            unready = self._vehicle.driver.unready
+            if view.stage is Stage.WAITING and unready is not None:
+                self._feed.post(Note(f"waiting for the vehicle: {unready}"))
+
+    def _close(self, ending: Ending | None) -> bool:
+        """Sign and close the log; whether all of it is on the disk. Without an ending (a fault) it stays unsigned."""
+        digest: bytes | None = None
+        with suppress(OSError):
+            digest = self._frames.finish()
+        whole = ending is not None
+        try:
+            if ending is not None:
+                line = self._recorder.close(self._clock.now(), ending=ending, tlog=digest)
+                self._sink.append(line, True)
+        except OSError:
+            whole = False
+        try:
+            self._sink.close()
+        except OSError:
+            whole = False
+        return whole and not self._sink.waiting
+
+    def _summary(self, ending: Ending, code: ExitCode, whole: bool) -> Summary:
+        loaded, policy, mission = self._loaded, self._loaded.bundle.policy, self._loaded.bundle.mission
+        flavour = self._vehicle.driver.flavour
+        log = _short(self._run.path / LOG)
+        return Summary(
+            mission=mission.name,
+            policy=f"{policy.name}@{policy.version}",
+            vehicle=loaded.vehicle,
+            flavour=flavour.name if flavour is not None else "",
+            mode=loaded.mode,
+            ending=ending,
+            exit_code=code,
+            steps=len(mission.invocations),
+            steps_done=len(self._teller.done),
+            outcomes=self._teller.outcomes,
+            flight_us=self._clock.now().monotonic_us - self._start_us,
+            records=self._recorder.count,
+            whole=whole,
+            folder=str(self._run.path),
+            log=log,
+            next=f"rtshcua verify-log {shlex.quote(log)}",
+        )
+
+
+def _short(path: Path) -> str:
+    """A path as seen from here, where that is shorter."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except (ValueError, OSError):
+        return str(path)

@@ -1,0 +1,167 @@
+"""`rtshcua keys`: make and list signing keys and the trust root."""
+
+import json
+import secrets
+import sys
+import time
+from getpass import getpass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.faults import fail
+from rtshcua.cli.shown import utc
+from rtshcua.cli.unlock import read_passphrase
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, VerificationKey
+from rtshcua.wire.trust import TrustRoot, open_root
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_DAY_US = 86_400_000_000
+_SHORTEST = 12  # characters of a passphrase
+
+
+@app.callback()
+def keys() -> None:
+    """Make and list signing keys and the trust root."""
+
+
+@app.command()
+def init(
+    if_missing: Annotated[bool, typer.Option("--if-missing", help="do nothing where there are keys already")] = False,
+    development: Annotated[
+        bool, typer.Option("--development/--encrypted", help="unencrypted keys for trying out, or encrypted ones")
+    ] = True,
+    days: Annotated[int, typer.Option(min=1, max=3660, help="how long the trust root is valid")] = 365,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase to encrypt with")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Make a key for each duty, and the trust root that names them.
+
+    A development root says so of itself: its keys lie unencrypted in your data folder, readable by you alone.
+    """
+    store = KeyStore(data_folder())
+    if store.exists():
+        if if_missing:
+            return _listed(store, as_json=as_json)
+        return fail(ExitCode.REFUSED, f"there are keys already in `{store.folder}`", "`rtshcua keys list` shows them")
+    passphrase = None
+    if not development:
+        passphrase = _new_passphrase(passphrase_file)
+        if passphrase is None:
+            return fail(
+                ExitCode.USAGE, f"encrypted keys need a passphrase of {_SHORTEST} characters or more, typed alike"
+            )
+    now_us = time.time_ns() // 1000
+    store.create(
+        lambda: secrets.token_bytes(SEED_BYTES),
+        development=development,
+        passphrase=passphrase,
+        now_us=now_us,
+        expires_us=now_us + days * _DAY_US,
+    )
+    return _listed(store, as_json=as_json)
+
+
+@app.command(name="list")
+def list_(
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """List the keys of the key store, and what the trust root trusts them for."""
+    return _listed(KeyStore(data_folder()), as_json=as_json)
+
+
+@app.command()
+def show(
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Print the pin of the trust root: what an auditor gives to `rtshcua verify-log --root`."""
+    store = KeyStore(data_folder())
+    try:
+        root = _root(store)
+        kid = store.pin()
+    except Untrusted as error:
+        return _refused(error)
+    public = next(key.public for key in root.keys if key.kid == kid)
+    if as_json:
+        print(json.dumps({"root_key": public.hex(), "kid": kid.hex(), "development": root.development}))
+    else:
+        print(public.hex())
+    return ExitCode.OK
+
+
+def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
+    try:
+        root = _root(store)
+    except Untrusted as error:
+        return _refused(error)
+    if as_json:
+        print(json.dumps(_as_object(store, root), indent=2, ensure_ascii=False))
+        return ExitCode.OK
+    kind = "development root: for trying out, its keys are not encrypted" if root.development else "trust root"
+    print(f"{kind}\n  folder   {store.folder}\n  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}\n")
+    print(f"  {'duty':<9} {'key':<33} may speak for")
+    for key in root.keys:
+        print(f"  {key.duty:<9} {key.kid.hex():<33} {_speaks(key)}")
+    return ExitCode.OK
+
+
+def _as_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
+    return {
+        "folder": str(store.folder),
+        "root": str(store.root_path),
+        "development": root.development,
+        "version": root.version,
+        "issued_at_us": root.issued_at_us,
+        "expires_at_us": root.expires_at_us,
+        "keys": [
+            {
+                "duty": key.duty,
+                "kid": key.kid.hex(),
+                "public": key.public.hex(),
+                "roles": key.roles,
+                "sources": key.sources,
+                "vehicles": key.vehicles,
+                "file": str(store.key_path(key.duty)),
+            }
+            for key in root.keys
+        ],
+    }
+
+
+def _speaks(key: VerificationKey) -> str:
+    if key.duty is Duty.ROOT:
+        return "names the other keys"
+    who = f"{_any(key.roles, 'role')} through {' or '.join(key.sources)}, " if key.roles else ""
+    return f"{who}on {_any(key.vehicles, 'vehicle')}"
+
+
+def _any(names: tuple[str, ...], what: str) -> str:
+    return f"any {what}" if ANY in names else f"{what} {', '.join(names)}"
+
+
+def _root(store: KeyStore) -> TrustRoot:
+    """The store's own root, also an expired one: it is here to be looked at."""
+    return open_root(store.root(), pinned=store.pin(), now_us=0)
+
+
+def _refused(error: Untrusted) -> ExitCode:
+    help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
+    return fail(ExitCode.INPUT if error.slug == "no-keys" else ExitCode.UNTRUSTED, str(error), help)
+
+
+def _new_passphrase(path: Path | None) -> bytes | None:
+    if path is not None:
+        given = read_passphrase(path)
+    elif sys.stdin is not None and sys.stdin.isatty():
+        given = getpass("new passphrase: ").encode()
+        if getpass("once more: ").encode() != given:
+            return None
+    else:
+        return None
+    return given if len(given.decode(errors="replace")) >= _SHORTEST else None

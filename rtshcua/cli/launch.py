@@ -1,0 +1,199 @@
+"""Everything before a flight: trust, the bundle, the link, the vehicle, and that the bundle has not flown before."""
+
+import gc
+import secrets
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
+from rtshcua.adapters.files.keystore import KeyStore, read_key, read_root
+from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.files.runs import RunFolder
+from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.adapters.vehicle.address import Address
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli import simulated
+from rtshcua.cli.flight import Flight
+from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.live.feed import Feed
+from rtshcua.cli.tape import Tape
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.ports import Event
+from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot, open_root
+from rtshcua.wire.untrusted import Untrusted
+
+#: How long a heartbeat is waited for, and then word of whether the vehicle is in the air, in seconds.
+HEARTBEAT_S = 10.0
+AIR_S = 5.0
+
+_LOOPBACK = "127.0.0.1"
+_POLL_S = 0.05
+_NOT_HERE = ("mode-refused", "wrong-vehicle")
+
+
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`."""
+
+    bundle: Path
+    link: Address | None
+    simulator: Sequence[str]
+    mode: Mode
+    speed: float
+    vehicle: str | None
+    root: Path | None
+    pin: str | None
+    log_key: Path | None
+    data: Path
+    state: Path
+    runs: Path
+    style: str
+
+
+class Refused(Exception):
+    """The flight does not begin: exit code, a stable slug, a text for a person, and perhaps help."""
+
+    def __init__(self, code: ExitCode, slug: str, text: str, help: str | None = None) -> None:
+        super().__init__(text)
+        self.code = code
+        self.slug = slug
+        self.help = help
+
+
+def launch(order: Launch) -> ExitCode:
+    """Fly, and show how it ended. Raises `Refused`, and OSError for files that cannot be read or written."""
+    bundle = _read(order.bundle)
+    clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
+    try:
+        root, signed_root, log_key = _trust(order, clock.now().utc_us)
+        loaded = _load(order, bundle, root, clock)
+    except Untrusted as error:
+        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
+        raise Refused(ExitCode.UNTRUSTED, error.slug, str(error), help) from None
+    with ExitStack() as view:  # it may still be shown when everything else is over
+        with ExitStack() as stack:
+            interrupts, tape = stack.enter_context(Interrupts()), Tape()
+            vehicle = _listen(order, Driver(loaded.bundle.policy), clock, tape)
+            stack.callback(vehicle.close)
+            if order.link is None:
+                stack.enter_context(_simulate(order, loaded, vehicle.port))
+            events = _meet(order, vehicle, clock, interrupts)
+            resumed = _opened_before(order, loaded, vehicle, clock, events)
+            run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
+            feed = view.enter_context(Feed(order.style))
+            flight = Flight(
+                loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
+                run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
+            )  # fmt: skip
+            gc.collect()
+            gc.freeze()  # what was loaded stays; the collector need not look at it while flying
+            code, summary = flight.fly()
+        feed.post(summary)
+    return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _read(path: Path) -> bytes:
+    with path.open("rb") as file:
+        data = file.read(MAX_BUNDLE + 1)
+    if len(data) > MAX_BUNDLE:
+        raise Refused(ExitCode.INPUT, "too-large", f"`{path}` is larger than a bundle may be")
+    return data
+
+
+def _trust(order: Launch, now_us: int) -> tuple[TrustRoot, bytes, SigningKey]:
+    """The trust root, its signed bytes, and the key that will sign the log. Raises `Untrusted` and `Refused`."""
+    store = KeyStore(order.data)
+    signed = store.root() if order.root is None else read_root(order.root)
+    pinned = store.pin() if order.root is None else _pinned(order.pin)
+    root = open_root(signed, pinned=pinned, now_us=now_us)
+    key = store.signing_key(Duty.LOG) if order.log_key is None else read_key(order.log_key, Duty.LOG, passphrase=None)
+    if key.kid not in root.keys_for(Duty.LOG):
+        text = f"the trust root names no log key {key.kid.hex()}: nobody could verify the log"
+        raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, "`--log-key` gives one that it names")
+    return root, signed, key
+
+
+def _pinned(text: str | None) -> bytes | None:
+    try:
+        pinned = None if text is None else bytes.fromhex(text)
+    except ValueError:
+        pinned = b""
+    if pinned is not None and len(pinned) not in (16, 32):
+        raise Refused(ExitCode.USAGE, "pin", f"`{text}` is no public key and no key id in hexadecimal")
+    return pinned
+
+
+def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Loaded:
+    now = clock.now()
+    identity = order.vehicle
+    if identity is None:
+        identity = open_bundle(bundle, root=root, vehicle=None, now_us=now.utc_us).policy.vehicle.identity
+    loaded = load(
+        bundle, root=root, vehicle=identity, now=now, mode=order.mode,
+        session_key=secrets.token_bytes(SESSION_KEY_BYTES), peer_is_own_simulator=order.link is None,
+    )  # fmt: skip
+    if isinstance(loaded, LoadRefusal):
+        raise Refused(ExitCode.REFUSED if loaded.slug in _NOT_HERE else ExitCode.UNTRUSTED, loaded.slug, loaded.text)
+    return loaded
+
+
+def _listen(order: Launch, driver: Driver, clock: LinkClock, tape: Tape) -> UdpVehicle:
+    host, port = (_LOOPBACK, 0) if order.link is None else (order.link.host, order.link.port)
+    try:
+        return UdpVehicle((host, port), driver, clock, tape.keep)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise Refused(
+            ExitCode.LINK, "port", f"cannot listen at udp {host}:{port}: {reason}",
+            "another program may listen there; a vehicle can be told to send to another port",
+        ) from None  # fmt: skip
+
+
+def _simulate(order: Launch, loaded: Loaded, port: int) -> Simulator:
+    words = [*simulated.fitting(loaded.bundle.policy), *order.simulator]
+    try:
+        return Simulator(["--port", str(port), "--speed", f"{order.speed:g}", *words])
+    except SimulatorError as error:
+        raise Refused(ExitCode.LINK, "simulator", str(error)) from None
+
+
+def _meet(order: Launch, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts) -> list[Event]:
+    """Wait for the first heartbeat of an autopilot; what happened meanwhile."""
+    events: list[Event] = []
+    until_s = time.monotonic() + HEARTBEAT_S
+    while vehicle.driver.flavour is None:
+        if interrupts.wish() is not None:
+            raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
+        if time.monotonic() > until_s:
+            where = "the simulated vehicle" if order.link is None else f"a vehicle at `{order.link}`"
+            raise Refused(
+                ExitCode.LINK, "no-vehicle", f"no heartbeat of {where} within {HEARTBEAT_S:.0f} s",
+                "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try",
+            )  # fmt: skip
+        events += vehicle.poll(clock.now().monotonic_us, int(_POLL_S * order.speed * 1_000_000))
+    return events
+
+
+def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
+    """Open the bundle, which works once. True for one that was opened before while the vehicle is in the air.
+
+    Then a run of it broke off up there: nothing of the mission is flown again, but the contingency brings it down.
+    """
+    store = FileReplayStore(order.state, loaded.vehicle)
+    if store.open_once(loaded.bundle.digest, loaded.expires_us, clock.now().utc_us):
+        return False
+    seen = vehicle.driver.seen
+    until_s = time.monotonic() + AIR_S
+    while not seen.landed_state and time.monotonic() < until_s:
+        events += vehicle.poll(clock.now().monotonic_us, int(_POLL_S * order.speed * 1_000_000))
+    if seen.airborne:
+        return True
+    text = f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
+    raise Refused(ExitCode.REFUSED, "replayed", text, "compile the mission again, which issues it anew")

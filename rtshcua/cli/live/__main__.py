@@ -1,0 +1,47 @@
+"""`python -m rtshcua.cli.live STYLE`: draws what it is told on its standard input, until that ends."""
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator
+
+import msgspec
+
+from rtshcua.cli.live.lines import as_json, plain
+from rtshcua.cli.live.story import Message
+
+EXIT_OK, EXIT_GONE = 0, 1
+
+
+def messages() -> Iterator[Message]:
+    """What the flying process tells, one by one."""
+    decode = msgspec.json.Decoder(Message).decode
+    for line in sys.stdin.buffer:
+        yield decode(line)
+
+
+def main() -> int:
+    """Draw until the input ends; 1 when nobody reads any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with the flight, not before
+    try:
+        if sys.argv[1] == "screen":
+            from rtshcua.cli.live.screen import draw
+
+            draw(messages())
+        else:
+            _print(as_json if sys.argv[1] == "json" else plain)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or exiting would fail on it again
+        return EXIT_GONE
+    return EXIT_OK
+
+
+def _print(style: Callable[[Message], Iterable[str]]) -> None:
+    for message in messages():
+        for line in style(message):
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

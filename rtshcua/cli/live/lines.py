@@ -1,0 +1,53 @@
+"""The view in a pipe: one plain line an event, or one JSON object."""
+
+from collections.abc import Iterable
+
+import msgspec
+
+from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration, printable
+
+
+def plain(message: Message) -> Iterable[str]:
+    """The lines for a person."""
+    match message:
+        case Plan():
+            yield f"mission {message.mission} under {message.policy} on {message.vehicle}, mode {message.mode}"
+        case Happened(what):
+            yield f"{what.t_us / 1_000_000:9.2f} s  {sentence(what)}"
+        case Note(text):
+            yield f"{'':11}  {printable(text)}"
+        case Summary():
+            yield from ending(message)
+
+
+def sentence(what: Happening) -> str:
+    """A happening as one line: the outcome or event, what it is about, and why."""
+    subject = printable(what.subject)
+    if what.event != "decision":
+        return f"{what.event:<11}  {subject}{'  ' if subject and what.detail else ''}{printable(what.detail)}".rstrip()
+    why = ""
+    if what.outcome != "allow":
+        why = f"  because {what.reason}{f': `{printable(what.clause)}`' if what.clause else ''}"
+        why += f"; instead {printable(what.target)}" if what.target else ""
+    return f"{what.outcome:<11}  {subject}{why}"
+
+
+def ending(summary: Summary) -> Iterable[str]:
+    """The last lines: what flew, what was decided, where the log is, what to do next."""
+    counts = ", ".join(f"{count} {name}" for name, count in summary.outcomes.items() if count) or "nothing decided"
+    whole = "whole" if summary.whole else "NOT whole: the disk refused some"
+    yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
+    yield f"  decided  {counts}"
+    yield f"  log      {summary.log} ({summary.records} records, {whole})"
+    yield f"  next     {summary.next}"
+
+
+def as_json(message: Message) -> Iterable[str]:
+    """One object a line; snapshots are for screens."""
+    match message:
+        case Snapshot():
+            return
+        case Happened(what):
+            yield msgspec.json.encode(what).decode()
+        case _:
+            yield msgspec.json.encode(message).decode()

@@ -1,0 +1,103 @@
+"""What the flying process tells the drawing one: JSON lines, each one of these."""
+
+import msgspec
+
+from rtshcua.onboard.runtime.view import View
+
+
+class Step(msgspec.Struct, frozen=True):
+    """A mission step as it was written, and the index of its phase."""
+
+    text: str
+    phase: int
+
+
+class Signal(msgspec.Struct, frozen=True):
+    """How to write a signal's value: its dimension, and the labels of an enumeration."""
+
+    name: str
+    dimension: str
+    labels: dict[int, str]
+
+
+class Plan(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
+    """What is going to fly. `position` names the signal that is one, `path` holds x, y in mm of every place gone to."""
+
+    mission: str
+    intent: str
+    policy: str
+    vehicle: str
+    mode: str
+    speed: float
+    phases: tuple[str, ...]
+    steps: tuple[Step, ...]
+    signals: tuple[Signal, ...]
+    position: str
+    path: tuple[tuple[int, int], ...]
+
+
+class Snapshot(msgspec.Struct, frozen=True, tag="view", tag_field="event"):
+    """How things stand now; one that cannot be sent at once is not sent."""
+
+    view: View
+
+
+class Happening(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One record of the log, in brief: a decision (`event` is `decision`) or an effect. `t_us` is since the start."""
+
+    event: str
+    t_us: int
+    step: int = -1
+    subject: str = ""
+    outcome: str = ""
+    reason: str = ""
+    clause: str = ""
+    target: str = ""
+    detail: str = ""
+
+
+class Happened(msgspec.Struct, frozen=True, tag="happened", tag_field="event"):
+    """A happening on its way to the view."""
+
+    what: Happening
+
+
+class Note(msgspec.Struct, frozen=True, tag="note", tag_field="event"):
+    """A word about the run itself, not about the flight."""
+
+    text: str
+
+
+class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
+    """How the run ended; also `summary.json` of the run folder. The log proves it, this only says it."""
+
+    mission: str
+    policy: str
+    vehicle: str
+    flavour: str
+    mode: str
+    ending: str
+    exit_code: int
+    steps: int
+    steps_done: int
+    outcomes: dict[str, int]
+    flight_us: int
+    records: int
+    whole: bool
+    folder: str
+    log: str
+    next: str
+
+
+Message = Plan | Snapshot | Happened | Note | Summary
+
+
+def printable(text: str) -> str:
+    """Text of the world's own making, without what a terminal would obey."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def duration(us: int) -> str:
+    """A time as a person reads it: `4 min 12 s`."""
+    minutes, seconds = divmod(us // 1_000_000, 60)
+    return f"{minutes} min {seconds} s" if minutes else f"{seconds} s"

@@ -1,0 +1,91 @@
+"""From evidence lines and the loaded bundle to what the view is told, and to the counts of the summary."""
+
+import msgspec
+
+from rtshcua.cli.live.story import Happening, Plan, Signal, Step
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import POSITION
+from rtshcua.wire.request import CONTINGENCY_LINK, STEP
+
+_OUTCOMES = ("allow", "deny", "defer", "fallback")
+
+
+class _Line(msgspec.Struct):
+    """What is read of an evidence line; the rest of it is not looked at."""
+
+    type: str
+    at_us: int
+    kind: int = -1
+    step: int = -1
+    link: int = -1
+    event: str = ""
+    outcome: str = ""
+    reason: str = ""
+    clause: str | None = None
+    target: str | None = None
+    detail: str = ""
+
+
+_read = msgspec.json.Decoder(_Line).decode
+
+
+def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Plan:
+    """The plan of a loaded bundle."""
+    paths = [invocation.plan.path for invocation in mission.invocations if invocation.plan.kind != MotionKind.HOME]
+    return Plan(
+        mission=mission.name,
+        intent=mission.intent,
+        policy=f"{policy.name}@{policy.version}",
+        vehicle=policy.vehicle.identity,
+        mode=mode,
+        speed=speed,
+        phases=mission.phases,
+        steps=tuple(Step(invocation.text, invocation.phase) for invocation in mission.invocations),
+        signals=tuple(Signal(signal.name, signal.dimension, dict(signal.labels)) for signal in policy.signals),
+        position=next((signal.name for signal in policy.signals if signal.kind == POSITION), ""),
+        path=tuple(point for path in paths for point in zip(path[::2], path[1::2], strict=True)),
+    )
+
+
+class Teller:
+    """Reads each evidence line once, counts, and says what happened."""
+
+    def __init__(self, policy: Policy, mission: Mission, start_us: int) -> None:
+        self._policy = policy
+        self._mission = mission
+        self._start_us = start_us
+        self.outcomes = dict.fromkeys(_OUTCOMES, 0)
+        self.done: set[int] = set()
+
+    def tell(self, line: bytes) -> Happening | None:
+        """What a line says, if it is a decision or an effect."""
+        record = _read(line)
+        t_us = record.at_us - self._start_us
+        subject = self._subject(record)
+        if record.type == "decision":
+            if record.kind == STEP and record.outcome in self.outcomes:
+                self.outcomes[record.outcome] += 1
+            clause, target = record.clause or "", record.target or ""
+            return Happening(
+                "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail
+            )
+        if record.type != "effect":
+            return None
+        if record.event == "succeeded" and record.kind == STEP:
+            self.done.add(record.step)
+        return Happening(record.event, t_us, record.step, subject, detail=record.detail)
+
+    def _subject(self, record: _Line) -> str:
+        """The step or link that a record is about, as it was written."""
+        if record.kind == CONTINGENCY_LINK:
+            return f"contingency: {self._policy.contingency[record.link].text}"
+        if record.kind < 0 or record.step < 0:
+            return ""
+        invocation = self._mission.invocations[record.step]
+        if record.kind == STEP:
+            return invocation.text
+        if record.link >= 0:
+            return f"fallback: {invocation.contract.fallback[record.link].text}"
+        return "fallback: what the policy degrades to"

@@ -1,0 +1,99 @@
+"""`rtshcua run`: fly a bundle, on the simulated vehicle or on another one."""
+
+import os
+import sys
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from rtshcua.adapters.files.folders import data_folder, state_folder
+from rtshcua.adapters.vehicle import address
+from rtshcua.cli import simulated
+from rtshcua.cli.faults import fail
+from rtshcua.cli.launch import Launch, Refused, launch
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.onboard.enforcement.load import Mode
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def run(
+    bundle: Annotated[Path, typer.Argument(help="what `rtshcua compile` made")],
+    connect: Annotated[
+        str | None, typer.Option(metavar="udpin:HOST:PORT", help="another vehicle: the address that it sends to")
+    ] = None,
+    mode: Annotated[Mode, typer.Option(help="how decisions are enforced; `none` flies the simulated vehicle only")]
+    = Mode.SOFTWARE,
+    speed: Annotated[float, typer.Option(min=0.1, max=200, help="seconds of flight in a second; in simulation")] = 1.0,
+    flavour: simulated.Flavour = None,
+    battery: simulated.Battery = None,
+    wind: simulated.Wind = None,
+    fault: simulated.Faults = None,
+    seed: simulated.Seed = None,
+    vehicle: Annotated[str | None, typer.Option(metavar="IDENTITY", help="who this vehicle is (as the bundle says)")]
+    = None,
+    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    pin: Annotated[str | None, typer.Option(metavar="HEX", help="the root's public key, where `--root` is given")]
+    = None,
+    log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
+    runs: Annotated[Path, typer.Option(help="where the run's folder is made")] = Path("runs"),
+    state_dir: Annotated[Path | None, typer.Option(help="where it is kept which bundles flew (the data folder)")]
+    = None,
+    fresh_state: Annotated[bool, typer.Option("--fresh-state", help="forget which bundles flew; simulation only")]
+    = False,
+    plain: Annotated[bool, typer.Option("--plain", help="one line an event, in a terminal too")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the summary last")] = False,
+) -> ExitCode:  # fmt: skip
+    """Fly a bundle, once. Every step is decided before it is sent, watched while it flies, and recorded.
+
+    Without `--connect` a simulated vehicle is started for it. Ctrl-C falls back and lands first.
+    """
+    words = simulated.arguments(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
+    own = connect is None
+    if not own and words:
+        return fail(ExitCode.USAGE, "options of the simulated vehicle do not go with `--connect`", _SIM_HELP)
+    if fresh_state and (state_dir is not None or not own):
+        return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
+    try:
+        link = None if connect is None else address.parse(connect)
+    except ValueError as error:
+        return fail(ExitCode.USAGE, str(error))
+    if link is not None and link.way != "udpin":
+        return fail(ExitCode.USAGE, f"`{link}`: a flight listens to its vehicle", "`udpin:HOST:PORT`")
+    if link is not None and speed != 1 and not link.is_loopback:
+        return fail(ExitCode.USAGE, "`--speed` is for a simulated vehicle; a real one lives as fast as we do")
+    with ExitStack() as stack:
+        state = state_dir or state_folder()
+        if fresh_state:
+            state = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rtshcua-")))
+        order = Launch(
+            bundle=bundle, link=link, simulator=words, mode=mode, speed=speed, vehicle=vehicle, root=root, pin=pin,
+            log_key=log_key, data=data_folder(), state=state, runs=runs, style=_style(plain=plain, as_json=as_json),
+        )  # fmt: skip
+        try:
+            return launch(order)
+        except Refused as refused:
+            return _say(refused, as_json=as_json)
+
+
+_SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
+
+
+def _style(*, plain: bool, as_json: bool) -> str:
+    if as_json:
+        return "json"
+    terminal = sys.stdout is not None and sys.stdout.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+    return "screen" if terminal and not plain else "lines"
+
+
+def _say(refused: Refused, *, as_json: bool) -> ExitCode:
+    """A flight that never began: for a person, and with `--json` for a program too."""
+    if as_json:
+        said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
+        print(msgspec.json.encode(said).decode())
+    return fail(refused.code, str(refused), refused.help)

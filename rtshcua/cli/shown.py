@@ -1,0 +1,22 @@
+"""How commands show times, and text that came from elsewhere, to a person."""
+
+from datetime import UTC, datetime
+
+_LAST_US = 253_402_300_799_999_999  # the end of the year 9999
+
+
+def utc(us: int) -> str:
+    """A UTC time in us since the Unix epoch, to the second."""
+    if not 0 <= us <= _LAST_US:
+        return f"{us} us"
+    return datetime.fromtimestamp(us // 1_000_000, UTC).strftime("%Y-%m-%d %H:%M:%SZ")
+
+
+def plain(text: str) -> str:
+    """Text from elsewhere without what could move a terminal's cursor, colour it, or pretend to be another line."""
+    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
+
+
+def shorten(text: str, width: int) -> str:
+    """At most `width` characters of a text, with an ellipsis where it was longer."""
+    return text if len(text) <= width else text[: width - 1] + "…"

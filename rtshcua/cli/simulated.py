@@ -1,0 +1,85 @@
+"""The options of the simulated vehicle, as `run` and `sim` share them."""
+
+import re
+from typing import Annotated
+
+import typer
+
+from rtshcua.model.flat.policy import Policy
+from rtshcua.simulation.config import HOME, Kind
+from rtshcua.simulation.fault_text import KINDS, parse_fault
+
+_WIND = re.compile(r"\d+(\.\d+)?,\d+(\.\d+)?(,\d+(\.\d+)?)?", re.ASCII)
+_HOME = re.compile(r"-?\d+(\.\d+)?,-?\d+(\.\d+)?,-?\d+(\.\d+)?", re.ASCII)
+_AMSL_M = HOME.amsl_mm // 1_000
+_CRUISE_MM_S = 5_000
+_FASTEST_MM_S = 12_000
+
+
+def _wind(text: str | None) -> str | None:
+    if text is not None and not _WIND.fullmatch(text):
+        raise typer.BadParameter(f"`{text}` is not SPEED,FROM[,GUST] in m/s and degrees")
+    return text
+
+
+def _home(text: str | None) -> str | None:
+    if text is not None and not _HOME.fullmatch(text):
+        raise typer.BadParameter(f"`{text}` is not LAT,LON,AMSL in degrees, degrees and metres")
+    return text
+
+
+def _faults(texts: list[str] | None) -> list[str] | None:
+    for text in texts or []:
+        try:
+            parse_fault(text)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+    return texts
+
+
+Flavour = Annotated[Kind | None, typer.Option(help="which autopilot the simulated vehicle is (px4)")]
+Battery = Annotated[float | None, typer.Option(min=0, max=100, metavar="PERCENT", help="its charge at the start (100)")]
+Wind = Annotated[
+    str | None,
+    typer.Option(metavar="SPEED,FROM[,GUST]", callback=_wind, help="m/s, degrees it blows from, m/s of gusts"),
+]
+Faults = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault", metavar="KIND,at=TIME,...", callback=_faults,
+        help=f"what goes wrong (repeatable): {', '.join(KINDS)}; such as battery,at=30s,level=20%",
+    ),
+]  # fmt: skip
+Home = Annotated[
+    str | None, typer.Option(metavar="LAT,LON,AMSL", callback=_home, help="where it stands: degrees, degrees, metres")
+]
+Seed = Annotated[int | None, typer.Option(help="of its noise and gusts: the same seed, the same vehicle (1)")]
+
+
+def arguments(
+    *,
+    flavour: Kind | None,
+    battery: float | None,
+    wind: str | None,
+    faults: list[str] | None,
+    seed: int | None,
+) -> list[str]:
+    """The command line of the simulation's process; options left out keep its own defaults."""
+    words: list[str] = []
+    for name, value in (("flavour", flavour), ("battery", battery), ("wind", wind), ("seed", seed)):
+        if value is not None:
+            words += [f"--{name}", str(value)]
+    for fault in faults or []:
+        words += ["--fault", fault]
+    return words
+
+
+def fitting(policy: Policy) -> list[str]:
+    """Options that make it the vehicle of a policy: its home, its endurance, and no faster than it."""
+    latitude, longitude = policy.projection.latitude / 10_000_000, policy.projection.longitude / 10_000_000
+    cruise = min(_CRUISE_MM_S, policy.vehicle.speed or _FASTEST_MM_S) / 1_000
+    return [
+        f"--home={latitude:.7f},{longitude:.7f},{_AMSL_M}",
+        f"--hover={policy.vehicle.endurance_us / 60_000_000:.3f}",
+        f"--cruise={cruise:.3f}",
+    ]

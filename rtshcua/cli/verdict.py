@@ -1,0 +1,144 @@
+"""How the audit of a log is told: to a person, and as JSON."""
+
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from textwrap import wrap
+
+from rtshcua.cli.pin import Pin
+from rtshcua.cli.shown import plain, shorten, utc
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.finding import Claim, Finding
+from rtshcua.evidence.report import Report, Verdict
+from rtshcua.ground.auditor.audit import Audit
+
+#: what a kind of failure means to whoever must act on it, by the first part of its slug
+MEANINGS = {
+    "log": "There is nothing to verify.",
+    "genesis": "The beginning of the log is not what this program writes, or belongs to another flight.",
+    "record": "A line was damaged or written by something else: it is not what this program writes.",
+    "chain": "The log was changed after it was written, or records were taken out, added or moved.",
+    "clock": "The recorded times contradict each other: records were put together from elsewhere, or the clock failed.",
+    "close": "The end of the log was forged or damaged: its signature does not cover these records.",
+    "trust": "The log may be sound in itself, but it does not rest on the root that you trust.",
+    "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
+    "dispatch": "The vehicle was commanded without the permission that the log should show first.",
+    "telemetry": "The raw frames beside the log are not those of this flight.",
+    "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",
+}
+_INCOMPLETE = "The program stopped before it closed the log, or its end was cut off. What came after is not known."
+
+_WIDTH = 100
+_SHOWN = 160
+_TITLES = {
+    Verdict.VERIFIED: ("VERIFIED", "bold green"),
+    Verdict.INCOMPLETE: ("INCOMPLETE", "bold yellow"),
+    Verdict.FAILED: ("FAILED", "bold red"),
+}
+_OUTCOMES = ("allow", "deny", "defer", "fallback")
+
+
+def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str, object]:
+    """The whole, for a program. Keys are only ever added."""
+    report = audit.report
+    genesis, close = report.genesis, report.close
+    return {
+        "log": str(path),
+        "verdict": report.verdict.value,
+        "exit_code": int(code),
+        "pinned": {"key": pinned.key.hex(), "source": pinned.source},
+        "records": report.records,
+        "counts": dict(report.counts),
+        "failure": _finding(report.failure),
+        "shortfall": _finding(report.shortfall),
+        "flight": None
+        if genesis is None
+        else {
+            "vehicle": genesis.vehicle,
+            "mission": genesis.mission,
+            "mode": genesis.mode,
+            "boot": genesis.boot,
+            "log_key": genesis.log_kid,
+            "begun_utc_us": genesis.utc_us,
+            "lasted_us": report.last_us - genesis.at_us,
+            "ending": None if close is None else close.ending,
+        },
+        "root": report.root.hex(),
+        "proven": [claim._asdict() for claim in report.proven],
+        "unproven": [claim._asdict() for claim in report.unproven],
+    }
+
+
+def _finding(finding: Finding | None) -> dict[str, object] | None:
+    return None if finding is None else {**finding._asdict(), "line": finding.record + 1}
+
+
+def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
+    """Prints the whole for a person."""
+    report = audit.report
+    lines: list[tuple[str, str]] = [] if first else [("", "")]
+    lines += [("", f"log     {plain(str(path))}"), *_flight(report), ("", f"pinned  {plain(pinned.source)}"), ("", "")]
+    title, style = _TITLES[report.verdict]
+    finding = report.failure or report.shortfall
+    if finding is None:
+        lines.append((style, f"{title}  {report.records} records, closed and signed; unanchored"))
+    else:
+        lines.append((style, f"{title}  at record {finding.record}, line {finding.record + 1}: {finding.slug}"))
+        lines += _why(finding, failed=report.failure is not None)
+    lines += _counts(report)
+    lines += _claims("shown", "green", "+", report.proven) + _claims("not shown", "yellow", "-", report.unproven)
+    _print(lines)
+
+
+def _flight(report: Report) -> list[tuple[str, str]]:
+    genesis, close = report.genesis, report.close
+    if genesis is None:
+        return []
+    seconds = (report.last_us - genesis.at_us) / 1_000_000
+    ending = f", {plain(close.ending)}" if close is not None else ""
+    what = f"`{plain(genesis.mission)}` on `{plain(genesis.vehicle)}`, {utc(genesis.utc_us)}, {seconds:.1f} s"
+    return [("", f"flight  {what}, mode {plain(genesis.mode)}{ending}")]
+
+
+def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
+    kind = finding.slug.partition("/")[0]
+    yield from (("", f"  {line}") for line in wrap(plain(finding.text), _WIDTH))
+    if finding.expected:
+        yield "", f"  expected  {shorten(plain(finding.expected), _SHOWN)}"
+    if finding.found:
+        yield "", f"  found     {shorten(plain(finding.found), _SHOWN)}"
+    meaning = MEANINGS[kind] if failed or kind == "tail" else _INCOMPLETE
+    yield from (("", f"  {line}") for line in wrap(meaning, _WIDTH))
+
+
+def _counts(report: Report) -> Iterable[tuple[str, str]]:
+    counts = report.counts
+    if not counts:
+        return
+    outcomes = ", ".join(f"{counts[name]} {name}" for name in _OUTCOMES if counts.get(name))
+    decisions = f"{counts.get('decision', 0)} decisions{f' ({outcomes})' if outcomes else ''}"
+    yield "", f"  {report.records} records read: {decisions}, {counts.get('effect', 0)} effects"
+
+
+def _claims(title: str, style: str, mark: str, claims: tuple[Claim, ...]) -> list[tuple[str, str]]:
+    if not claims:
+        return []
+    lines = [("", ""), ("bold", title)]
+    for claim in claims:
+        head, *more = wrap(plain(claim.text), _WIDTH)
+        lines += [(style, f"  {mark} {head}"), *((style, f"    {line}") for line in more)]
+    return lines
+
+
+def _print(lines: Iterable[tuple[str, str]]) -> None:
+    if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
+        for _, text in lines:
+            print(text)
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    for style, text in lines:
+        console.print(Text(text, style))

@@ -1,0 +1,59 @@
+"""From a line back to its record: only the one line that our encoder would have written for it is accepted."""
+
+import re
+
+import msgspec
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.records import FORMAT, VERSION, AnyRecord, Close, Decision, Effect, Genesis, encode
+
+#: the longest line in bytes; a genesis carries a whole bundle
+LONGEST = 1 << 26
+
+_TYPE = b',"type":"'  # no text can hold it, for a quote inside a text stands behind a backslash
+_VERSION = re.compile(rb',"version":(\d{1,15})[,}]')
+_DECODERS: dict[bytes, msgspec.json.Decoder[AnyRecord]] = {
+    b"genesis": msgspec.json.Decoder(Genesis),
+    b"decision": msgspec.json.Decoder(Decision),
+    b"effect": msgspec.json.Decoder(Effect),
+    b"close": msgspec.json.Decoder(Close),
+}
+_WORDS = {
+    "`int`": "an integer", "`float`": "a fraction", "`str`": "a text", "`bool`": "a truth value", "`null`": "null",
+    "`array`": "a list", "`object`": "an object", "JSON is malformed": "it is not JSON",
+}  # fmt: skip
+
+
+def read(line: bytes) -> AnyRecord | Flaw:
+    """The record of a line (newline included), or what is wrong with the line."""
+    start = line.rfind(_TYPE) + len(_TYPE)
+    name = line[start : line.find(b'"', start)] if start >= len(_TYPE) else b""
+    decoder = _DECODERS.get(name)
+    if decoder is None:
+        return Flaw("record/malformed", "it is not a record: genesis, decision, effect or close")
+    try:
+        record = decoder.decode(line)
+    except UnicodeDecodeError:
+        return Flaw("record/malformed", "it is not UTF-8")
+    except msgspec.DecodeError as error:
+        version = _VERSION.search(line) if name == b"genesis" else None
+        if version is not None and int(version[1]) != VERSION:
+            return _unknown_format(FORMAT, int(version[1]))
+        return Flaw("record/malformed", f"it has not the form of a record of type {name.decode()}: {_words(error)}")
+    if encode(record) != line:
+        return Flaw("record/not-canonical", "it is not written in the one form that this record has (RFC 8785)")
+    if isinstance(record, Genesis) and (record.format != FORMAT or record.version != VERSION):
+        return _unknown_format(record.format, record.version)
+    return record
+
+
+def _words(error: msgspec.DecodeError) -> str:
+    text = str(error)
+    for theirs, ours in _WORDS.items():
+        text = text.replace(theirs, ours)
+    return text[:1].lower() + text[1:]
+
+
+def _unknown_format(name: str, version: int) -> Flaw:
+    text = "its format is not one that this program reads"
+    return Flaw("genesis/format", text, f"{name} version {version}", f"{FORMAT} version {VERSION}")

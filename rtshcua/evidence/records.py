@@ -1,0 +1,165 @@
+"""The records of a log: what each line holds, byte for byte.
+
+A line is RFC 8785 (JCS) JSON and a newline: keys sorted, integers, texts, null, arrays and objects only. msgspec writes
+the fields of a struct in the order of their definition, so every struct here defines them sorted; the bytes are then
+those of RFC 8785. `_prev` sorts first, for every other key begins with a lower-case letter: its value stands at
+bytes 10 to 73 of each line.
+
+Every record has `_prev` (SHA-256 of 0x00 and the line before, newline included: chain link and RFC 9162 leaf at once),
+`seq` (counts from 0), `type`, and the moment it was written: `at_us` (monotonic), `utc_us` (since the Unix epoch) and
+`utc_error_us` (bound on the error of `utc_us`). Digests, keys and ids are lower-case hexadecimal.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from rtshcua.wire import names
+
+FORMAT, VERSION = names.LOG.name, names.LOG.version
+
+#: the largest integer that every JSON reader holds exactly (RFC 8785 section 3.2.2.3, RFC 7493 section 2.2)
+LARGEST = (1 << 53) - 1
+
+Integer = Annotated[int, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
+Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
+Hex = Annotated[str, msgspec.Meta(pattern="^([0-9a-f]{2})*$")]
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"prev": "_prev"}, gc=False):
+    """The base of what a log holds; without fields, for those of a subclass would come after them, unsorted."""
+
+
+class Genesis(Record, frozen=True):
+    """The first record: who flies what, under which trust, and what the log is checked with.
+
+    `bundle` and `root` are base64 of the bundle and of the trust root; `log_key` is the Ed25519 public key, called
+    `log_kid` in the root, that signs the close. `boot` is 16 random bytes; `before` the last line's hash of the log
+    that this device wrote before, or null. `mode` is the enforcement mode.
+    """
+
+    prev: Hash
+    at_us: Count
+    before: Hash | None
+    boot: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{32}$")]
+    bundle: str
+    format: str
+    log_key: Hash
+    log_kid: Hex
+    mission: str
+    mode: str
+    root: str
+    seq: Count
+    type: Literal["genesis"]
+    utc_error_us: Count
+    utc_us: Count
+    vehicle: str
+    version: Count
+
+
+class RecordedState(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
+    """Paper symbol `S_t` as it was read: one value and one age (us) a slot, null where nothing valid was received."""
+
+    ages: tuple[Integer, ...]
+    values: tuple[Integer | None, ...]
+
+
+class RecordedContext(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
+    """`decide`'s context but for the binding; an approval is [rule, role, granted, monotonic us]."""
+
+    approvals: tuple[tuple[Integer, Integer, Integer, Integer], ...]
+    consumed: Integer
+    phase: Integer
+    policy_version: Integer
+    released_us: Integer
+    remaining_us: Integer
+    vehicle: str
+
+
+class Decision(Record, frozen=True):
+    """One answer of `enforce`, with every input that `decide` read, so that it can be derived again.
+
+    `kind`, `step` and `link` are those of the request (`wire.request`). `outcome` and `reason` are slugs.
+    `binding` is the one that the request presented. `clause` is the text of the deciding clause, `clause_at` its
+    [source, start, end]; `target` the text of the link to fly instead and `target_link` its index (-1: none).
+    `rule_step` is the number in section 4.1 of the step that decided, `valid_until_us` monotonic.
+    """
+
+    prev: Hash
+    at_us: Count
+    binding: Hex
+    clause: str | None
+    clause_at: tuple[Integer, Integer, Integer] | None
+    context: RecordedContext
+    invocation: Hex
+    kind: Integer
+    link: Integer
+    mode: str
+    outcome: str
+    reason: str
+    rule_step: Integer
+    seq: Count
+    state: RecordedState
+    step: Integer
+    target: str | None
+    target_link: Integer
+    type: Literal["decision"]
+    utc_error_us: Count
+    utc_us: Count
+    valid_until_us: Integer
+
+
+class Effect(Record, frozen=True):
+    """What then happened. `event` is a stable slug; `detail` is text of the world's own making, never to be trusted.
+
+    `kind`, `step` and `link` name what it belongs to as in `Decision` (-1 where nothing does), `token` the command
+    (-1: none).
+    """
+
+    prev: Hash
+    at_us: Count
+    detail: str
+    event: str
+    kind: Integer
+    link: Integer
+    seq: Count
+    step: Integer
+    token: Integer
+    type: Literal["effect"]
+    utc_error_us: Count
+    utc_us: Count
+
+
+class Close(Record, frozen=True):
+    """The last record. `count` is the number of records before it, `tlog` the SHA-256 of the telemetry log, or null.
+
+    `checkpoint` is a C2SP signed note over the tree of all records, this one included: its own leaf is its line with
+    `checkpoint` null, so that the signature covers the ending and every other field too.
+    """
+
+    prev: Hash
+    at_us: Count
+    checkpoint: str | None
+    count: Count
+    ending: str
+    seq: Count
+    tlog: Hash | None
+    type: Literal["close"]
+    utc_error_us: Count
+    utc_us: Count
+
+
+AnyRecord = Genesis | Decision | Effect | Close
+
+_encode = msgspec.json.Encoder().encode
+
+
+def encode(record: Record) -> bytes:
+    """The line of a record, newline included."""
+    return _encode(record) + b"\n"
+
+
+def unsigned(close: Close) -> Close:
+    """A close as its own leaf holds it: without its checkpoint."""
+    return msgspec.structs.replace(close, checkpoint=None)

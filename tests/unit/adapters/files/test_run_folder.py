@@ -1,0 +1,68 @@
+"""Run folders: named by time and bundle, never shared, readable for other tools."""
+
+import errno
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.files import telemetry
+from rtshcua.adapters.files.runs import RunFolder
+from rtshcua.mavlink import tlog
+
+UTC_US = 1_750_000_000_999_999  # 2025-06-15T15:06:40Z
+
+
+def test_folder_holds_the_bundle_and_makes_room(tmp_path: Path) -> None:
+    run = RunFolder(tmp_path / "runs", name="short", bundle=b"bundle", utc_us=UTC_US)
+    assert run.path == tmp_path / "runs" / "20250615T150640Z-short"
+    assert (run.path / "mission.bundle").read_bytes() == b"bundle"
+    log = run.log()
+    log.append(b"{}\n", durable=True)
+    log.close()
+    run.write_summary({"ending": "completed", "records": 1})
+    run.write_summary({"ending": "aborted", "records": 1})
+    assert json.loads((run.path / "summary.json").read_text())["ending"] == "aborted"
+    run.telemetry().finish()
+    assert sorted(file.name for file in run.path.iterdir()) == [
+        "log.jsonl", "mission.bundle", "summary.json", "telemetry.tlog",
+    ]  # fmt: skip
+
+
+def test_two_runs_in_one_second_do_not_meet(tmp_path: Path) -> None:
+    names = [RunFolder(tmp_path, name="short", bundle=b"", utc_us=UTC_US).path.name for _ in range(3)]
+    assert names == ["20250615T150640Z-short", "20250615T150640Z-short-2", "20250615T150640Z-short-3"]
+
+
+@pytest.mark.parametrize(("name", "part"), [("../../etc", ".._.._etc"), ("", "run"), ("é b" * 50, "__b" * 26 + "__")])
+def test_a_name_stays_inside_the_folder(name: str, part: str, tmp_path: Path) -> None:
+    run = RunFolder(tmp_path, name=name, bundle=b"", utc_us=UTC_US)
+    assert run.path.parent == tmp_path
+    assert run.path.name == f"20250615T150640Z-{part}"
+
+
+def test_telemetry_is_a_tlog_and_its_digest_that_of_the_file(tmp_path: Path) -> None:
+    frame = bytes.fromhex("fd09000000010100000000000000020351040312d4")
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
+    file.write(UTC_US, frame)
+    file.write(UTC_US + 1, frame)
+    digest = file.finish()
+    data = (tmp_path / "telemetry.tlog").read_bytes()
+    assert digest == hashlib.sha256(data).digest()
+    assert [(entry.at_us, entry.frame) for entry in tlog.read(data)] == [(UTC_US, frame), (UTC_US + 1, frame)]
+
+
+@pytest.mark.parametrize("size", [10, 1 << 20])
+def test_a_full_disk_ends_the_telemetry_and_not_the_flight(size: int, tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("needs /dev/full")
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
+    file._file.close()
+    file._file = full.open("wb")
+    for _ in range(3):
+        file.write(UTC_US, bytes(size))
+    assert file.finish() == hashlib.sha256(b"").digest()
+    assert file.error is not None
+    assert file.error.errno == errno.ENOSPC

@@ -1,0 +1,86 @@
+"""A short log of one flight, written by the recorder itself."""
+
+from collections.abc import Callable
+
+import pytest
+
+from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.wire.keys import Duty, SigningKey
+
+BOOT = bytes(range(16))
+
+
+@pytest.fixture
+def log_key() -> SigningKey:
+    return SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
+
+
+@pytest.fixture
+def now() -> Callable[[int], Now]:
+    """The moment a number of milliseconds after the start."""
+    return lambda ms: Now(5_000_000 + ms * 1000, 1_750_000_000_000_000 + ms * 1000, 2_000)
+
+
+@pytest.fixture
+def recorder(log_key: SigningKey) -> Recorder:
+    return Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
+
+
+@pytest.fixture
+def begin(recorder: Recorder, now: Callable[[int], Now]) -> Callable[[], bytes]:
+    return lambda: recorder.genesis(
+        now(0), bundle=b"bundle", root=b"root", boot=BOOT, vehicle="quad 07+é", mission="short", mode="software"
+    )
+
+
+@pytest.fixture
+def decide(recorder: Recorder, now: Callable[[int], Now]) -> Callable[..., bytes]:
+    """Records an allow of step 0 after some milliseconds; any field can be given."""
+
+    def decide(ms: int, **fields: object) -> bytes:
+        given: dict[str, object] = {
+            "kind": 0,
+            "step": 0,
+            "link": -1,
+            "invocation": bytes(16),
+            "state": State((35_000, None, -3), (1_200, 0, 50)),
+            "context": Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),)),
+            "outcome": Outcome.ALLOW,
+            "reason": Reason.ADMITTED,
+            "rule_step": 8,
+            "clause": None,
+            "clause_at": None,
+            "target": None,
+            "target_link": -1,
+            "valid_until_us": 6_000_000,
+        }
+        return recorder.decision(now(ms), **(given | fields))  # type: ignore[arg-type]
+
+    return decide
+
+
+@pytest.fixture
+def log(
+    recorder: Recorder, begin: Callable[[], bytes], decide: Callable[..., bytes], now: Callable[[int], Now]
+) -> list[bytes]:
+    """Genesis, two decisions, two effects, close."""
+    refused = {
+        "step": 1,
+        "outcome": Outcome.FALLBACK,
+        "reason": Reason.STATE_VIOLATED,
+        "rule_step": 6,
+        "clause": 'battery > 35 % "ß"',
+        "clause_at": (0, 10, 24),
+        "target": "hover for 20 s",
+        "target_link": 0,
+    }
+    return [
+        begin(),
+        decide(10),
+        recorder.effect(now(11), "dispatched", kind=0, step=0, token=1),
+        decide(12, **refused),
+        recorder.effect(now(13), "failed", kind=0, step=0, token=1, detail="PreArm: \ud800 \x1b[31m\n"),
+        recorder.close(now(20), ending="aborted", tlog=bytes(32)),
+    ]

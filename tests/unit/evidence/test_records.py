@@ -1,0 +1,165 @@
+"""Lines are those of RFC 8785, byte for byte, and only those are read back."""
+
+from typing import get_args
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import (
+    LARGEST,
+    AnyRecord,
+    Close,
+    Decision,
+    Effect,
+    RecordedContext,
+    RecordedState,
+    encode,
+    unsigned,
+)
+
+ESCAPES = {"\b": "\\b", "\t": "\\t", "\n": "\\n", "\f": "\\f", "\r": "\\r", '"': '\\"', "\\": "\\\\"}
+
+
+def jcs(value: object) -> str:
+    """RFC 8785, sections 3.2.2 and 3.2.3, for the values that a log has; written from the RFC alone."""
+    match value:
+        case None:
+            return "null"
+        case int():
+            return str(value)
+        case str():
+            return '"' + "".join(ESCAPES.get(c) or (f"\\u{ord(c):04x}" if c < " " else c) for c in value) + '"'
+        case list() | tuple():
+            return "[" + ",".join(map(jcs, value)) + "]"
+        case dict():
+            keys = sorted(value, key=lambda key: key.encode("utf-16-be"))
+            return "{" + ",".join(f"{jcs(key)}:{jcs(value[key])}" for key in keys) + "}"
+    raise TypeError(value)
+
+
+integers = st.integers(-LARGEST, LARGEST)
+counts = st.integers(0, LARGEST)
+texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+hashes = st.binary(min_size=32, max_size=32).map(bytes.hex)
+effects = st.builds(
+    Effect,
+    hashes,
+    counts,
+    texts,
+    texts,
+    integers,
+    integers,
+    counts,
+    integers,
+    integers,
+    st.just("effect"),
+    counts,
+    counts,
+)
+states = st.builds(RecordedState, st.lists(integers).map(tuple), st.lists(st.none() | integers).map(tuple))
+contexts = st.builds(
+    RecordedContext,
+    st.lists(st.tuples(integers, integers, integers, integers), max_size=2).map(tuple),
+    integers,
+    integers,
+    integers,
+    integers,
+    integers,
+    texts,
+)
+decisions = st.builds(
+    Decision,
+    prev=hashes,
+    at_us=counts,
+    binding=hashes,
+    clause=st.none() | texts,
+    clause_at=st.none() | st.tuples(integers, integers, integers),
+    context=contexts,
+    invocation=hashes,
+    kind=integers,
+    link=integers,
+    mode=texts,
+    outcome=texts,
+    reason=texts,
+    rule_step=integers,
+    seq=counts,
+    state=states,
+    step=integers,
+    target=st.none() | texts,
+    target_link=integers,
+    type=st.just("decision"),
+    utc_error_us=counts,
+    utc_us=counts,
+    valid_until_us=integers,
+)
+closes = st.builds(
+    Close,
+    hashes,
+    counts,
+    st.none() | texts,
+    counts,
+    texts,
+    counts,
+    st.none() | hashes,
+    st.just("close"),
+    counts,
+    counts,
+)
+
+
+@given(effects | decisions | closes)
+def test_a_line_is_canonical_and_reads_back(record: AnyRecord) -> None:
+    line = encode(record)
+    assert line == jcs(msgspec.to_builtins(record)).encode() + b"\n"
+    assert read(line) == record
+
+
+def test_fields_are_sorted_and_begin_with_a_lower_case_letter() -> None:
+    for kind in (*get_args(AnyRecord), RecordedState, RecordedContext):
+        names = kind.__struct_encode_fields__
+        assert list(names) == sorted(names)
+        assert all(name[0].islower() for name in names if name != "_prev")
+
+
+@given(closes)
+def test_unsigned_is_the_close_without_its_checkpoint(close: Close) -> None:
+    signed = b'"checkpoint":' + jcs(close.checkpoint).encode()
+    assert encode(unsigned(close)) == encode(close).replace(signed, b'"checkpoint":null')
+
+
+GOOD = encode(Effect("0" * 64, 1, "d", "e", 0, 0, 0, 0, 0, "effect", 3, 2))
+
+
+@pytest.mark.parametrize(
+    ("line", "slug", "words"),
+    [
+        (b"", "record/malformed", "it is not a record"),
+        (b"\xff\xfe\n", "record/malformed", "it is not a record"),
+        (b'{"type":"effect"}\n', "record/malformed", "it is not a record"),
+        (GOOD.replace(b"effect", b"effort"), "record/malformed", "it is not a record"),
+        (GOOD.replace(b'"d"', b'"\xff"'), "record/malformed", "it is not UTF-8"),
+        (GOOD.replace(b'"at_us":1,', b""), "record/malformed", "object missing required field `at_us`"),
+        (GOOD.replace(b"}", b',"z":1}'), "record/malformed", "object contains unknown field `z`"),
+        (GOOD.replace(b'"kind":0', b'"kind":0.0'), "record/malformed", "expected an integer, got a fraction"),
+        (GOOD.replace(b'"kind":0', b'"kind":true'), "record/malformed", "expected an integer, got a truth value"),
+        (GOOD.replace(b'"kind":0', b'"kind":9007199254740992'), "record/malformed", "`$.kind`"),
+        (GOOD.replace(b'"d"', b"[" * 100_000), "record/malformed", "expected a text, got a list"),
+        (GOOD.replace(b'"d"', b"null"), "record/malformed", "expected a text, got null"),
+        (GOOD.replace(b'"kind":0,', b'"kind":0,,'), "record/malformed", "it is not JSON"),
+        (GOOD.replace(b'"kind":0', b'"kind": 0'), "record/not-canonical", "RFC 8785"),
+        (GOOD.replace(b'"kind":0', b'"kind":-0'), "record/not-canonical", "RFC 8785"),
+        (GOOD.replace(b'"kind":0', b'"kind":1,"kind":0'), "record/not-canonical", "RFC 8785"),
+        (GOOD.replace(b'"d"', b'"\\u0064"'), "record/not-canonical", "RFC 8785"),
+        (GOOD.replace(b"\n", b"\r\n"), "record/not-canonical", "RFC 8785"),
+    ],
+)
+def test_anything_else_is_refused(line: bytes, slug: str, words: str) -> None:
+    flaw = read(line)
+    assert isinstance(flaw, Flaw)
+    assert flaw.slug == slug
+    assert words in flaw.text
+    assert not any(word in flaw.text for word in ("`int`", "`str`", "`float`", "`bool`", "`array`", "`object`"))

@@ -18,15 +18,13 @@ class Plan(Flat, frozen=True):
     """Where the skill will take the vehicle, after the leg from wherever it is then.
 
     `path` is x0, y0, x1, y1, ... in local mm; `altitude` in mm above home (the height flown at; for LAND and HOLD the
-    height at dispatch counts), `speed` in mm/s, 0 where the skill leaves it to the vehicle. `hold_us` is how long
-    a HOLD lasts as a mission step; 0: until something else is commanded, or its limit as a link is over.
+    height at dispatch counts), `speed` in mm/s, 0 where the skill leaves it to the vehicle.
     """
 
     kind: int
     path: tuple[int, ...]
     altitude: int
     speed: int
-    hold_us: int = 0
 
 
 class Invocation(Flat, frozen=True):

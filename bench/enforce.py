@@ -1,0 +1,97 @@
+"""The dispatch-time path, from a state in hand to a command that may be sent, against the published figure for it.
+
+One admission: encode the request, `enforce` in mode `software` (decide, mint the permit), read the answer, make the
+evidence line and append it to a file, check the permit. Signatures were verified at load. The machine is noisy, so the
+percentiles are those of a block of admissions, and the quietest block counts; the median block stands beside it.
+Exits with 1 when the 95th percentile is above the limit.
+"""
+
+import sys
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter_ns
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from reference.world import LOG_KEY, SESSION_KEY, START, VEHICLE, loaded
+from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.evidence.chain import Recorder
+from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
+from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.executor import Executor
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.enforcement.mint import Mint
+from rtshcua.onboard.ports import Append, Dispatch
+from rtshcua.onboard.runtime.admission import Admission
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.queue import InvocationQueue
+from rtshcua.onboard.runtime.remaining import RemainingLatency
+from rtshcua.wire.duty import Duty
+
+LIMIT_US, PUBLISHED_US = 100.0, 318.0
+BLOCKS, ROUNDS = 21, 200
+PARTS = ("enforce and record", "append", "check the permit", "all")
+
+
+def fresh(of: Loaded) -> Loaded:
+    """The same bundle in a new session, so that its one step may be admitted again."""
+    boundary = SoftwareBoundary(
+        of.policy, of.invocations, of.bundle.policy_digest, VEHICLE, Mint(SESSION_KEY), enforced=True
+    )
+    executor = Executor(SESSION_KEY, Commands(of.bundle.policy, of.bundle.mission))
+    return replace(of, boundary=boundary, executor=executor)
+
+
+def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:
+    """How long the parts of one admission take, in ns, and all of it."""
+    of = fresh(of)
+    journal, queue = Journal(recorder), InvocationQueue(of.bundle.mission)
+    queue.release(START.monotonic_us)
+    admission = Admission(of, journal, queue, RemainingLatency())
+    state = flat.state()
+    begin = perf_counter_ns()
+    answer = admission.ask(START, state, (0, 0, -1))
+    decided = perf_counter_ns()
+    for action in journal.take():
+        if isinstance(action, Append):
+            file.append(action.line, action.durable)
+    appended = perf_counter_ns()
+    assert answer is not None
+    dispatch = of.executor.dispatch(answer.permit, START.monotonic_us)
+    end = perf_counter_ns()
+    assert isinstance(dispatch, Dispatch)
+    return decided - begin, appended - decided, end - appended, end - begin
+
+
+def main() -> int:
+    """Measures, prints, and says whether the limit held."""
+    survey = replace(flat.INVOCATIONS[flat.INSPECTION_STEP], step=0)
+    of = loaded(mission=replace(flat.MISSION, invocations=(survey,)))
+    recorder = Recorder(lambda text: LOG_KEY.sign(text, duty=Duty.LOG), LOG_KEY.public)
+    with TemporaryDirectory() as folder:
+        file = EvidenceFile(Path(folder) / "log")
+        [one(of, recorder, file) for _ in range(ROUNDS)]  # warm
+        blocks = [[one(of, recorder, file) for _ in range(ROUNDS)] for _ in range(BLOCKS)]
+        file.close()
+    p95 = 0.0
+    for number, name in enumerate(PARTS):
+        columns = [sorted(parts[number] for parts in block) for block in blocks]
+        middles, highs = ([column[at] / 1e3 for column in columns] for at in (ROUNDS // 2, ROUNDS * 95 // 100))
+        p95 = min(highs)
+        print(
+            f"enforce: {name}: median {min(middles):.1f} us, p95 {p95:.1f} us "
+            f"(median block: {median(middles):.1f} us, {median(highs):.1f} us)"
+        )
+    print(
+        f"enforce: p95 is {p95 / LIMIT_US:.2f} of the limit ({LIMIT_US:.0f} us), "
+        f"{p95 / PUBLISHED_US:.2f} of the published {PUBLISHED_US:.0f} us"
+    )
+    return int(p95 > LIMIT_US)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""Parsing: text to IR against a bare Lark parse of the same text with positions, in one run, the collector on and off.
+
+Also that both time and memory grow in proportion to the text, up to 50,000 lines. Exits with 1 when a limit is broken.
+"""
+
+import gc
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from time import perf_counter_ns
+
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language.generate import GRAMMAR, lark
+from rtshcua.ground.language.parse import parse
+from rtshcua.ground.language.table import table
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+RATIO = 1.0
+ROUNDS = 7
+LINES = 2_000
+MOST_LINES = 50_000
+GROWTH = 2.0
+"""The time a line at `MOST_LINES` may take, relative to that at a tenth of it."""
+CEILING = 2_048
+"""Bytes of memory a line, of the IR and of all that parsing needs at its peak, without the text."""
+
+
+def sources(lines: int) -> str:
+    """The shipped sources, again and again, until there are so many lines. Names repeat: that is for the checker."""
+    files = [
+        path for folder in ("skills", "policies", "missions") for path in sorted((CHECKOUT / folder).glob("*.rts"))
+    ]
+    once = "".join(path.read_text(encoding="utf-8") for path in files)
+    text = once * (lines // once.count("\n") + 1)
+    end = 0
+    for _ in range(lines):
+        end = text.index("\n", end) + 1
+    return text[: text.rindex("\n}\n", 0, end) + 3]
+
+
+def milliseconds(work: Callable[[], object]) -> float:
+    """How long `work` takes."""
+    start = perf_counter_ns()
+    work()
+    return (perf_counter_ns() - start) / 1e6
+
+
+def ours(text: str) -> None:
+    """Text to IR; the text must be good."""
+    assert not parse(Source("bench.rts", text)).diagnostics
+
+
+def against_lark() -> bool:
+    """The ratio to Lark, which makes a tree of tokens and no IR."""
+    grammar, text = GRAMMAR.read_text(encoding="utf-8"), sources(LINES)
+    print(
+        f"parse: reading the committed table takes {milliseconds(table):.1f} ms, "
+        f"making it with Lark {milliseconds(lambda: lark(grammar)):.0f} ms"
+    )
+    bare = lark(grammar)
+    held = True
+    for collector in (True, False):
+        (gc.enable if collector else gc.disable)()
+        rounds = [(milliseconds(lambda: ours(text)), milliseconds(lambda: bare.parse(text))) for _ in range(ROUNDS)]
+        mine, peer = median(a for a, _ in rounds), median(b for _, b in rounds)
+        held &= mine <= RATIO * peer
+        print(
+            f"parse: text to IR takes {mine / peer:.2f} times a bare Lark parse, limit {RATIO:g} "
+            f"({mine:.0f} ms against {peer:.0f} ms, {LINES} lines, collector {'on' if collector else 'off'})"
+        )
+    gc.enable()
+    return held
+
+
+def in_proportion() -> bool:
+    """Time and memory for few lines and for many."""
+    few, many = sources(MOST_LINES // 10), sources(MOST_LINES)
+    small = median(milliseconds(lambda: ours(few)) for _ in range(3)) * 10
+    large = median(milliseconds(lambda: ours(many)) for _ in range(3))
+    print(
+        f"parse: a line takes {large / small:.2f} times as long in {MOST_LINES} lines as in a tenth of them, "
+        f"limit {GROWTH:g} ({large:.0f} ms, {large * 1000 / MOST_LINES:.1f} us a line)"
+    )
+    tracemalloc.start()
+    parsed = parse(Source("bench.rts", many))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert parsed.unit.skills
+    print(
+        f"parse: {MOST_LINES} lines take {peak / 2**20:.0f} MiB at their peak, {peak // MOST_LINES} bytes a line, "
+        f"limit {CEILING}"
+    )
+    return large <= GROWTH * small and peak <= CEILING * MOST_LINES
+
+
+def start_up() -> None:
+    """What importing the parser costs a process, and that Lark is not among it."""
+    code = (
+        "import sys, time; t = time.perf_counter_ns(); import rtshcua.model.ir.program; m = time.perf_counter_ns();"
+        "import rtshcua.ground.language.load; l = time.perf_counter_ns();"
+        "assert 'lark' not in sys.modules; print((m - t) / 1e6, (l - m) / 1e6)"
+    )
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, check=True) for _ in range(5)]
+    model, parser = (median(float(run.stdout.split()[at]) for run in runs) for at in (0, 1))
+    print(f"parse: importing takes {parser:.0f} ms, after {model:.0f} ms for the IR and pydantic; Lark is not imported")
+
+
+if __name__ == "__main__":
+    start_up()
+    sys.exit(0 if all([against_lark(), in_proportion()]) else 1)

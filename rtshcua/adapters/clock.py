@@ -1,0 +1,93 @@
+"""The machine's clocks as the runtime's `Clock` port, and one for a simulated vehicle that lives faster than life."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from rtshcua.model.flat.situation import Now
+
+#: How far UTC may be off where nothing better is known, in us.
+UTC_ERROR_US = 100_000
+
+
+class LinkClock(Protocol):
+    """The `Clock` port, with what a link needs of it besides."""
+
+    def now(self) -> Now:
+        """The present moment."""
+        ...
+
+    def heard(self, boot_us: int) -> None:
+        """A frame of the vehicle said how long it has been up, in us."""
+        ...
+
+    def real_seconds(self, us: int) -> float:
+        """How long `us` of this clock last on the machine's, for waiting."""
+        ...
+
+
+class SystemClock:
+    """Monotonic time and UTC of the machine, in us. UTC is read once and carried on: a clock step moves nothing."""
+
+    def __init__(self, utc_error_us: int = UTC_ERROR_US) -> None:
+        self._utc_error_us = utc_error_us
+        self._ahead_us = time.time_ns() // 1_000 - time.monotonic_ns() // 1_000
+
+    def now(self) -> Now:
+        """The present moment."""
+        monotonic_us = time.monotonic_ns() // 1_000
+        return Now(monotonic_us, monotonic_us + self._ahead_us, self._utc_error_us)
+
+    def heard(self, boot_us: int) -> None:
+        """The vehicle's own time does not matter here."""
+
+    def real_seconds(self, us: int) -> float:
+        """The same in seconds."""
+        return us / 1_000_000
+
+
+class PacedClock:
+    """Time as a simulated vehicle has it that lives `speed` times as fast; never for a real one.
+
+    It runs on from the vehicle's boot time as frames bring it, at most `LEAD_US` ahead: when the vehicle's process or
+    this one is held up for a moment, which at such a speed is a long time, the age of a signal does not jump. Only when
+    nothing was heard for `PATIENCE_NS` of the machine's time does it run free, so that silence is still noticed.
+    """
+
+    LEAD_US = 200_000
+    PATIENCE_NS = 500_000_000
+
+    def __init__(
+        self, speed: float, utc_error_us: int = UTC_ERROR_US, machine_ns: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self._speed = speed
+        self._utc_error_us = utc_error_us
+        self._machine_ns = machine_ns
+        self._heard_ns = machine_ns()
+        self._base_us = self._last_us = self._heard_ns // 1_000
+        self._boot_us: int | None = None
+        self._ahead_us = time.time_ns() // 1_000 - self._base_us
+
+    def now(self) -> Now:
+        """The present moment; never before the last."""
+        silent_ns = self._machine_ns() - self._heard_ns
+        run_us = int(silent_ns * self._speed) // 1_000
+        if self._boot_us is not None:
+            free_us = int(max(0, silent_ns - self.PATIENCE_NS) * self._speed) // 1_000
+            run_us = min(run_us, self.LEAD_US) + free_us
+        self._last_us = max(self._last_us, self._base_us + run_us)
+        return Now(self._last_us, self._last_us + self._ahead_us, self._utc_error_us)
+
+    def heard(self, boot_us: int) -> None:
+        """Follow the vehicle's time. One that goes backwards (a new start) is set aside."""
+        if self._boot_us is None:
+            self._base_us = self.now().monotonic_us
+        elif boot_us > self._boot_us:
+            self._base_us = max(self._base_us + boot_us - self._boot_us, self._last_us - self.LEAD_US)
+        else:
+            return
+        self._boot_us, self._heard_ns = boot_us, self._machine_ns()
+
+    def real_seconds(self, us: int) -> float:
+        """The same on the machine's clock."""
+        return us / 1_000_000 / self._speed

@@ -1,0 +1,102 @@
+"""The simulated vehicle as a process of its own, started for one run and gone with it."""
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, Self
+
+START_S = 20.0
+_STOP_S = 2.0
+_MODULE = "rtshcua.simulation"
+
+
+class SimulatorError(Exception):
+    """The simulated vehicle did not start; the text is for a person."""
+
+
+class Simulator:
+    """Starts `python -m rtshcua.simulation` with these options, and waits until it says that it is up.
+
+    Its standard input is a pipe from here, so it ends when this process does, however that happens; it has a session of
+    its own, so that Ctrl-C in the terminal is not for it. `ready` is what it says of itself. Raises `SimulatorError`.
+    """
+
+    def __init__(self, options: Sequence[str], patience_s: float = START_S) -> None:
+        # -P: nothing of the folder that we happen to stand in is imported.
+        command = [sys.executable, "-P", "-m", _MODULE, *options]
+        try:
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+            )
+        except OSError as error:
+            raise SimulatorError(f"the simulated vehicle cannot be started: {error.strerror or error}") from error
+        line = self._first_line(patience_s)
+        if line is None:
+            reason = self._reason()
+            self.stop()
+            raise SimulatorError(f"the simulated vehicle did not start: {reason}")
+        self.ready: dict[str, Any] = json.loads(line)
+
+    @property
+    def running(self) -> bool:
+        """Whether the process lives."""
+        return self._process.poll() is None
+
+    def wait(self) -> int:
+        """Wait until the process ends by itself; its exit code."""
+        return self._process.wait()
+
+    def stop(self) -> None:
+        """End it: by closing its input, and, should it not listen, by signals."""
+        process = self._process
+        if process.stdin is not None:
+            with suppress(OSError):
+                process.stdin.close()
+        for end in (process.terminate, process.kill):
+            try:
+                process.wait(_STOP_S)
+                break
+            except subprocess.TimeoutExpired:
+                end()
+        process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def _first_line(self, patience_s: float) -> bytes | None:
+        """What it says once it is up, a JSON object; None when nothing comes in time, or it ended."""
+        assert self._process.stdout is not None
+        handle, line = self._process.stdout.fileno(), b""
+        end = time.monotonic() + patience_s
+        while not line.endswith(b"\n"):
+            left = end - time.monotonic()
+            if left <= 0 or not select.select([handle], [], [], left)[0]:
+                return None
+            part = os.read(handle, 4_096)
+            if not part:
+                return None
+            line += part
+        return line
+
+    def _reason(self) -> str:
+        try:
+            _, errors = self._process.communicate(timeout=_STOP_S)
+        except subprocess.TimeoutExpired:
+            return "it gave no sign of life in time"
+        lines = errors.decode("utf-8", "replace").strip().splitlines()
+        last = lines[-1] if lines else f"it ended with code {self._process.returncode}"
+        return last.partition("error: ")[2] or last

@@ -1,0 +1,46 @@
+"""What differs between autopilots, as a value: each flavour's package makes one."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.onboard.ports import Command
+
+Message = Any
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One part of a manoeuvre: send, then wait until the effect is seen.
+
+    `message` is sent at once, and again while it is not acknowledged; `command` is the MAV_CMD whose acknowledgement
+    belongs to it. A message without one (None) is sent again each `repeat_us`. `done` None: it has no effect that could
+    be seen, so its acknowledgement has to do. `modes` are the flight modes that belong to this stage; another one means
+    that somebody took over. `timeout_us` 0: only the skill's own time limit ends the wait. `powered`: it cannot go on
+    once the motors are off on the ground. `travels`: a vehicle that stands still has stopped short.
+    """
+
+    message: Message | None
+    command: int | None
+    done: Callable[[Observed], bool] | None
+    modes: frozenset[int]
+    timeout_us: int = 0
+    repeat_us: int = 0
+    powered: bool = False
+    travels: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Flavour:
+    """An autopilot's name, the names of its modes, and how it is made to do each kind of motion."""
+
+    name: str
+    autopilot: int  # MAV_AUTOPILOT of its heartbeat
+    mode_names: Mapping[int, str]
+    stages: Callable[[Command, Observed, int], list[Stage]]  # command, what is seen, target system
+
+
+def mode_name(flavour: Flavour, number: int) -> str:
+    """The flavour's name of a `custom_mode`, or the number itself."""
+    return flavour.mode_names.get(number, f"mode {number}")

@@ -1,0 +1,69 @@
+"""The MAVLink messages that adapters send, made in one place with the fields that nobody uses filled in."""
+
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+NAN = float("nan")
+
+DO_SET_MODE = dialect.MAV_CMD_DO_SET_MODE
+ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
+REPOSITION = dialect.MAV_CMD_DO_REPOSITION
+CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
+SET_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+
+_AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
+_POSITION_ONLY = 0x0DF8  # POSITION_TARGET_TYPEMASK: ignore velocity, acceleration, yaw and yaw rate
+
+
+def heartbeat() -> Any:
+    """Of an onboard controller; never of a ground station, which would hide the loss of the real one."""
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+    )
+
+
+def command(system: int, number: int, *parameters: float) -> Any:
+    """COMMAND_LONG with up to seven parameters, the rest 0."""
+    filled = [*parameters, *[0.0] * (7 - len(parameters))]
+    return dialect.MAVLink_command_long_message(system, _AUTOPILOT, number, 0, *filled)
+
+
+def set_mode(system: int, *custom: int) -> Any:
+    """DO_SET_MODE to a custom mode: PX4 takes main and sub mode, ArduCopter the number."""
+    return command(system, DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *custom)
+
+
+def arm(system: int) -> Any:
+    """Arm, never by force."""
+    return command(system, ARM_DISARM, 1, 0)
+
+
+def reposition_amsl(system: int, latitude: int, longitude: int, amsl_mm: int, speed_mm_s: int) -> Any:
+    """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode."""
+    speed = speed_mm_s / 1_000 if speed_mm_s else -1.0
+    flags = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    return dialect.MAVLink_command_int_message(
+        system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
+        speed, flags, 0, NAN, latitude, longitude, amsl_mm / 1_000,
+    )  # fmt: skip
+
+
+def position_target(system: int, latitude: int, longitude: int, height_mm: int) -> Any:
+    """SET_POSITION_TARGET_GLOBAL_INT: a place at a height above home."""
+    return dialect.MAVLink_set_position_target_global_int_message(
+        0, system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, _POSITION_ONLY,
+        latitude, longitude, height_mm / 1_000, 0, 0, 0, 0, 0, 0, 0, 0,
+    )  # fmt: skip
+
+
+def number_of(message: str) -> int | None:
+    """The message's number on the wire; None when the dialect has no such message."""
+    number: int | None = getattr(dialect, f"MAVLINK_MSG_ID_{message}", None)
+    return number
+
+
+def message_interval(system: int, message: str, interval_us: int) -> Any:
+    """SET_MESSAGE_INTERVAL by the name of a message that the dialect has."""
+    return command(system, SET_INTERVAL, number_of(message) or 0, interval_us)

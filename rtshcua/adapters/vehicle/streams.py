@@ -1,0 +1,78 @@
+"""Telemetry streams: asked for one by one, asked again when they stop, left alone when the vehicle has none such."""
+
+from collections.abc import Iterable, Mapping
+
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import Message
+
+ANSWER_US = 500_000  # how long one request waits for its acknowledgement
+QUIET_US = 3_000_000  # a stream that is silent for so long is asked for again
+#: Readiness waits no longer than this for what is needed; and for what the autopilot itself does not have, but somebody
+#: else may send (RADIO_STATUS comes from the radio).
+PATIENCE_US = 5_000_000
+PATIENCE_REFUSED_US = 2_000_000
+
+#: What effects are seen by, and how often, in us; the heartbeat too, for a change of mode must not be seen late.
+ALWAYS: Mapping[str, int] = {
+    "HEARTBEAT": 200_000,
+    "GLOBAL_POSITION_INT": 100_000,
+    "EXTENDED_SYS_STATE": 200_000,
+    "GPS_RAW_INT": 500_000,
+    "SYS_STATUS": 500_000,
+}
+
+
+class Streams:
+    """SET_MESSAGE_INTERVAL for each message of `wanted` (its interval in us), one request outstanding at a time.
+
+    `needed` holds groups of messages of which one is enough: the sources of one signal.
+    """
+
+    def __init__(self, wanted: Mapping[str, int], needed: Iterable[frozenset[str]]) -> None:
+        self._needed = [*needed, *[frozenset({name}) for name in ALWAYS]]
+        self._wanted = {name: us for name, us in wanted.items() if messages.number_of(name) is not None}
+        self._queue = list(self._wanted)
+        self._refused: set[str] = set()
+        self._heard_us: dict[str, int] = {}
+        self._asking: str | None = None
+        self._asked_us = 0
+        self._since_us: int | None = None
+
+    def heard(self, name: str, now_us: int) -> None:
+        """A message came."""
+        self._heard_us[name] = now_us
+
+    def answered(self, accepted: bool) -> None:
+        """The outstanding request was acknowledged."""
+        if self._asking is not None:
+            if not accepted:
+                self._refused.add(self._asking)
+            self._asking = None
+
+    def due(self, system: int, now_us: int) -> list[Message]:
+        """The request to send now, if one is due. One that is not answered goes to the end of the queue."""
+        if self._since_us is None:
+            self._since_us = now_us
+        if self._asking is not None:
+            if now_us - self._asked_us < ANSWER_US:
+                return []
+            self._queue.append(self._asking)
+            self._asking = None
+        if not self._queue:
+            self._queue = [name for name in self._wanted if self._is_quiet(name, now_us)]
+        if not self._queue:
+            return []
+        self._asking, self._asked_us = self._queue.pop(0), now_us
+        return [messages.message_interval(system, self._asking, self._wanted[self._asking])]
+
+    def settled(self, now_us: int) -> bool:
+        """Whether one message of each group was heard, or was waited for long enough."""
+        if self._since_us is None:
+            return False
+        missing = [group for group in self._needed if not group & self._heard_us.keys()]
+        patience_us = PATIENCE_REFUSED_US if all(group <= self._refused for group in missing) else PATIENCE_US
+        return not missing or now_us - self._since_us > patience_us
+
+    def _is_quiet(self, name: str, now_us: int) -> bool:
+        last_us = max(self._heard_us.get(name, 0), self._since_us or 0)
+        return name not in self._refused and now_us - last_us > QUIET_US

@@ -1,0 +1,82 @@
+"""Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rtshcua.mavlink.quantise import hypot_mm, quantise
+from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import POSITION, Signal, SignalSource
+from rtshcua.model.flat.zone import MAX_COORDINATE, Projection, project
+
+#: Each message is asked for several times within the shortest time to stale of what it carries, within these, in us.
+MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
+_WITHIN_STALE = 4
+
+
+class Telemetry:
+    """Knows which messages carry which signals."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._projection = policy.projection
+        self._sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
+        self._by_message: dict[str, list[tuple[Signal, SignalSource]]] = {}
+        for signal in policy.signals:
+            for source in signal.sources:
+                self._by_message.setdefault(source.message, []).append((signal, source))
+
+    @property
+    def intervals(self) -> Mapping[str, int]:
+        """The messages that some signal needs, and how often, in us."""
+        return {
+            name: _often(min(signal.stale_us for signal, _ in carried)) for name, carried in self._by_message.items()
+        }
+
+    @property
+    def sources(self) -> Sequence[frozenset[str]]:
+        """For each signal, the messages that may carry it."""
+        return self._sources
+
+    def distance_from_home(self, latitude: int, longitude: int) -> int:
+        """Distance in mm of a place (1e-7 degree) from the declared home."""
+        return hypot_mm(*project(self._projection, latitude, longitude))
+
+    def read(self, name: str, message: Any) -> tuple[tuple[int, int | None], ...]:
+        """(slot, canonical integer) of every signal that this message carries; None is "reported as not known"."""
+        carried = self._by_message.get(name)
+        if carried is None:
+            return ()
+        values: list[tuple[int, int | None]] = []
+        for signal, source in carried:
+            if signal.kind == POSITION:
+                x, y = _place(source, message, self._projection)
+                values += [(signal.slot, x), (signal.slot + 1, y)]
+            else:
+                values.append((signal.slot, _number(source, message)))
+        return tuple(values)
+
+
+def _often(stale_us: int) -> int:
+    return min(max(stale_us // _WITHIN_STALE, MOST_OFTEN_US), LEAST_OFTEN_US)
+
+
+def _number(source: SignalSource, message: Any) -> int | None:
+    parts = [_field(source, message, field) for field in source.fields]
+    if len(parts) == 1 or parts[0] is None:
+        return parts[0]
+    return None if parts[1] is None else hypot_mm(parts[0], parts[1])
+
+
+def _place(source: SignalSource, message: Any, projection: Projection) -> tuple[int, int] | tuple[None, None]:
+    latitude, longitude = (_field(source, message, field) for field in source.fields)
+    if latitude is None or longitude is None:
+        return None, None
+    x, y = project(projection, latitude, longitude)
+    if max(abs(x), abs(y)) > MAX_COORDINATE:  # farther than any zone can be declared: nonsense, not a place
+        return None, None
+    return x, y
+
+
+def _field(source: SignalSource, message: Any, field: str) -> int | None:
+    value = quantise(getattr(message, field), source.numerator, source.denominator, source.unknown)
+    return None if value is None or abs(value) > MAX_VALUE else value

@@ -1,0 +1,116 @@
+"""The `Vehicle` port over UDP: one socket, one peer, every good frame kept for the raw log."""
+
+import select
+import socket
+from collections.abc import Callable, Sequence
+
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.mavlink.frames import Received
+from rtshcua.onboard.ports import Command, Event
+
+_LARGEST = 65_535
+_BUFFER = 4 << 20  # asked for; what the system allows is enough for a moment of being held up
+#: One poll takes no more datagrams, and no more of the clock's time, than this: a flood must not starve the runtime,
+#: and a backlog is worked off in order.
+_BATCH = 256
+_SLICE_US = 50_000
+
+
+class UdpVehicle:
+    """Listens where the vehicle sends to (`udpin`), and answers the first sender that proves to be a vehicle.
+
+    Datagrams of other senders are read and dropped from then on. `keep` gets every good frame that came, and every one
+    that was sent, with its UTC time in us.
+    Raises OSError where the address cannot be bound.
+    """
+
+    def __init__(
+        self, address: tuple[str, int], driver: Driver, clock: LinkClock, keep: Callable[[int, bytes], None]
+    ) -> None:
+        self._driver = driver
+        self._clock = clock
+        self._keep = keep
+        self._peer: tuple[str, int] | None = None
+        self._pending: list[Event] = []
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(address)
+        except OSError:
+            self._socket.close()
+            raise
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._socket.setblocking(False)
+
+    @property
+    def port(self) -> int:
+        """The port listened at (the system's choice when 0 was asked for)."""
+        return int(self._socket.getsockname()[1])
+
+    @property
+    def driver(self) -> Driver:
+        """What is known of the vehicle."""
+        return self._driver
+
+    def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
+        """Wait at most `timeout_us` of the clock for frames; gives what happened."""
+        events, frames = self._driver.tick(now_us)
+        self._send(frames)
+        events, self._pending = [*self._pending, *events], []
+        wait = 0.0 if events else max(0.0, self._clock.real_seconds(timeout_us))
+        if select.select([self._socket], [], [], wait)[0]:
+            self._drain(now_us + _SLICE_US, events)
+        return events
+
+    def begin(self, command: Command, now_us: int) -> None:
+        """Start a manoeuvre."""
+        events, frames = self._driver.begin(command, now_us)
+        self._send(frames)
+        self._pending += events
+
+    def release(self) -> None:
+        """Send nothing more that moves the vehicle."""
+        self._driver.release()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+    def _drain(self, until_us: int, events: list[Event]) -> None:
+        for _ in range(_BATCH):
+            try:
+                datagram, sender = self._socket.recvfrom(_LARGEST)
+            except BlockingIOError:
+                return
+            except ConnectionError:  # an ICMP answer to something we sent: the peer is not there (yet)
+                continue
+            if self._peer is not None and sender != self._peer:
+                continue
+            now = self._clock.now()
+            heard = self._driver.receive(datagram, now.monotonic_us)
+            if self._peer is None:
+                if self._driver.flavour is None:
+                    continue
+                self._peer = sender
+            for frame in heard.frames:
+                self._keep(now.utc_us, frame.frame)
+                self._follow(frame)
+            self._send(heard.answers)
+            events += heard.events
+            if now.monotonic_us > until_us:
+                return
+
+    def _follow(self, frame: Received) -> None:
+        if frame.name == "GLOBAL_POSITION_INT":
+            self._clock.heard(frame.message.time_boot_ms * 1_000)
+
+    def _send(self, frames: Sequence[bytes]) -> None:
+        if self._peer is None or not frames:
+            return
+        utc_us = self._clock.now().utc_us
+        for frame in frames:
+            self._keep(utc_us, frame)
+            try:
+                self._socket.sendto(frame, self._peer)
+            except OSError:
+                continue  # lost, as any datagram may be: what matters is sent again, and only effects count

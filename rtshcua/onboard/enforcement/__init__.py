@@ -1,0 +1,1 @@
+"""The enforcement boundary: `load` once, `enforce` bytes for bytes, and the executor that nothing is sent without."""

@@ -1,0 +1,191 @@
+"""The enforcement boundary in this process: `enforce` decides one request and mints what the decision grants.
+
+It holds what a runtime must not be trusted with: the verified bundle, which steps were decided, and the key of the
+permits. Bytes go in and bytes come out, so that an isolated process or a trusted world can take its place.
+"""
+
+from typing import Final
+
+from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.flat.policy import Airspace, Policy, Rule
+from rtshcua.model.flat.situation import Context
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.mint import Mint
+from rtshcua.wire.permit import LINK_VALID_US
+from rtshcua.wire.request import FALLBACK_LINK, STEP, Malformed, Request, decode
+from rtshcua.wire.response import (
+    NO_CLAUSE,
+    NO_TARGET,
+    Answer,
+    Status,
+    encode,
+    encode_refusal,
+    own_clauses,
+    shared_clauses,
+)
+
+#: the last step of section 4.1 that a request must pass for its id to be used up
+_AUTHORITY: Final = 3
+_INTEGRITY: Final = 1
+_STATE: Final = 6
+_PASSED: Final = 8
+
+
+class SoftwareBoundary:
+    """`ports.Boundary` over a prepared bundle.
+
+    `enforced` false is mode `none`: it decides and answers as ever, and mints a step's permit whatever the decision.
+    """
+
+    def __init__(
+        self,
+        policy: PreparedPolicy,
+        invocations: tuple[PreparedInvocation, ...],
+        policy_digest: bytes,
+        vehicle: str,
+        mint: Mint,
+        *,
+        enforced: bool,
+    ) -> None:
+        self._policy = policy
+        self._invocations = invocations
+        self._policy_digest = policy_digest
+        self._vehicle = vehicle
+        self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
+        self._mint = mint
+        self._enforced = enforced
+        self._slots = policy.policy.slots
+        self._clauses = _ClauseNumbers(policy.policy, invocations)
+        self._consumed: set[int] = set()
+        self._latest = -1  # the last step that was asked for and not denied
+
+    def enforce(self, request: bytes) -> bytes:
+        """Decide one request. Hostile bytes get a refusal; nothing is raised and nothing is remembered of them."""
+        asked = decode(request, self._slots)
+        if isinstance(asked, Malformed):
+            return encode_refusal(Status.MALFORMED)
+        answer = self._step(asked) if asked.kind == STEP else self._link(asked)
+        return encode_refusal(answer) if isinstance(answer, Status) else encode(answer)
+
+    def _step(self, asked: Request) -> Answer | Status:
+        step = asked.step
+        if not 0 <= step < len(self._invocations) or asked.link != -1:
+            return Status.UNKNOWN_STEP
+        consumed = int(step in self._consumed)
+        if step > self._latest + 1 or (step < self._latest and not consumed):
+            return Status.NOT_CURRENT
+        prepared = self._invocations[step]
+        context = Context(
+            asked.binding,
+            self._vehicle,
+            self._version,
+            consumed,
+            asked.released_us,
+            asked.phase,
+            asked.remaining_us,
+            (),
+        )
+        decision = decide(prepared, asked.state, self._policy, context, asked.now)
+        if decision.outcome is not Outcome.DENY or not self._enforced:
+            self._latest = max(self._latest, step)
+        if decision.step > _AUTHORITY and not self._may_ask_again(prepared, decision):
+            self._consumed.add(step)
+        return Answer(
+            decision.outcome,
+            decision.reason,
+            decision.step,
+            NO_CLAUSE if decision.clause is None else self._clauses.number(step, decision.clause),
+            NO_TARGET if decision.link is None else self._target(prepared, decision.link, decision.target),
+            decision.valid_until_us,
+            consumed,
+            self._permit(prepared, decision, asked.now.monotonic_us),
+        )
+
+    def _may_ask_again(self, prepared: PreparedInvocation, decision: Decision) -> bool:
+        """A deferred step is asked for again, and so is one that its mission holds for."""
+        if decision.outcome is Outcome.FALLBACK:
+            holds = prepared.invocation.on_inadmissible == OnInadmissible.HOLD
+            return holds and decision.reason is not Reason.NO_SLACK
+        return decision.outcome is Outcome.DEFER
+
+    def _permit(self, prepared: PreparedInvocation, decision: Decision, now_us: int) -> bytes:
+        not_after_us = decision.valid_until_us
+        if decision.outcome is not Outcome.ALLOW:
+            if self._enforced:
+                return b""
+            not_after_us = now_us + LINK_VALID_US
+        invocation = prepared.invocation
+        contingency = self._policy.policy.contingency
+        return self._mint.step(invocation.step, not_after_us, len(invocation.contract.fallback), len(contingency))
+
+    def _link(self, asked: Request) -> Answer | Status:
+        now_us = asked.now.monotonic_us
+        if asked.kind == FALLBACK_LINK:
+            if not 0 <= asked.step < len(self._invocations):
+                return Status.UNKNOWN_STEP
+            if asked.step != self._latest:
+                return Status.NOT_CURRENT
+            prepared = self._invocations[asked.step]
+            binding = prepared.invocation.binding
+            number = self._fallback(asked, prepared)
+        else:
+            if asked.step != -1:
+                return Status.UNKNOWN_STEP
+            binding = self._policy_digest
+            number = self._contingency(asked)
+        if isinstance(number, Status):
+            return number
+        if asked.binding != binding:
+            reason = Reason.BINDING_MISMATCH
+            return Answer(Outcome.DENY, reason, _INTEGRITY, NO_CLAUSE, NO_TARGET, now_us, 0)
+        if number is None:
+            return Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, _STATE, NO_CLAUSE, NO_TARGET, now_us, 0)
+        until_us = now_us + LINK_VALID_US
+        permit = self._mint.link(asked.kind, asked.step, number, until_us)
+        return Answer(Outcome.ALLOW, Reason.ADMITTED, _PASSED, NO_CLAUSE, NO_TARGET, until_us, 0, permit)
+
+    def _fallback(self, asked: Request, prepared: PreparedInvocation) -> int | Status | None:
+        """The link's number in a permit if it may be flown now, None if not."""
+        if asked.link >= len(prepared.chain):
+            return Status.UNKNOWN_STEP
+        if asked.link != DEGRADE:
+            link = prepared.chain[asked.link]
+            return asked.link if link_admissible(link, asked.state, self._policy, asked.now) else None
+        choice = choose_fallback(prepared, asked.state, self._policy, asked.now)
+        if choice is None or choice.index != DEGRADE:
+            return None
+        return self._target(prepared, choice.index, choice.link)
+
+    def _target(self, prepared: PreparedInvocation, index: int, link: Link | None) -> int:
+        """A link's number outside of `decide`: the one in its chain, or `-1 - rule` for a degrade rule's target."""
+        if index != DEGRADE:
+            return index
+        rule = next(degrade.rule for degrade in prepared.candidates.degrades if degrade.rule.target == link)
+        return -1 - self._clauses.shared[rule]
+
+    def _contingency(self, asked: Request) -> int | Status | None:
+        chain = self._policy.contingency
+        if not 0 <= asked.link < len(chain):
+            return Status.UNKNOWN_STEP
+        return asked.link if link_admissible(chain[asked.link], asked.state, self._policy, asked.now) else None
+
+
+class _ClauseNumbers:
+    """The numbers of clauses in a response. The shared ones are kept once; a rule has its index in the policy."""
+
+    def __init__(self, policy: Policy, invocations: tuple[PreparedInvocation, ...]) -> None:
+        shared = shared_clauses(policy)
+        self.shared: dict[Clause | Rule | Airspace, int] = {clause: number for number, clause in enumerate(shared)}
+        self._own: tuple[dict[Clause | Rule | Airspace, int], ...] = tuple(
+            {clause: len(shared) + number for number, clause in enumerate(own_clauses(prepared.invocation.contract))}
+            for prepared in invocations
+        )
+
+    def number(self, step: int, clause: Clause | Rule | Airspace) -> int:
+        number = self._own[step].get(clause)
+        return self.shared[clause] if number is None else number

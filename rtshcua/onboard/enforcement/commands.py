@@ -1,0 +1,62 @@
+"""The commands of a bundle: what a permit's kind, step and link stand for. Built from verified parts alone."""
+
+from collections.abc import Sequence
+
+from rtshcua.model.flat.contract import PLACE, Link, MotionKind
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import unproject
+from rtshcua.onboard.ports import Command
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+
+
+class Commands:
+    """Looks up the command of a step or a link. Raises `LookupError` for one that the bundle does not have."""
+
+    def __init__(self, policy: Policy, mission: Mission) -> None:
+        self._policy = policy
+        self._steps = tuple((invocation, self._geo(invocation.plan.path)) for invocation in mission.invocations)
+
+    def command(self, kind: int, step: int, link: int, token: int) -> Command:
+        """The command, under the token of its permit. A `link` of `-1 - rule` is the target of that degrade rule."""
+        if kind == STEP:
+            return self._of_step(step, token)
+        return self._of_link(self._link(kind, step, link), token)
+
+    def _link(self, kind: int, step: int, link: int) -> Link:
+        if kind == CONTINGENCY_LINK:
+            return self._policy.contingency[_index(link)]
+        if kind != FALLBACK_LINK:
+            raise LookupError(f"no kind {kind}")
+        if link >= 0:
+            return self._steps[_index(step)][0].contract.fallback[link]
+        target = self._policy.rules[-1 - link].target
+        if target is None:
+            raise LookupError(f"rule {-1 - link} has no target")
+        return target
+
+    def _of_step(self, step: int, token: int) -> Command:
+        invocation, geo = self._steps[_index(step)]
+        plan = invocation.plan
+        return Command(token, invocation.contract.name, plan.kind, plan.path, geo, plan.altitude, plan.speed)
+
+    def _of_link(self, link: Link, token: int) -> Command:
+        contract = self._policy.contracts[link.skill]
+        motion = contract.motion
+        path: tuple[int, ...] = ()
+        if motion.kind == MotionKind.FLY:
+            cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
+            path = link.arguments[cell : cell + 2]
+        altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
+        return Command(token, contract.name, motion.kind, path, self._geo(path), altitude, speed)
+
+    def _geo(self, path: Sequence[int]) -> tuple[int, ...]:
+        projection = self._policy.projection
+        return tuple([part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(projection, x, y)])
+
+
+def _index(number: int) -> int:
+    """A list index as a request may give it; Python's own negative ones would name another step."""
+    if number < 0:
+        raise LookupError(f"no number {number}")
+    return number

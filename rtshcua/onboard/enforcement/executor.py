@@ -1,0 +1,133 @@
+"""The executor: the only place that turns a permit into something to send (design section 4.5, mediated dispatch).
+
+It checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
+still the one that flies; that a step waits for its turn, and never follows a return or a landing that a fallback began;
+and that chains go forward only.
+"""
+
+from enum import StrEnum
+
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.ports import Dispatch
+from rtshcua.wire.permit import Permit, open_permit
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
+
+_HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
+_UNTOUCHED = DEGRADE - 1
+_ALWAYS = (1 << 63) - 1  # us
+
+
+class PermitRefusal(StrEnum):
+    """Why a permit sends nothing."""
+
+    FORGED = "permit/forged"
+    USED = "permit/used"
+    LATE = "permit/late"
+    NOT_COVERED = "permit/not-covered"  # a link that does not stand behind this permit
+    LAPSED = "permit/lapsed"  # standing, but its step is over or its flight has landed
+    OUT_OF_TURN = "permit/out-of-turn"  # a step while another runs, or one behind it
+    MISSION_OVER = "permit/mission-over"  # a step after a return or a landing began
+    BACKWARDS = "permit/backwards"  # a link before the one that was flown
+
+
+class Executor:
+    """Checks permits under the session key and remembers what was sent."""
+
+    def __init__(self, key: bytes, commands: Commands) -> None:
+        self._key = key
+        self._commands = commands
+        self._used: set[int] = set()
+        self._step = -1  # the last step that was sent,
+        self._serial = 0  # its permit,
+        self._running = False  # and whether it still runs
+        self._flight: int | None = None  # the first step permit of this flight
+        self._fallback = (-1, _UNTOUCHED)  # the step whose chain was last in use, and the last link sent
+        self._contingency = _UNTOUCHED  # the last link of the contingency that was sent
+        self._homeward = False  # a link began a return or a landing,
+        self._final = False  # and it was one of the contingency
+
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | PermitRefusal:
+        """What to send for a permit at a monotonic time, or why nothing is sent."""
+        permit = open_permit(sealed, self._key)
+        if permit is None:
+            return PermitRefusal.FORGED
+        return self._dispatch(permit, now_us)
+
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | PermitRefusal:
+        """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
+        permit = open_permit(sealed, self._key)
+        if permit is None:
+            return PermitRefusal.FORGED
+        fallback = kind == FALLBACK_LINK
+        if not 0 <= link < (permit.fallbacks if fallback else permit.contingencies):
+            return PermitRefusal.NOT_COVERED
+        if permit.kind != STEP or self._lapsed(permit, fallback=fallback):
+            return PermitRefusal.LAPSED
+        step = permit.step if fallback else -1
+        serial = permit.serial + 1 + link + (0 if fallback else permit.fallbacks)
+        return self._dispatch(Permit(kind, step, link, serial, 0, 0, _ALWAYS), now_us)
+
+    def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | PermitRefusal:
+        if permit.serial in self._used:
+            return PermitRefusal.USED
+        if now_us > permit.not_after_us:
+            return PermitRefusal.LATE
+        refusal = self._refuse_step(permit) if permit.kind == STEP else self._refuse_link(permit)
+        if refusal is not None:
+            return refusal
+        command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial)
+        self._used.add(permit.serial)
+        if permit.kind == STEP:
+            self._step, self._serial, self._running = permit.step, permit.serial, True
+            self._flight = permit.serial if self._flight is None else self._flight
+        else:
+            self._follow(permit, command.kind in _HOMEWARD)
+        return Dispatch(command, permit.not_after_us, needs_record=permit.kind == STEP)
+
+    def ended(self) -> None:
+        """The running step ended, however it did: the next may be sent."""
+        self._running = False
+
+    def landed(self) -> None:
+        """The vehicle landed: standing permits lapse."""
+        self._running = False
+        self._flight = None
+
+    def _follow(self, permit: Permit, homeward: bool) -> None:
+        self._running = False
+        self._homeward = self._homeward or homeward
+        if permit.kind == CONTINGENCY_LINK:
+            self._contingency = permit.link
+            self._final = self._final or homeward
+        else:
+            self._fallback = (permit.step, _position(permit))
+
+    def _refuse_step(self, permit: Permit) -> PermitRefusal | None:
+        if self._homeward:
+            return PermitRefusal.MISSION_OVER
+        if self._running or permit.step <= self._step:
+            return PermitRefusal.OUT_OF_TURN
+        return None
+
+    def _lapsed(self, permit: Permit, *, fallback: bool) -> bool:
+        """Whether nothing stands behind a step's permit: not sent, followed by another step, or landed since."""
+        if self._flight is None or permit.serial not in self._used or permit.serial < self._flight:
+            return True
+        return fallback and permit.serial != self._serial
+
+    def _refuse_link(self, permit: Permit) -> PermitRefusal | None:
+        if permit.kind == CONTINGENCY_LINK:
+            # Holds may come and go; once the contingency brings it home or down, it goes on from there.
+            return PermitRefusal.BACKWARDS if self._final and permit.link < self._contingency else None
+        if permit.step < self._step:
+            return PermitRefusal.LAPSED
+        step, last = self._fallback
+        if self._final or (permit.step == step and _position(permit) <= last):
+            return PermitRefusal.BACKWARDS
+        return None
+
+
+def _position(permit: Permit) -> int:
+    """Where in its chain a fallback permit stands: a degrade rule's target comes before the first link."""
+    return max(permit.link, DEGRADE)

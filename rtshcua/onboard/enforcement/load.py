@@ -1,0 +1,109 @@
+"""`load`: from the bytes of a bundle to a boundary that may decide, once. All signatures are verified here.
+
+Checked, in this order: that the mode may be used with this peer; then by `open_bundle` the signatures, that each key
+may speak for its duty, vehicle, role and source, the format versions, and every binding; then by `prepare` that
+policy and mission make sense, and that the mission only tightens; last that the requests of this policy fit the wire.
+"""
+
+from enum import StrEnum
+from typing import Final
+
+import msgspec
+
+from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
+from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.executor import Executor
+from rtshcua.onboard.enforcement.mint import Mint
+from rtshcua.onboard.ports import Boundary
+from rtshcua.wire.bundle import Bundle, open_bundle
+from rtshcua.wire.request import MAX_AGE_US, MAX_SLOTS
+from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.untrusted import Untrusted
+
+#: length of a session key in bytes
+SESSION_KEY_BYTES: Final = 32
+
+
+class Mode(StrEnum):
+    """How `enforce` is kept apart from the runtime. `NONE` enforces nothing: for measuring, in simulation only."""
+
+    NONE = "none"
+    SOFTWARE = "software"
+
+
+class LoadRefusal(msgspec.Struct, frozen=True):
+    """Why a bundle does not run here: a stable slug, and a text for a person."""
+
+    slug: str
+    text: str
+
+
+class Loaded(msgspec.Struct, frozen=True):
+    """A bundle in force: the boundary and the executor that share the session key, and the verified parts."""
+
+    boundary: Boundary
+    executor: Executor
+    bundle: Bundle
+    policy: PreparedPolicy
+    invocations: tuple[PreparedInvocation, ...]
+    vehicle: str
+    mode: Mode
+
+    @property
+    def expires_us(self) -> int:
+        """The UTC time in us after which no step of this bundle can be fresh: until then its replay must be refused."""
+        return max(
+            prepared.invocation.issued_at_us + prepared.invocation.contract.validity_us for prepared in self.invocations
+        )
+
+
+def load(
+    bundle: bytes,
+    *,
+    root: TrustRoot,
+    vehicle: str,
+    now: Now,
+    mode: Mode,
+    session_key: bytes,
+    peer_is_own_simulator: bool,
+) -> Loaded | LoadRefusal:
+    """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else.
+
+    Raises ValueError for a session key of another length; whatever is wrong with the bundle is a `LoadRefusal`.
+    """
+    if len(session_key) != SESSION_KEY_BYTES:
+        raise ValueError(f"a session key has {SESSION_KEY_BYTES} bytes, not {len(session_key)}")
+    if mode is Mode.NONE and not peer_is_own_simulator:
+        return LoadRefusal("mode-refused", "mode `none` flies nothing but the simulated vehicle that this run started")
+    try:
+        opened = open_bundle(bundle, root=root, vehicle=vehicle, now_us=now.utc_us)
+    except Untrusted as error:
+        return LoadRefusal(error.slug, str(error))
+    policy = prepare(opened.policy)
+    if isinstance(policy, Malformed):
+        return LoadRefusal("malformed", f"the policy does not make sense: {policy.what}")
+    invocations = prepare_mission(opened.mission, policy)
+    if isinstance(invocations, Malformed):
+        return LoadRefusal("malformed", f"the mission does not make sense: {invocations.what}")
+    if problem := _does_not_fit(opened.policy) or (not invocations and "the mission has no step"):
+        return LoadRefusal("malformed", problem)
+    boundary = SoftwareBoundary(
+        policy, invocations, opened.policy_digest, vehicle, Mint(session_key), enforced=mode is not Mode.NONE
+    )
+    executor = Executor(session_key, Commands(opened.policy, opened.mission))
+    return Loaded(boundary, executor, opened, policy, invocations, vehicle, mode)
+
+
+def _does_not_fit(policy: Policy) -> str | None:
+    if policy.slots > MAX_SLOTS:
+        return f"the state has {policy.slots} slots; a request has room for {MAX_SLOTS}"
+    for signal in policy.signals:
+        if signal.stale_us >= MAX_AGE_US:
+            return f"signal `{signal.name}` grows stale later than a request can tell"
+    if not policy.contingency:
+        return "the policy has no contingency"
+    return None

@@ -1,0 +1,24 @@
+"""The mint: makes permits under the session key, each with a serial of its own."""
+
+from rtshcua.wire.permit import Permit, seal
+from rtshcua.wire.request import STEP
+
+
+class Mint:
+    """Seals permits. Only a boundary has one, and only what decides calls it."""
+
+    def __init__(self, key: bytes) -> None:
+        self._key = key
+        self._serial = 1
+
+    def step(self, step: int, not_after_us: int, fallbacks: int, contingencies: int) -> bytes:
+        """A step's permit, which stands for so many links of its chain and of the contingency too."""
+        serial = self._serial
+        self._serial += 1 + fallbacks + contingencies
+        return seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us), self._key)
+
+    def link(self, kind: int, step: int, link: int, not_after_us: int) -> bytes:
+        """A permit for a link that was just decided."""
+        serial = self._serial
+        self._serial += 1
+        return seal(Permit(kind, step, link, serial, 0, 0, not_after_us), self._key)

@@ -1,0 +1,244 @@
+"""The ports of the onboard wing: what the pure runtime exchanges with the world, and who it expects on the other side.
+
+Events come in, actions go out; `adapters` (a real link) and `simulation` in virtual time drive the same runtime. All
+times are in us; `at_us` is monotonic.
+"""
+
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import Protocol, dataclass_transform
+
+import msgspec
+
+from rtshcua.model.flat.situation import Now
+
+
+@dataclass_transform(frozen_default=True)
+class Frozen(msgspec.Struct, frozen=True):
+    """The base of events, actions and commands."""
+
+
+# ---------------------------------------------------------------- events
+
+
+class Readings(Frozen, frozen=True):
+    """Signals that one frame carried: (state slot, canonical integer or None for "reported as not known")."""
+
+    at_us: int
+    values: tuple[tuple[int, int | None], ...]
+
+
+class Ready(Frozen, frozen=True):
+    """The vehicle is connected, its estimator has a position and it would accept arming."""
+
+    at_us: int
+
+
+class AirState(Frozen, frozen=True):
+    """What the vehicle says of itself: armed, and in the air (EXTENDED_SYS_STATE, or the flavour's equivalent)."""
+
+    at_us: int
+    armed: bool
+    airborne: bool
+
+
+class Sent(Frozen, frozen=True):
+    """The first frame of command `token` went out at `at_us`: what admission and dispatch took is measured with it."""
+
+    at_us: int
+    token: int
+
+
+class Succeeded(Frozen, frozen=True):
+    """The effect of command `token` was observed: arrived, climbed, landed and disarmed."""
+
+    at_us: int
+    token: int
+
+
+class Failed(Frozen, frozen=True):
+    """Command `token` was refused by the vehicle, or its effect did not come.
+
+    `text` is the vehicle's own, untrusted.
+    """
+
+    at_us: int
+    token: int
+    reason: str
+    text: str = ""
+
+
+class TakenOver(Frozen, frozen=True):
+    """Someone else changed the flight mode: the pilot, or the autopilot's own failsafe. It wins."""
+
+    at_us: int
+    mode: str
+
+
+class LinkLost(Frozen, frozen=True):
+    """No heartbeat of the vehicle for longer than the link's limit."""
+
+    at_us: int
+
+
+class LinkBack(Frozen, frozen=True):
+    """Heartbeats are back after `LinkLost`."""
+
+    at_us: int
+
+
+class Interrupted(Frozen, frozen=True):
+    """The operator asked this program to stop (SIGINT, SIGTERM): fall back first, then end."""
+
+    at_us: int
+
+
+class EvidenceFailed(Frozen, frozen=True):
+    """The evidence sink cannot take records any more (disk full, I/O error)."""
+
+    at_us: int
+    reason: str
+
+
+Event = (
+    Readings
+    | Ready
+    | AirState
+    | Sent
+    | Succeeded
+    | Failed
+    | TakenOver
+    | LinkLost
+    | LinkBack
+    | Interrupted
+    | EvidenceFailed
+)
+
+
+# ---------------------------------------------------------------- commands and actions
+
+
+class Command(Frozen, frozen=True):
+    """One bounded manoeuvre for the vehicle adapter; it exists only beside a permit.
+
+    `kind` is a `MotionKind`. `path` is x0, y0, ... in local mm (east, north of declared home) with `geo` the same
+    points as latitude, longitude in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s (0: the vehicle's
+    own default). A HOLD succeeds after `hold_us` of observed holding; with 0 it goes on until another command
+    replaces it.
+    """
+
+    token: int
+    skill: str
+    kind: int
+    path: tuple[int, ...]
+    geo: tuple[int, ...]
+    altitude: int
+    speed: int
+    hold_us: int = 0
+
+
+class Ending(StrEnum):
+    """How a mission run ended; each has its exit code in `diagnostics.exits`."""
+
+    COMPLETED = "completed"  # all steps observed done, landed
+    ABORTED = "aborted"  # a fallback or the contingency brought it down, or home
+    REFUSED = "refused"  # nothing ever flew: refused on the ground
+    STOOD_DOWN = "stood-down"  # the pilot or the autopilot took over
+    LINK_LOST = "link-lost"  # the vehicle went silent
+    INTERRUPTED = "interrupted"  # the operator stopped it; it fell back first
+    EVIDENCE_LOST = "evidence-lost"  # nothing could be recorded any more
+
+
+class Dispatch(Frozen, frozen=True):
+    """Send `command`; the permit was checked by the executor in the same step.
+
+    Whoever sends it looks at the clock again: after `not_after_us` it is not sent, and `Failed` with reason `late`
+    says so. `needs_record`: nor is it when an `Append` before it could not be written (`withheld`); a fallback goes out
+    even then.
+    """
+
+    command: Command
+    not_after_us: int
+    needs_record: bool
+
+
+class Release(Frozen, frozen=True):
+    """Stand down: send nothing more that moves the vehicle."""
+
+
+class Append(Frozen, frozen=True):
+    """Append one evidence line (with its newline). Stands before every action that depends on it."""
+
+    line: bytes
+    durable: bool
+
+
+class Show(Frozen, frozen=True):
+    """Something a person watching would like to know; never needed for the flight."""
+
+    kind: str
+    text: str
+    step: int = -1
+
+
+class End(Frozen, frozen=True):
+    """The run is over."""
+
+    ending: Ending
+
+
+Action = Dispatch | Release | Append | Show | End
+
+
+class Boundary(Protocol):
+    """The enforcement boundary after `load`: bytes in, bytes out, the same in process, isolated, or in another
+    world.
+    """
+
+    def enforce(self, request: bytes) -> bytes:
+        """Decide one request; the answer is a decision with, on `allow`, permits."""
+        ...
+
+
+class Clock(Protocol):
+    """The only source of time."""
+
+    def now(self) -> Now:
+        """Monotonic us, UTC us and the bound on its error."""
+        ...
+
+
+class Vehicle(Protocol):
+    """A vehicle behind its adapter: telemetry becomes events, commands become frames."""
+
+    def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
+        """Wait at most `timeout_us` for frames, and return what happened up to then."""
+        ...
+
+    def begin(self, command: Command, now_us: int) -> None:
+        """Start the manoeuvre; a command under way is replaced. Its outcome comes as an event with its token."""
+        ...
+
+    def release(self) -> None:
+        """Stand down: send nothing more that moves the vehicle."""
+        ...
+
+
+class EvidenceSink(Protocol):
+    """Where evidence lines go. Raises OSError when it cannot take one; nothing is lost silently."""
+
+    def append(self, line: bytes, durable: bool) -> None:
+        """Write one line; `durable` returns only when it is on the disk."""
+        ...
+
+    def close(self) -> None:
+        """Flush and close."""
+        ...
+
+
+class ReplayStore(Protocol):
+    """Which bundles were opened on this vehicle, synced to disk before anything of them flies."""
+
+    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int) -> bool:
+        """False when the bundle was opened before (also by a run that crashed)."""
+        ...

@@ -1,0 +1,1 @@
+"""The runtime: mission queue, state monitor, supervisor, fallbacks. Sans-I/O: events in, actions out."""

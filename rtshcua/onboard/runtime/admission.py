@@ -1,0 +1,132 @@
+"""Admission: asks the boundary, and records each answer before anyone acts on it."""
+
+from collections import deque
+
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.policy import Airspace, Rule
+from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Show
+from rtshcua.onboard.runtime.flight import Key
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.queue import InvocationQueue
+from rtshcua.onboard.runtime.remaining import RemainingLatency
+from rtshcua.onboard.runtime.view import Decided
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Request, encode
+from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, decode, own_clauses, shared_clauses
+
+#: how many decisions a display is shown
+SHOWN = 6
+
+
+class Admission:
+    """Builds requests, reads answers, records them.
+
+    An answer about a step that equals the one before is counted and not recorded again, so that a deferral does not
+    flood the log; `flush` records the count.
+    """
+
+    def __init__(self, loaded: Loaded, journal: Journal, queue: InvocationQueue, remaining: RemainingLatency) -> None:
+        self._loaded = loaded
+        self._journal = journal
+        self._queue = queue
+        self._remaining = remaining
+        self.recent: deque[Decided] = deque(maxlen=SHOWN)
+        self._policy = loaded.bundle.policy
+        self._shared = shared_clauses(self._policy)
+        self._last: tuple[int, tuple[object, ...]] | None = None
+        self._repeated = 0
+
+    def ask(self, now: Now, state: State, key: Key) -> Answer | None:
+        """The boundary's answer about a step or link (kind, step, link); None when it did not decide."""
+        kind, step, link = key
+        released_us = self._queue.released_us or 0  # 0: nothing was released yet, and only the contingency may fly
+        phase, remaining_us = self._queue.phase, self._remaining.us
+        binding, identity = self._bound(kind, step)
+        data = self._loaded.boundary.enforce(
+            encode(Request(kind, step, link, binding, now, state, released_us, phase, remaining_us))
+        )
+        answer = decode(data)
+        if not isinstance(answer, Answer):
+            text = answer.name.lower() if isinstance(answer, Status) else answer.text
+            self._journal.effect(now, "undecided", kind=kind, step=step, link=link, detail=text)
+            return None
+        if kind == STEP:
+            last = (step, (answer.outcome, answer.reason, answer.clause, answer.target))
+            if last == self._last and not answer.permit:
+                self._repeated += 1
+                return answer
+            self.flush(now)
+            self._last = last
+        context = Context(
+            binding, self._loaded.vehicle, self._policy.version, answer.consumed, released_us, phase, remaining_us, ()
+        )
+        clause = self._clause(step, answer)
+        target = self._target(step, answer)
+        self._show(now, key, answer, "" if clause is None else clause.text)
+        self._journal.line(
+            self._journal.recorder.decision(
+                now,
+                kind=kind,
+                step=step,
+                link=link,
+                invocation=identity,
+                state=state,
+                context=context,
+                outcome=answer.outcome,
+                reason=answer.reason,
+                rule_step=answer.rule_step,
+                clause=None if clause is None else clause.text,
+                clause_at=None if clause is None else (clause.source, clause.start, clause.end),
+                target=None if target is None else target.text,
+                target_link=max(answer.target, -1),
+                valid_until_us=answer.valid_until_us,
+            )
+        )
+        return answer
+
+    def flush(self, now: Now) -> None:
+        """Record how often the last answer was given again."""
+        if self._last is not None and self._repeated:
+            self._journal.effect(now, "repeated", kind=STEP, step=self._last[0], detail=str(self._repeated))
+        self._last = None
+        self._repeated = 0
+
+    def _clause(self, step: int, answer: Answer) -> Clause | Rule | Airspace | None:
+        """The clause that decided, found by its number."""
+        if answer.clause == NO_CLAUSE:
+            return None
+        if answer.clause < len(self._shared):
+            return self._shared[answer.clause]
+        own = own_clauses(self._loaded.invocations[step].invocation.contract)
+        return own[answer.clause - len(self._shared)]
+
+    def _show(self, now: Now, key: Key, answer: Answer, clause: str) -> None:
+        subject = self._subject(*key)
+        self.recent.append(Decided(now.monotonic_us, subject, answer.outcome.name.lower(), answer.reason, clause))
+        text = f"{answer.outcome.name.lower()} {subject}: {answer.reason}" + (f" (`{clause}`)" if clause else "")
+        self._journal.add(Show("decision", text, key[1]))
+
+    def _subject(self, kind: int, step: int, link: int) -> str:
+        if kind == STEP:
+            return self._loaded.invocations[step].invocation.text
+        if link == DEGRADE:
+            return "the target of a degrade rule"
+        chain = self._policy.contingency
+        if kind == FALLBACK_LINK:
+            chain = self._loaded.invocations[step].invocation.contract.fallback
+        return chain[link].text
+
+    def _bound(self, kind: int, step: int) -> tuple[bytes, bytes]:
+        if kind == CONTINGENCY_LINK:
+            return self._loaded.bundle.policy_digest, b""
+        invocation = self._loaded.invocations[step].invocation
+        return invocation.binding, invocation.invocation_id
+
+    def _target(self, step: int, answer: Answer) -> Link | None:
+        if answer.target == NO_TARGET:
+            return None
+        if answer.target >= 0:
+            return self._loaded.invocations[step].invocation.contract.fallback[answer.target]
+        return self._policy.rules[-1 - answer.target].target

@@ -1,0 +1,254 @@
+"""The conduct of a mission: what is to be done now, by stage (design section 4.4).
+
+What a step that is not admitted does: denied in the air, the contingency flies, and nothing that the step itself says
+is listened to. Deferred, it is asked for again until its deadline, in the air under a hold. Else `on inadmissible`
+counts: `skip` goes on with the next step, `hold` waits like a deferral, `abort` flies the step's fallback and, when
+that is used up, the contingency. On the ground nothing is sent, and the run ends.
+"""
+
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
+from rtshcua.model.flat.situation import Now
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import End, Ending
+from rtshcua.onboard.runtime.admission import Admission
+from rtshcua.onboard.runtime.craft import Craft
+from rtshcua.onboard.runtime.dispatcher import Dispatcher
+from rtshcua.onboard.runtime.fallback import Fallback, Progress
+from rtshcua.onboard.runtime.flight import Limits, Stage, hold_us
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.monitor import StateMonitor
+from rtshcua.onboard.runtime.queue import InvocationQueue
+from rtshcua.onboard.runtime.remaining import RemainingLatency
+from rtshcua.onboard.runtime.supervisor import Supervisor
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.response import Answer
+
+#: what ends a run matters more the further down it stands
+_GRAVITY = (Ending.ABORTED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
+
+
+class Conduct:
+    """The state of a run, and its turns. `ending` is None until it ended."""
+
+    def __init__(self, loaded: Loaded, journal: Journal, limits: Limits, *, resumed: bool) -> None:
+        self.loaded = loaded
+        self.stage = Stage.WAITING
+        self.ending: Ending | None = None
+        self.craft = Craft()
+        self.queue = InvocationQueue(loaded.bundle.mission)
+        self.monitor = StateMonitor(loaded.bundle.policy.slots)
+        remaining = RemainingLatency()
+        self.admission = Admission(loaded, journal, self.queue, remaining)
+        self.dispatcher = Dispatcher(loaded.executor, journal, remaining)
+        self.fresh = True  # something was received, or began, since the current step was last asked for
+        self._journal = journal
+        self._limits = limits
+        self._resumed = resumed
+        self._fallback = Fallback(loaded, self.admission, self.dispatcher, limits)
+        self._supervisor: Supervisor | None = None
+        self._cause: Ending | None = None
+        self._began_us: int | None = None
+        self._asked_us = 0
+        self._held = False  # a hold for the current step was tried
+
+    @property
+    def aloft(self) -> bool:
+        """Whether a motion command may be needed: in the air, as far as is known, or with a command under way."""
+        if self.dispatcher.active is not None or self.craft.airborne:
+            return True
+        return self.craft.airborne is None and self.dispatcher.dispatched
+
+    def turn(self, now: Now) -> bool:
+        """Do one thing that can be done now; False when there is none left."""
+        self._began_us = now.monotonic_us if self._began_us is None else self._began_us
+        lost_since_us = self.craft.lost_since_us
+        if lost_since_us is not None:
+            if now.monotonic_us - lost_since_us > self._limits.silent_us:
+                self.stand_down(now, Ending.LINK_LOST)
+            return False  # nothing that is sent would arrive
+        match self.stage:
+            case Stage.WAITING:
+                return self._wait(now, self._began_us)
+            case Stage.DECIDING:
+                return self._decide(now)
+            case Stage.RUNNING:
+                return self._supervise(now)
+            case Stage.FALLING:
+                return self._fall(now)
+            case Stage.ENDED:
+                return False
+
+    # -------------------------------------------------------- what ends a run, or turns it homeward
+
+    def break_off(self, now: Now, cause: Ending) -> None:
+        """Give the mission up: what runs falls back, in the air the contingency flies, on the ground the run ends."""
+        self._blame(cause)
+        if not self.aloft:
+            self.end(now, cause)
+        elif self.stage is Stage.RUNNING:
+            self.fall_back(FALLBACK_LINK, cause)
+        elif self.stage is not Stage.FALLING:
+            self.fall_back(CONTINGENCY_LINK, cause)
+
+    def fall_back(self, kind: int, cause: Ending = Ending.ABORTED) -> None:
+        """Fly the current step's chain, or the contingency, down to the ground."""
+        self._blame(cause)
+        current = self.queue.current
+        self._fallback.begin(kind, current.step if current is not None and kind == FALLBACK_LINK else -1)
+        self.stage = Stage.FALLING
+
+    def stand_down(self, now: Now, ending: Ending) -> None:
+        """Send nothing more, whatever flies, and end."""
+        self.dispatcher.release(now)
+        self._journal.effect(now, "stood-down")
+        self.end(now, ending)
+
+    def end(self, now: Now, ending: Ending) -> None:
+        """End the run."""
+        self.admission.flush(now)
+        self.stage = Stage.ENDED
+        self.ending = ending
+        self._journal.add(End(ending))
+
+    def down(self, now: Now) -> None:
+        """The vehicle is on the ground again: the flight is over, and with it a fallback."""
+        self.dispatcher.landed()
+        self.craft.airborne = False
+        if self.stage is Stage.FALLING:
+            self.end(now, self._cause or Ending.ABORTED)
+
+    def advance(self, now: Now) -> None:
+        """The current step is done, or skipped."""
+        self.queue.advance(now.monotonic_us)
+        self._supervisor = None
+        self._held = False
+        self.fresh = True
+        self.stage = Stage.DECIDING
+
+    def _blame(self, cause: Ending) -> None:
+        if self._cause is None or _GRAVITY.index(cause) > _GRAVITY.index(self._cause):
+            self._cause = cause
+
+    def _give_up(self, now: Now) -> bool:
+        """End on the ground; refused if nothing ever flew."""
+        self.end(now, self._cause or (Ending.ABORTED if self.craft.flown else Ending.REFUSED))
+        return False
+
+    # -------------------------------------------------------- turns
+
+    def _wait(self, now: Now, began_us: int) -> bool:
+        craft = self.craft
+        if not craft.ready or craft.airborne is None:
+            if now.monotonic_us - began_us > self._limits.ready_us:
+                self._journal.effect(now, "never-ready")
+                self._give_up(now)
+            return False
+        self._journal.effect(now, "ready")
+        if self._resumed and craft.airborne:
+            self._journal.effect(now, "resumed")
+            self.fall_back(CONTINGENCY_LINK)
+            return True
+        if self._resumed or craft.airborne:
+            # A flight that this run did not begin is someone else's, and a bundle flies once.
+            self._journal.effect(now, "resumed" if self._resumed else "already-airborne")
+            return self._give_up(now)
+        self.queue.release(now.monotonic_us)
+        self.stage = Stage.DECIDING
+        return True
+
+    def _decide(self, now: Now) -> bool:
+        invocation = self.queue.current
+        if invocation is None:
+            return self._finish(now)
+        if not self.fresh and now.monotonic_us - self._asked_us < self._limits.again_us:
+            return False
+        self.fresh, self._asked_us = False, now.monotonic_us
+        state = self.monitor.state(now.monotonic_us)
+        answer = self.admission.ask(now, state, (STEP, invocation.step, -1))
+        if answer is None or (answer.outcome is Outcome.DENY and not answer.permit):
+            if not self.aloft:
+                return self._give_up(now)
+            self.fall_back(CONTINGENCY_LINK)
+            return True
+        if answer.permit:
+            return self._start(now, invocation, answer)
+        if self._may_wait(now, invocation, answer):
+            self._hold(now)
+            return False
+        return self._inadmissible(now, invocation)
+
+    def _finish(self, now: Now) -> bool:
+        if not self.aloft:
+            self.end(now, Ending.COMPLETED)
+            return False
+        self._journal.effect(now, "not-landed")
+        self.fall_back(CONTINGENCY_LINK)
+        return True
+
+    def _start(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
+        lasting_us = hold_us(invocation.contract, invocation.arguments)
+        if not self.dispatcher.fly(now, answer.permit, (STEP, invocation.step, -1), lasting_us):
+            return self._inadmissible(now, invocation)
+        prepared = self.loaded.invocations[invocation.step]
+        self._supervisor = Supervisor(prepared, self.loaded.policy, now.monotonic_us)
+        self.stage = Stage.RUNNING
+        return False
+
+    def _may_wait(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
+        """Whether asking again can help: not past the deadline, but for an approval, which has a time of its own."""
+        if answer.reason is Reason.AWAITING_APPROVAL:
+            return True
+        holds = invocation.on_inadmissible == OnInadmissible.HOLD and answer.reason is not Reason.NO_SLACK
+        released_us = self.queue.released_us or 0
+        in_time = now.monotonic_us < released_us + invocation.contract.deadline_us
+        return in_time and (answer.outcome is Outcome.DEFER or holds)
+
+    def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
+        if invocation.on_inadmissible == OnInadmissible.SKIP:
+            self._journal.effect(now, "skipped", kind=STEP, step=invocation.step)
+            self.advance(now)
+            return True
+        if not self.aloft:
+            return self._give_up(now)
+        self.fall_back(FALLBACK_LINK)
+        return True
+
+    def _hold(self, now: Now) -> None:
+        """In the air, a step that waits does so under the first hold of the contingency; once, for a hold goes on."""
+        if self._held or not self.aloft or self.dispatcher.active is not None:
+            return
+        self._held = True
+        policy = self.loaded.bundle.policy
+        for index, link in enumerate(policy.contingency):
+            if policy.contracts[link.skill].motion.kind == MotionKind.HOLD:
+                key = (CONTINGENCY_LINK, -1, index)
+                answer = self.admission.ask(now, self.monitor.state(now.monotonic_us), key)
+                if answer is not None and answer.permit:
+                    self.dispatcher.fly(now, answer.permit, key, None)
+                return
+
+    def _supervise(self, now: Now) -> bool:
+        active, supervisor = self.dispatcher.active, self._supervisor
+        if active is None or supervisor is None:
+            return False
+        if active.until_us is not None and now.monotonic_us >= active.until_us:
+            self.dispatcher.end(now, "succeeded")
+            self.advance(now)
+            return True
+        violated = supervisor.violated(self.monitor.state(now.monotonic_us), now)
+        if violated is None:
+            return False
+        self.dispatcher.end(now, "violated", violated)
+        self.fall_back(FALLBACK_LINK)
+        return True
+
+    def _fall(self, now: Now) -> bool:
+        if self.dispatcher.active is None and self.craft.at_rest:
+            self.down(now)
+            return False
+        if self._fallback.turn(now, self.monitor.state(now.monotonic_us)) is Progress.STRANDED:
+            self._journal.effect(now, "stranded")
+            self.stand_down(now, self._cause or Ending.ABORTED)
+        return False

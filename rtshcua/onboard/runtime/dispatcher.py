@@ -1,0 +1,88 @@
+"""The dispatcher: hands permits to the executor, and keeps the one command that flies."""
+
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal
+from rtshcua.onboard.ports import Dispatch, Release
+from rtshcua.onboard.runtime.flight import Active, Key
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.remaining import RemainingLatency
+from rtshcua.wire.request import FALLBACK_LINK, STEP
+
+
+class Dispatcher:
+    """At most one command flies; a new one replaces it."""
+
+    def __init__(self, executor: Executor, journal: Journal, remaining: RemainingLatency) -> None:
+        self._executor = executor
+        self._journal = journal
+        self._remaining = remaining
+        self.active: Active | None = None
+        self.dispatched = False
+        self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
+
+    def fly(self, now: Now, permit: bytes, key: Key, lasting_us: int | None) -> bool:
+        """Dispatch what the permit is for, to be over after `lasting_us` (None: when it succeeds or fails).
+
+        False if the executor refused, and then nothing is sent.
+        """
+        sent = self._send(now, self._executor.dispatch(permit, now.monotonic_us), key, lasting_us)
+        if sent and key[0] == STEP:
+            self._standing = (key[1], permit)
+        return sent
+
+    def stand_in(self, now: Now, key: Key, lasting_us: int) -> bool:
+        """As `fly`, for a link, by the permit of the last step that was sent, which stands for it."""
+        kind, step, link = key
+        if self._standing is None or (kind == FALLBACK_LINK and self._standing[0] != step):
+            return False
+        permit = self._standing[1]
+        return self._send(now, self._executor.stand_in(permit, kind, link, now.monotonic_us), key, lasting_us)
+
+    def _send(self, now: Now, dispatch: Dispatch | PermitRefusal, key: Key, lasting_us: int | None) -> bool:
+        kind, step, link = key
+        if isinstance(dispatch, PermitRefusal):
+            self._journal.effect(now, "refused", kind=kind, step=step, link=link, detail=dispatch)
+            return False
+        at_us, command = now.monotonic_us, dispatch.command
+        self.end(now, "replaced")
+        self._journal.add(dispatch)
+        self.active = Active(kind, step, link, command, at_us, None if lasting_us is None else at_us + lasting_us)
+        self.dispatched = True
+        token, skill = command.token, command.skill
+        self._journal.effect(now, "dispatched", kind=kind, step=step, link=link, token=token, detail=skill)
+        return True
+
+    def sent(self, token: int, at_us: int) -> None:
+        """The first frame of a command went out: one measurement of `L_rem`."""
+        if self.active is not None and self.active.command.token == token:
+            self._remaining.measured(at_us - self.active.since_us)
+
+    def flies(self, token: int) -> bool:
+        """Whether this is the command that flies; a late word about another one means nothing any more."""
+        return self.active is not None and self.active.command.token == token
+
+    def end(self, now: Now, event: str, detail: str = "") -> None:
+        """The command that flies ended: record how."""
+        active = self.active
+        if active is None:
+            return
+        self._journal.effect(
+            now,
+            event,
+            kind=active.kind,
+            step=active.step,
+            link=active.link,
+            token=active.command.token,
+            detail=detail,
+        )
+        self._executor.ended()
+        self.active = None
+
+    def landed(self) -> None:
+        """The flight is over: standing permits lapse."""
+        self._executor.landed()
+
+    def release(self, now: Now) -> None:
+        """Stand down: send nothing more."""
+        self.end(now, "released")
+        self._journal.add(Release())

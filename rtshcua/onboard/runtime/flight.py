@@ -1,0 +1,81 @@
+"""What flies now, and where a chain of fallbacks stands."""
+
+from enum import StrEnum
+from typing import TypeAlias
+
+import msgspec
+
+from rtshcua.model.flat.contract import Contract, Link, MotionKind
+from rtshcua.onboard.ports import Command, Frozen
+
+
+class Stage(StrEnum):
+    """Where a run stands."""
+
+    WAITING = "waiting"  # for the vehicle to be ready
+    DECIDING = "deciding"  # about the current step; on the ground, or holding
+    RUNNING = "running"  # the current step flies
+    FALLING = "falling-back"  # a chain flies, down to the ground
+    ENDED = "ended"
+
+
+class Limits(Frozen):
+    """How long the runtime waits for the world, in us.
+
+    `ready_us` for a vehicle that is ready, `silent_us` for a lost link to come back. The last link of the contingency
+    has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us` bounds how long a deferred step is
+    left without asking again when nothing was received.
+    """
+
+    ready_us: int = 120_000_000
+    silent_us: int = 30_000_000
+    retry_us: int = 2_000_000
+    tries: int = 5
+    again_us: int = 100_000
+
+
+#: kind, step and link, as in requests, permits and the log
+Key: TypeAlias = tuple[int, int, int]
+
+
+class Active(Frozen):
+    """A command that was dispatched and has not ended; it is over by itself at `until_us`, if there is such a time."""
+
+    kind: int
+    step: int
+    link: int
+    command: Command
+    since_us: int
+    until_us: int | None
+
+    @property
+    def key(self) -> Key:
+        """The (kind, step, link) of the permit that it flies under."""
+        return self.kind, self.step, self.link
+
+    @property
+    def homeward(self) -> bool:
+        """Whether its success is a landing."""
+        return self.command.kind in (MotionKind.HOME, MotionKind.LAND)
+
+
+class Chain(msgspec.Struct):
+    """A chain that is being flown: its kind, the step it belongs to (-1: the contingency), and the last link used."""
+
+    kind: int
+    step: int
+    after: int
+    tried: int = 0
+    wait_until_us: int = 0
+
+
+def hold_us(contract: Contract, arguments: tuple[int, ...]) -> int | None:
+    """How long a skill that holds is to hold (`hold for time`), None where it does not say."""
+    if contract.motion.kind != MotionKind.HOLD or contract.motion.time < 0:
+        return None
+    return arguments[contract.motion.time]
+
+
+def link_us(link: Link, contract: Contract, endurance_us: int) -> int:
+    """How long a link may take: its own limit, the time it holds, its skill's, or as long as anything can fly."""
+    return link.limit_us or hold_us(contract, link.arguments) or contract.duration_us or endurance_us

@@ -1,0 +1,118 @@
+"""What each event means: it changes what is known, and sometimes the stage; what follows is `Conduct.turn`'s."""
+
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.ports import (
+    AirState,
+    Ending,
+    Event,
+    EvidenceFailed,
+    Failed,
+    Interrupted,
+    LinkBack,
+    LinkLost,
+    Readings,
+    Ready,
+    Sent,
+    Succeeded,
+    TakenOver,
+)
+from rtshcua.onboard.runtime.conduct import Conduct
+from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.wire.request import FALLBACK_LINK
+
+
+class Happenings:
+    """Takes events over into a `Conduct`, and records those that matter."""
+
+    def __init__(self, conduct: Conduct, journal: Journal) -> None:
+        self._conduct = conduct
+        self._journal = journal
+        self._gap = False
+
+    def take(self, now: Now, event: Event) -> None:
+        """Take one event over. All are total: a late, repeated or senseless one changes nothing."""
+        conduct = self._conduct
+        match event:
+            case Readings():
+                conduct.monitor.update(event)
+                conduct.fresh = True
+            case Ready():
+                conduct.craft.ready = True
+            case AirState():
+                self._air(now, event)
+            case Sent():
+                conduct.dispatcher.sent(event.token, event.at_us)
+            case Succeeded():
+                self._succeeded(now, event.token)
+            case Failed():
+                self._failed(now, event)
+            case TakenOver():
+                self._journal.effect(now, "taken-over", detail=event.mode)
+                conduct.stand_down(now, Ending.STOOD_DOWN)
+            case LinkLost() | LinkBack():
+                self._link(now, lost=isinstance(event, LinkLost))
+            case Interrupted():
+                self._journal.effect(now, "interrupted")
+                conduct.break_off(now, Ending.INTERRUPTED)
+            case EvidenceFailed():
+                self._evidence_failed(now, event.reason)
+
+    def _air(self, now: Now, event: AirState) -> None:
+        conduct, craft = self._conduct, self._conduct.craft
+        was_airborne = craft.airborne
+        craft.armed, craft.airborne = event.armed, event.airborne
+        craft.flown = craft.flown or (event.airborne and conduct.dispatcher.dispatched)
+        if not (was_airborne and craft.at_rest):
+            return
+        active = conduct.dispatcher.active
+        if conduct.stage is Stage.FALLING:
+            conduct.dispatcher.end(now, "landed")
+            conduct.down(now)
+        elif conduct.stage is Stage.RUNNING and active is not None and not active.homeward:
+            # It came down without being told to: whatever ran is over, and nothing is sent to a vehicle on the ground.
+            conduct.dispatcher.end(now, "landed")
+            conduct.dispatcher.landed()
+            conduct.end(now, Ending.ABORTED)
+
+    def _succeeded(self, now: Now, token: int) -> None:
+        conduct = self._conduct
+        active = conduct.dispatcher.active
+        if active is None or not conduct.dispatcher.flies(token):
+            return
+        if active.command.kind == MotionKind.HOLD and (active.until_us is not None or conduct.stage is Stage.DECIDING):
+            return  # the hold is taken up; it is over when its time is, or when something replaces it
+        conduct.dispatcher.end(now, "succeeded")
+        running = conduct.stage is Stage.RUNNING
+        if active.homeward:
+            conduct.down(now)
+        if running:
+            conduct.advance(now)
+
+    def _failed(self, now: Now, event: Failed) -> None:
+        conduct = self._conduct
+        if not conduct.dispatcher.flies(event.token):
+            return
+        conduct.dispatcher.end(now, "failed", f"{event.reason}: {event.text}" if event.text else event.reason)
+        if conduct.stage is not Stage.RUNNING:
+            return
+        if conduct.aloft:
+            conduct.fall_back(FALLBACK_LINK)
+        else:
+            conduct.end(now, Ending.ABORTED if conduct.craft.flown else Ending.REFUSED)
+
+    def _link(self, now: Now, *, lost: bool) -> None:
+        conduct = self._conduct
+        if lost == (conduct.craft.lost_since_us is not None):
+            return
+        conduct.craft.lost_since_us = now.monotonic_us if lost else None
+        conduct.fresh = True
+        self._journal.effect(now, "link-lost" if lost else "link-back")
+
+    def _evidence_failed(self, now: Now, reason: str) -> None:
+        """Recorded once: the record may fail like the others, and be taken up when the sink can write again."""
+        if not self._gap:
+            self._gap = True
+            self._journal.effect(now, "gap", detail=reason)
+        self._conduct.break_off(now, Ending.EVIDENCE_LOST)

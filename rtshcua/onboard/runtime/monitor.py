@@ -1,0 +1,36 @@
+"""The state monitor: keeps the paper's `S_t`, one value and its age a slot, from what the frames carried."""
+
+from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.situation import State
+from rtshcua.onboard.ports import Readings
+from rtshcua.wire.request import MAX_AGE_US
+
+
+class StateMonitor:
+    """Values by state slot, and when each was last reported.
+
+    A value reported as not known, or outside 64 bits, is None. A report older than the one held is set aside: a frame
+    that comes late must not make the state younger. Slots that the policy does not have are ignored.
+    """
+
+    def __init__(self, slots: int) -> None:
+        self._values: list[int | None] = [None] * slots
+        self._stamps: list[int | None] = [None] * slots
+
+    def update(self, readings: Readings) -> None:
+        """Take over what one frame reported at `readings.at_us`."""
+        for slot, value in readings.values:
+            if not 0 <= slot < len(self._values):
+                continue
+            stamp = self._stamps[slot]
+            if stamp is not None and readings.at_us < stamp:
+                continue
+            self._stamps[slot] = readings.at_us
+            self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
+
+    def state(self, now_us: int) -> State:
+        """The state as of `now_us`. Ages saturate at 0 and `MAX_AGE_US`, and are 0 where nothing was ever reported."""
+        return State(
+            values=tuple(self._values),
+            ages=tuple(0 if stamp is None else min(max(now_us - stamp, 0), MAX_AGE_US) for stamp in self._stamps),
+        )

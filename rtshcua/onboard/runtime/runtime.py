@@ -1,0 +1,53 @@
+"""The runtime: events in, actions out; no clock, no I/O, one thread, and the same actions for the same events."""
+
+from collections.abc import Sequence
+
+from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Action, Ending, Event
+from rtshcua.onboard.runtime.conduct import Conduct
+from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.onboard.runtime.happenings import Happenings
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.snapshot import view_of
+from rtshcua.onboard.runtime.view import View
+
+
+class Runtime:
+    """Flies one loaded bundle once.
+
+    The caller has made the log's genesis with `recorder` before, and makes its close after `End`. `resumed` says that
+    an earlier run of this bundle broke off: in the air the contingency brings the vehicle down, on the ground nothing
+    flies.
+    """
+
+    def __init__(
+        self, loaded: Loaded, recorder: Recorder, *, limits: Limits | None = None, resumed: bool = False
+    ) -> None:
+        self._journal = Journal(recorder)
+        self._conduct = Conduct(loaded, self._journal, limits or Limits(), resumed=resumed)
+        self._happenings = Happenings(self._conduct, self._journal)
+
+    @property
+    def ending(self) -> Ending | None:
+        """How the run ended; None while it goes on."""
+        return self._conduct.ending
+
+    def step(self, now: Now, events: Sequence[Event]) -> list[Action]:
+        """What to do at `now`, which never goes back, after `events` in the order in which they happened.
+
+        To be called whenever something happens, and every few tens of ms: times run out without an event. Once the run
+        ended, nothing is done any more.
+        """
+        conduct = self._conduct
+        for event in events:
+            if conduct.stage is not Stage.ENDED:
+                self._happenings.take(now, event)
+        while conduct.turn(now):
+            pass
+        return self._journal.take()
+
+    def view(self, now: Now) -> View:
+        """What a display may show."""
+        return view_of(self._conduct, now.monotonic_us)

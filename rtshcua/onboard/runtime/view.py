@@ -1,0 +1,45 @@
+"""What a display may show of a run: plain data, made on request, with no way back into the runtime."""
+
+from rtshcua.onboard.ports import Ending, Frozen
+from rtshcua.onboard.runtime.flight import Stage
+
+
+class Reading(Frozen):
+    """A signal's canonical value (None: unknown, a position has two), its age in us, and whether it is stale."""
+
+    name: str
+    values: tuple[int | None, ...]
+    age_us: int
+    stale: bool
+
+
+class Decided(Frozen):
+    """One recorded decision, in words."""
+
+    at_us: int
+    subject: str
+    outcome: str
+    reason: str
+    clause: str
+
+
+class View(Frozen):
+    """A snapshot at a monotonic time.
+
+    `contract` names the skill that flies or is being decided; `left_us` counts down to its deadline while deciding,
+    to its time limit while it flies, None where there is none. `step` counts from 0 and is `steps` once all are done.
+    """
+
+    at_us: int
+    stage: Stage
+    phase: str
+    step: int
+    steps: int
+    contract: str
+    left_us: int | None
+    armed: bool | None
+    airborne: bool | None
+    linked: bool
+    signals: tuple[Reading, ...]
+    decisions: tuple[Decided, ...]
+    ending: Ending | None

@@ -1,0 +1,107 @@
+"""Requests to `enforce` (design section 4.5): below 1 KiB, integers and octets only, the same for every boundary.
+
+The body is one string of octets in a fixed layout, big-endian: kind, step, link, the binding presented, the moment
+(monotonic, UTC and its error), the release time, `L_rem` and the phase, then the state's values (8 octets a slot,
+`UNKNOWN` for None) and ages (4 octets a slot). Times are in us. Nothing has a variable width, so one request has one
+encoding, and a boundary in C reads it in place, without a parser.
+"""
+
+from functools import cache
+from struct import Struct
+from typing import Final
+
+import msgspec
+
+from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.wire import artefact, names
+from rtshcua.wire.digest import DIGEST_BYTES
+
+#: what may ask: a mission step, a link of a step's fallback chain, a link of the contingency
+STEP, FALLBACK_LINK, CONTINGENCY_LINK = 0, 1, 2
+#: the `link` that stands for the target of a degrade rule
+DEGRADE: Final = -1
+
+#: the largest request in octets, and the slots of a state with which none is larger
+MAX_SIZE: Final = 1023
+MAX_SLOTS: Final = 72
+#: Ages saturate here, at about 71 minutes; no signal may have a longer time to stale.
+MAX_AGE_US: Final = (1 << 32) - 1
+UNKNOWN: Final = -(1 << 63)
+
+_HEAD: Final = f">Bhh{DIGEST_BYTES}s5QH"
+_HEAD_FIELDS: Final = 10
+
+
+class Request(msgspec.Struct, frozen=True):
+    """What the runtime asks: may this step, or this link, be dispatched now?
+
+    `link` is -1 for a step, and `DEGRADE` for the target of a degrade rule (kind `FALLBACK_LINK`); `step` is -1 for a
+    link of the contingency. `binding` is the invocation's, or for the contingency the policy's digest. `released_us`,
+    `phase` and `remaining_us` are those of `Context`.
+    """
+
+    kind: int
+    step: int
+    link: int
+    binding: bytes
+    now: Now
+    state: State
+    released_us: int
+    phase: int
+    remaining_us: int
+
+
+class Malformed(msgspec.Struct, frozen=True):
+    """The answer to octets that are no request: which rule they break."""
+
+    text: str
+
+
+def encode(request: Request) -> bytes:
+    """The request's octets. Raises `struct.error` for what no monitor and no clock makes."""
+    state, now = request.state, request.now
+    prefix, layout = _form(len(state.values))
+    return prefix + layout.pack(
+        request.kind,
+        request.step,
+        request.link,
+        request.binding,
+        now.monotonic_us,
+        now.utc_us,
+        now.utc_error_us,
+        request.released_us,
+        request.remaining_us,
+        request.phase,
+        *[UNKNOWN if value is None else value for value in state.values],
+        *state.ages,
+    )
+
+
+def decode(data: bytes, slots: int) -> Request | Malformed:
+    """Read a request for a state of `slots` slots. Accepts only the octets that `encode` makes; raises nothing."""
+    prefix, layout = _form(slots)
+    if len(data) != len(prefix) + layout.size or not data.startswith(prefix):
+        return Malformed(f"not a request of version {names.REQUEST.version} for a state of {slots} slots")
+    fields = layout.unpack_from(data, len(prefix))
+    kind, step, link, binding, at_us, utc_us, utc_error_us, released_us, remaining_us, phase = fields[:_HEAD_FIELDS]
+    if kind > CONTINGENCY_LINK or step < -1 or link < -1:
+        return Malformed("a kind, step or link out of range")
+    if max(at_us, utc_us, utc_error_us, released_us, remaining_us) > MAX_VALUE:
+        return Malformed("a time out of range")
+    values: tuple[int | None, ...] = fields[_HEAD_FIELDS : _HEAD_FIELDS + slots]
+    if UNKNOWN in values:
+        values = tuple([None if value == UNKNOWN else value for value in values])
+    if not all([value is None or -MAX_VALUE <= value <= MAX_VALUE for value in values]):  # noqa: C419 - it is faster
+        return Malformed("a state value out of range")
+    ages = fields[_HEAD_FIELDS + slots :]
+    now = Now(at_us, utc_us, utc_error_us)
+    return Request(kind, step, link, binding, now, State(values, ages), released_us, phase, remaining_us)
+
+
+@cache
+def _form(slots: int) -> tuple[bytes, Struct]:
+    """What every request for a state of so many slots begins with, and the layout of what follows."""
+    layout = Struct(f"{_HEAD}{slots}q{slots}I")
+    body = bytes(layout.size)
+    return artefact.wrap(names.REQUEST, body)[: -layout.size], layout

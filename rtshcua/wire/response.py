@@ -1,0 +1,116 @@
+"""Responses of `enforce`: a decision, with a permit where it grants one, or a refusal to decide.
+
+The body is one string of octets in a fixed layout, big-endian: status, outcome, reason number, step of section 4.1,
+clause number, target, `valid_until_us`, consumed, then the permit, if any. In a refusal all but the status is 0.
+"""
+
+from enum import IntEnum
+from struct import Struct
+from typing import Final
+
+import msgspec
+
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.policy import Airspace, Policy, Rule
+from rtshcua.model.outcome import REASON_NUMBERS, WIRE_REASONS, Outcome, Reason
+from rtshcua.wire import artefact, names
+from rtshcua.wire.permit import SIZE
+
+#: `target` where the decision names none: less than `-1 - rule` for any rule
+NO_TARGET: Final = -(1 << 15) - 1
+#: `clause` where the contract itself decided
+NO_CLAUSE: Final = -1
+
+_HEAD: Final = Struct(">BBBBiiqB")
+
+
+class Status(IntEnum):
+    """Whether `enforce` decided, and if not, why."""
+
+    DECIDED = 0
+    MALFORMED = 1  # the octets are no request
+    UNKNOWN_STEP = 2  # the bundle has no such step or link
+    NOT_CURRENT = 3  # the bundle has it, but its turn has not come
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """A decision as it crosses the boundary.
+
+    `clause` counts through `shared_clauses`, then `own_clauses`. `target` is the number of a link of the fallback
+    chain, or `-1 - rule` for the target of a degrade rule. `consumed` is what `decide` was told. `permit` is empty
+    unless one was granted.
+    """
+
+    outcome: Outcome
+    reason: Reason
+    rule_step: int
+    clause: int
+    target: int
+    valid_until_us: int
+    consumed: int
+    permit: bytes = b""
+
+
+class Unusable(msgspec.Struct, frozen=True):
+    """Octets that are no response."""
+
+    text: str
+
+
+def shared_clauses(policy: Policy) -> tuple[Rule | Airspace, ...]:
+    """What can decide any request, numbered by position: the rules, then the airspace if there is one."""
+    return (*policy.rules, *(() if policy.airspace is None else (policy.airspace,)))
+
+
+def own_clauses(contract: Contract) -> tuple[Clause, ...]:
+    """What can decide a request for this contract; numbered on from the shared ones."""
+    return (*contract.require, *contract.assume, *contract.maintain)
+
+
+def encode(answer: Answer) -> bytes:
+    """The octets of a decision."""
+    body = _HEAD.pack(
+        Status.DECIDED,
+        answer.outcome,
+        REASON_NUMBERS[answer.reason],
+        answer.rule_step,
+        answer.clause,
+        answer.target,
+        answer.valid_until_us,
+        answer.consumed,
+    )
+    return (_WITH_PERMIT if answer.permit else _WITHOUT_PERMIT) + body + answer.permit
+
+
+def encode_refusal(status: Status) -> bytes:
+    """The octets of a refusal to decide."""
+    return _WITHOUT_PERMIT + _HEAD.pack(status, 0, 0, 0, 0, 0, 0, 0)
+
+
+def decode(data: bytes) -> Answer | Status | Unusable:
+    """Read a response; a refusal is its status. Raises nothing."""
+    prefix = _WITHOUT_PERMIT if len(data) == len(_WITHOUT_PERMIT) + _HEAD.size else _WITH_PERMIT
+    start = len(prefix) + _HEAD.size
+    if not data.startswith(prefix) or len(data) - start != (SIZE if prefix is _WITH_PERMIT else 0):
+        return Unusable(f"not a response of version {names.RESPONSE.version}")
+    status, outcome, reason, rule_step, *numbers = _HEAD.unpack_from(data, len(prefix))
+    if status != Status.DECIDED:
+        refused = Status(status) if status < len(Status) else None
+        if refused is None or data != encode_refusal(refused):
+            return Unusable("a refusal with more than its status")
+        return refused
+    if outcome >= len(Outcome) or reason >= len(WIRE_REASONS):
+        return Unusable("an outcome or a reason that there is not")
+    clause, target, valid_until_us, consumed = numbers
+    return Answer(
+        Outcome(outcome), WIRE_REASONS[reason], rule_step, clause, target, valid_until_us, consumed, data[start:]
+    )
+
+
+def _prefix(size: int) -> bytes:
+    return artefact.wrap(names.RESPONSE, bytes(size))[:-size]
+
+
+_WITHOUT_PERMIT: Final = _prefix(_HEAD.size)
+_WITH_PERMIT: Final = _prefix(_HEAD.size + SIZE)

@@ -1,0 +1,129 @@
+"""Requests for what is not the mission's current step, and bytes that are no request at all."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference.world import START, allowed, answer_to, loaded, request_for
+from rtshcua.model.flat.situation import State
+from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement.executor import PermitRefusal
+from rtshcua.onboard.ports import Dispatch
+from rtshcua.wire.response import Answer, Status, decode
+
+AT = START.monotonic_us
+
+
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_a_step_whose_turn_has_not_come_is_not_decided(step: int) -> None:
+    of = loaded()
+    assert answer_to(of, request_for(of, step=step)) is Status.NOT_CURRENT
+
+
+@pytest.mark.parametrize(("kind", "step", "link"), [(1, 0, 0), (1, 1, 0), (1, 0, -1)])
+def test_the_fallback_of_a_step_that_was_not_asked_for_is_not_decided(kind: int, step: int, link: int) -> None:
+    of = loaded()
+    assert answer_to(of, request_for(of, kind, step, link)) is Status.NOT_CURRENT
+
+
+def test_a_deferred_step_that_was_passed_over_is_not_decided_any_more() -> None:
+    of = loaded()
+    blind = State((None,) * of.bundle.policy.slots, (0,) * of.bundle.policy.slots)
+    deferred = answer_to(of, request_for(of, state=blind))
+    assert isinstance(deferred, Answer)
+    assert deferred.outcome is Outcome.DEFER
+    allowed(of, step=1)
+    assert answer_to(of, request_for(of)) is Status.NOT_CURRENT
+
+
+def test_the_fallback_of_an_earlier_step_is_not_decided() -> None:
+    of = loaded()
+    allowed(of)
+    allowed(of, step=1)
+    assert answer_to(of, request_for(of, 1, 0, 0)) is Status.NOT_CURRENT
+
+
+@pytest.mark.parametrize(
+    ("kind", "step", "link"),
+    [(0, 4, -1), (0, -1, -1), (0, 0, 0), (1, 0, 9), (1, 4, 0), (1, -1, 0), (2, 0, 0), (2, -1, 3), (2, -1, -1)],
+)
+def test_steps_and_links_that_the_bundle_does_not_have(kind: int, step: int, link: int) -> None:
+    of = loaded()
+    allowed(of)
+    assert answer_to(of, request_for(of, kind, step, link)) is Status.UNKNOWN_STEP
+
+
+def test_a_step_out_of_turn_is_not_sent() -> None:
+    of = loaded()
+    first = allowed(of)
+    second = allowed(of, step=1)
+    assert isinstance(of.executor.dispatch(second, AT), Dispatch)
+    assert of.executor.dispatch(first, AT) is PermitRefusal.OUT_OF_TURN, "behind the one that runs"
+    of.executor.ended()
+    assert of.executor.dispatch(first, AT) is PermitRefusal.OUT_OF_TURN, "and behind the one that ran"
+
+
+def test_two_steps_never_run_at_once() -> None:
+    of = loaded()
+    first = allowed(of)
+    second = allowed(of, step=1)
+    assert isinstance(of.executor.dispatch(first, AT), Dispatch)
+    assert of.executor.dispatch(second, AT) is PermitRefusal.OUT_OF_TURN
+
+
+def test_no_step_follows_a_return_that_a_fallback_began() -> None:
+    of = loaded()
+    first = allowed(of)
+    second = allowed(of, step=1)
+    of.executor.dispatch(first, AT)
+    home = allowed(of, 2, -1, 1)
+    assert isinstance(of.executor.dispatch(home, AT), Dispatch)
+    assert of.executor.dispatch(second, AT) is PermitRefusal.MISSION_OVER
+    hold = allowed(of, 2, -1, 0)
+    assert of.executor.dispatch(hold, AT) is PermitRefusal.BACKWARDS
+    again = allowed(of, 2, -1, 1)
+    assert isinstance(of.executor.dispatch(again, AT), Dispatch), "the same link may be tried again"
+    chain = allowed(of, 1, 1, 0)
+    assert of.executor.dispatch(chain, AT) is PermitRefusal.BACKWARDS, "from the contingency there is no way back"
+
+
+def test_a_chain_never_goes_backwards() -> None:
+    of = loaded()
+    allowed(of)
+    allowed(of, step=1)
+    permits = {link: allowed(of, 1, 1, link) for link in range(3)}
+    earlier = allowed(of, 1, 1, 0)
+    assert isinstance(of.executor.dispatch(permits[1], AT), Dispatch)
+    assert of.executor.dispatch(permits[0], AT) is PermitRefusal.BACKWARDS
+    assert of.executor.dispatch(earlier, AT) is PermitRefusal.BACKWARDS
+    assert isinstance(of.executor.dispatch(permits[2], AT), Dispatch)
+
+
+def test_a_hold_may_be_left_for_the_step_that_it_waited_for() -> None:
+    of = loaded()
+    first = allowed(of)
+    of.executor.dispatch(first, AT)
+    of.executor.ended()
+    second = allowed(of, step=1)
+    for _ in range(2):
+        hold = allowed(of, 2, -1, 0)
+        assert isinstance(of.executor.dispatch(hold, AT), Dispatch)
+    assert isinstance(of.executor.dispatch(second, AT), Dispatch)
+
+
+ONE = loaded()
+
+
+@given(st.binary(max_size=1200))
+def test_hostile_bytes_are_refused_and_remembered_nowhere(data: bytes) -> None:
+    assert decode(ONE.boundary.enforce(data)) is Status.MALFORMED
+
+
+@given(st.data())
+def test_a_changed_request_never_gets_more_than_an_answer(data: st.DataObject) -> None:
+    of = ONE
+    request = bytearray(request_for(of, *data.draw(st.sampled_from([(0, 0, -1), (1, 0, 0), (2, -1, 0)]))))
+    for _ in range(data.draw(st.integers(1, 4))):
+        request[data.draw(st.integers(0, len(request) - 1))] = data.draw(st.integers(0, 255))
+    answer = decode(of.boundary.enforce(bytes(request)))
+    assert isinstance(answer, Answer | Status)

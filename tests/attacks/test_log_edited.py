@@ -1,0 +1,103 @@
+"""Threat: a field of a record is edited, with or without the hashes, by an outsider or by the log key's holder."""
+
+import pytest
+
+from reference.forgery import edit, expect, flight, other_flight, prove, read, rehashed, rewritten, signed
+from rtshcua.evidence.report import Verdict
+
+LINES = flight()
+FIRST = next(number for number, line in enumerate(LINES) if read(line)["type"] == "decision")
+EFFECT = next(number for number, line in enumerate(LINES) if read(line).get("event") == "succeeded")
+
+
+def with_fields(number: int, lines: tuple[bytes, ...] = LINES, **fields: object) -> list[bytes]:
+    return [*lines[:number], edit(lines[number], **fields), *lines[number + 1 :]]
+
+
+EDITS = {
+    "outcome": "deny",
+    "reason": "state/violated",
+    "rule_step": 7,
+    "clause": "battery > 1 %",
+    "clause_at": [0, 1, 2],
+    "target": "hover",
+    "target_link": 0,
+    "valid_until_us": 99_000_000,
+}
+
+
+@pytest.mark.parametrize("field", EDITS)
+def test_an_edited_answer(field: str) -> None:
+    changed = with_fields(FIRST, **{field: EDITS[field]})
+    assert expect(changed) == ("chain/broken", FIRST)
+
+
+@pytest.mark.parametrize("field", EDITS)
+def test_an_edited_answer_that_was_rehashed(field: str) -> None:
+    """The chain is whole again; that the decision does not follow from its inputs shows before the close does."""
+    changed = rehashed(with_fields(FIRST, **{field: EDITS[field]}))
+    assert expect(changed) == (f"decision/{field.replace('_', '-')}", FIRST)
+
+
+@pytest.mark.parametrize("field", EDITS)
+def test_an_edited_answer_that_the_key_holder_signed_again(field: str) -> None:
+    assert expect(signed(with_fields(FIRST, **{field: EDITS[field]})))[0].startswith("decision/")
+
+
+def test_an_edited_effect_that_was_rehashed_breaks_the_signature() -> None:
+    assert expect(with_fields(EFFECT, event="failed")) == ("chain/broken", EFFECT)
+    assert expect(rewritten(with_fields(EFFECT, event="failed"))) == ("close/root", len(LINES) - 1)
+
+
+def test_an_edited_last_record_before_the_close() -> None:
+    number = len(LINES) - 2
+    assert expect(with_fields(number, utc_error_us=7)) == ("chain/broken", number)
+
+
+@pytest.mark.parametrize("fields", [{"ending": "aborted"}, {"tlog": "00" * 32}, {"utc_error_us": 7}])
+def test_an_edited_close(fields: dict[str, object]) -> None:
+    assert expect(with_fields(len(LINES) - 1, **fields)) == ("close/root", len(LINES) - 1)
+
+
+@pytest.mark.parametrize("count", [0, 1, 99])
+def test_a_close_that_counts_otherwise(count: int) -> None:
+    assert expect(with_fields(len(LINES) - 1, count=count)) == ("close/count", len(LINES) - 1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "slug"),
+    [
+        ({"mode": "none"}, "decision/mode"),
+        ({"step": 1}, "decision/invocation"),
+        ({"step": 99}, "decision/unknown-step"),
+        ({"kind": 1, "link": 99}, "decision/unknown-step"),
+        ({"kind": 3}, "decision/unknown-step"),
+        ({"invocation": "00" * 16}, "decision/invocation"),
+        ({"binding": "00" * 32}, "decision/outcome"),
+        ({"state": {"ages": [], "values": []}}, "decision/inputs"),
+    ],
+)
+def test_an_edited_question_that_was_rehashed(fields: dict[str, object], slug: str) -> None:
+    assert expect(rewritten(with_fields(FIRST, **fields))) == (slug, FIRST)
+
+
+def test_an_edited_state_shows_where_it_matters() -> None:
+    """The battery that sent the flight home is said to have been full: then nothing sends it home."""
+    lines = other_flight()
+    number, record = next(
+        (n, fields) for n, fields in enumerate(map(read, lines)) if fields.get("reason") == "safety/degraded"
+    )
+    state = record["state"] | {"values": [10_000, *record["state"]["values"][1:]]}
+    assert expect(signed(with_fields(number, lines, state=state))) == ("decision/outcome", number)
+
+
+def test_a_used_id_that_is_said_to_be_unused() -> None:
+    """The key holder lets a step be decided twice, and calls its id fresh each time."""
+    number = FIRST
+    again = [*LINES[: number + 1], LINES[number], *LINES[number + 1 :]]
+    assert expect(signed(again)) == ("decision/consumed", number + 1)
+
+
+def test_the_log_itself_is_sound() -> None:
+    for lines in (LINES, other_flight()):
+        assert prove(lines).report.verdict is Verdict.VERIFIED

@@ -1,0 +1,90 @@
+"""Threat: a bit of the log flips, on the disk or by hand. Each one must be noticed, in any byte."""
+
+import random
+
+import pytest
+
+from reference.forgery import edit, expect, flight, prove, read, rewritten, signed
+from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.verify import verify
+
+
+def noticed(data: bytes, at: int, bit: int) -> bool:
+    """By the chain alone, without any key but the one that the log names."""
+    return (
+        verify(_lines(bytes(data[:at]) + bytes([data[at] ^ 1 << bit]) + data[at + 1 :])).verdict is not Verdict.VERIFIED
+    )
+
+
+def _lines(data: bytes) -> list[bytes]:
+    """Split at newlines only, as a file is."""
+    *lines, rest = data.split(b"\n")
+    return [line + b"\n" for line in lines] + ([rest] if rest else [])
+
+
+def short() -> bytes:
+    """A log of few bytes: the genesis with a small bundle and root, one effect, the close."""
+    lines = flight()
+    return b"".join(signed([edit(lines[0], bundle="YnVuZGxl", root="cm9vdA=="), lines[2], lines[-1]]))
+
+
+def test_the_forger_writes_what_the_recorder_writes() -> None:
+    """Else the attacks in these files would fail for the wrong reason."""
+    assert tuple(signed(flight())) == flight()
+    assert rewritten(flight()) == list(flight())
+    assert prove(flight()).report.verdict is Verdict.VERIFIED
+    assert verify(_lines(short())).verdict is Verdict.VERIFIED
+
+
+def test_one_bit_of_each_line() -> None:
+    lines = flight()
+    for number, line in enumerate(lines):
+        at = line.index(b'"utc_us":') + 20
+        changed = line[:at] + bytes([line[at] ^ 1]) + line[at + 1 :]
+        slug, record = expect([*lines[:number], changed, *lines[number + 1 :]])
+        last = len(lines) - 1
+        assert record == number
+        assert slug == ("close/root" if number == last else "chain/broken"), (number, slug)
+
+
+def test_a_sample_of_all_bits() -> None:
+    data = b"".join(flight())
+    for at in random.Random(1).sample(range(len(data)), 400):
+        assert noticed(data, at, at % 8), at
+
+
+def test_a_sample_of_the_bits_of_the_signed_close() -> None:
+    data = b"".join(flight())
+    start = data.rindex(b"\n", 0, -1) + 1
+    for at in range(start, len(data)):
+        assert noticed(data, at, at % 7), at
+
+
+@pytest.mark.soak
+def test_every_bit_of_a_short_log() -> None:
+    data = short()
+    missed = [(at, bit) for at in range(len(data)) for bit in range(8) if not noticed(data, at, bit)]
+    assert not missed
+
+
+@pytest.mark.soak
+def test_every_byte_of_a_whole_flight_under_audit() -> None:
+    data = b"".join(flight())
+    for at in range(len(data)):
+        changed = _lines(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        assert prove(changed).report.verdict is not Verdict.VERIFIED, at
+
+
+def test_what_the_flip_did_is_named() -> None:
+    lines = flight()
+    number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
+    line = lines[number]
+
+    def with_byte(at: int, byte: int) -> list[bytes]:
+        return [*lines[:number], line[:at] + bytes([byte]) + line[at + 1 :], *lines[number + 1 :]]
+
+    assert expect(with_byte(0, ord("["))) == ("record/malformed", number)
+    assert expect(with_byte(line.index(b'"outcome"') + 1, 0xFF)) == ("record/malformed", number)
+    assert expect(with_byte(line.index(b'"seq":') + 6, ord("9"))) == ("chain/sequence", number)
+    assert expect(with_byte(11, ord("x"))) == ("record/malformed", number)
+    assert expect(with_byte(11, ord("0") if line[11] != ord("0") else ord("1"))) == ("chain/broken", number)

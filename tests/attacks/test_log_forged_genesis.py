@@ -1,0 +1,78 @@
+"""Threat: the genesis, on which all else rests, is forged: bundle, root, vehicle, mission, mode, format."""
+
+from base64 import b64decode, b64encode
+
+import pytest
+
+from reference.forgery import edit, expect, flight, other_flight, read, rewritten, signed
+
+LINES = flight()
+GENESIS = read(LINES[0])
+
+
+def begun(**fields: object) -> list[bytes]:
+    return [edit(LINES[0], **fields), *LINES[1:]]
+
+
+def flipped(field: str, at: int) -> str:
+    data = bytearray(b64decode(GENESIS[field]))
+    data[at] ^= 1
+    return b64encode(bytes(data)).decode()
+
+
+@pytest.mark.parametrize(
+    ("fields", "slug"),
+    [
+        ({"vehicle": "quad-08"}, "trust/bundle-wrong-vehicle"),
+        ({"mission": "another"}, "genesis/mission"),
+        ({"format": "rtshcua/diary"}, "genesis/format"),
+        ({"version": 2}, "genesis/format"),
+        ({"bundle": "AAAA"}, "trust/bundle-malformed"),
+        ({"bundle": ""}, "trust/bundle-malformed"),
+        ({"bundle": "no base64"}, "genesis/base64"),
+        ({"root": GENESIS["root"].rstrip("=") + "\n"}, "genesis/base64"),
+        ({"root": "AAAA"}, "trust/root-malformed"),
+        ({"root": GENESIS["bundle"]}, "trust/root-malformed"),
+        ({"utc_us": 0}, "trust/bundle"),
+        ({"boot": "00"}, "record/malformed"),
+        ({"log_key": "00"}, "record/malformed"),
+        ({"seq": 1}, "chain/sequence"),
+        ({"_prev": "11" * 32}, "chain/broken"),
+    ],
+)
+def test_a_forged_field(fields: dict[str, object], slug: str) -> None:
+    found, record = expect(begun(**fields))
+    if slug == "trust/bundle":  # an earlier time: nothing had expired, and nothing proves the time but the records
+        assert (found, record) == ("chain/broken", 0)
+        return
+    assert record == 0
+    assert found == slug or (found, slug.partition("/")[0]) == ("chain/broken", "trust"), found
+
+
+@pytest.mark.parametrize("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
+def test_one_bit_of_the_bundle(at: int) -> None:
+    assert expect(signed(begun(bundle=flipped("bundle", at))))[0].startswith("trust/bundle-")
+
+
+@pytest.mark.parametrize("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
+def test_one_bit_of_the_root(at: int) -> None:
+    assert expect(signed(begun(root=flipped("root", at))))[0].startswith("trust/root-")
+
+
+def test_the_bundle_of_another_mission() -> None:
+    """The policy may be mixed as little as the mission: both are in the bundle."""
+    bundle = read(other_flight()[0])["bundle"]
+    assert expect(begun(bundle=bundle)) == ("chain/broken", 0)
+    assert expect(rewritten(begun(bundle=bundle)))[0] == "decision/invocation"
+    assert expect(signed(begun(bundle=bundle)))[0] == "decision/invocation"
+
+
+def test_a_flight_that_says_it_was_never_enforced() -> None:
+    """Mode `none` would free every dispatch of its permit; but each decision records the mode too."""
+    assert expect(signed(begun(mode="none")))[0] == "decision/mode"
+
+
+def test_a_trust_root_that_had_expired() -> None:
+    later = 366 * 86_400_000_000 + 1
+    moved = [edit(line, utc_us=read(line)["utc_us"] + later) for line in LINES]
+    assert expect(signed(moved)) == ("trust/root-expired", 0)

@@ -1,0 +1,51 @@
+"""Threat: the end of the log is cut off, in a record, between two, or all of it."""
+
+import pytest
+
+from reference.forgery import edit, expect, flight, prove, read, rewritten
+from rtshcua.evidence.report import Verdict
+
+LINES = flight()
+LAST = len(LINES) - 1
+
+
+@pytest.mark.parametrize("count", range(1, LAST + 1))
+def test_cut_between_records(count: int) -> None:
+    assert expect(LINES[:count]) == ("close/missing", count)
+    assert prove(LINES[:count]).report.verdict is Verdict.INCOMPLETE
+
+
+@pytest.mark.parametrize("kept", [1, 10, 40, 74, 200, -2, -1])
+def test_cut_inside_a_record(kept: int) -> None:
+    for number in (1, 2, LAST):
+        cut = [*LINES[:number], LINES[number][: kept if kept < 0 else min(kept, len(LINES[number]) - 1)]]
+        assert expect(cut) == ("tail/torn", number)
+        assert prove(cut).report.verdict is Verdict.INCOMPLETE
+
+
+def test_cut_inside_the_genesis() -> None:
+    for kept in (1, 10, 500, len(LINES[0]) - 1):
+        assert expect([LINES[0][:kept]]) == ("genesis/missing", 0)
+
+
+def test_cut_to_nothing() -> None:
+    assert expect([]) == ("log/empty", 0)
+
+
+def test_cut_with_the_old_close_put_at_the_end() -> None:
+    for count in range(1, LAST):
+        assert expect([*LINES[:count], LINES[-1]]) == ("chain/sequence", count)
+        assert expect(rewritten([*LINES[:count], LINES[-1]])) == ("close/size", count)
+
+
+def test_the_size_in_the_signed_text_cannot_be_changed() -> None:
+    close = read(LINES[-1])
+    text = close["checkpoint"].replace(f"\n{LAST + 1}\n", f"\n{LAST}\n", 1)
+    cut = rewritten([*LINES[: LAST - 1], edit(LINES[-1], checkpoint=text)])
+    assert expect(cut) == ("close/signature", LAST - 1)
+
+
+def test_a_cut_log_says_what_it_does_not_show() -> None:
+    report = prove(LINES[:-1]).report
+    assert "signed-close" in [claim.slug for claim in report.unproven]
+    assert "signed-close" not in [claim.slug for claim in report.proven]

@@ -1,0 +1,57 @@
+"""A step that was admitted once, or a permit that was used once, is played again."""
+
+from reference.world import START, Run, allowed, answer_to, loaded, request_for
+from rtshcua.model.flat.situation import State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal
+from rtshcua.onboard.ports import Dispatch
+from rtshcua.wire.response import Answer
+
+
+def test_an_admitted_step_is_denied_the_second_time() -> None:
+    of = loaded()
+    allowed(of)
+    answer = answer_to(of, request_for(of))
+    assert isinstance(answer, Answer)
+    assert (answer.outcome, answer.reason, answer.consumed) == (Outcome.DENY, Reason.REPLAYED, 1)
+    assert answer.permit == b""
+
+
+def test_a_step_that_was_flown_does_not_come_back_later() -> None:
+    run = Run().until_flies("inspect_area")
+    answer = answer_to(run.loaded, request_for(run.loaded, step=1))
+    assert isinstance(answer, Answer)
+    assert answer.reason is Reason.REPLAYED
+
+
+def test_a_deferred_step_is_no_replay() -> None:
+    of = loaded()
+    blind = answer_to(of, request_for(of, state=State((None,) * of.bundle.policy.slots, (0,) * of.bundle.policy.slots)))
+    assert isinstance(blind, Answer)
+    assert blind.outcome is Outcome.DEFER
+    allowed(of)
+
+
+def test_what_fails_authentication_uses_no_id_up() -> None:
+    """Else a forger could have the honest request refused."""
+    of = loaded()
+    forged = answer_to(of, request_for(of, binding=bytes(32)))
+    assert isinstance(forged, Answer)
+    assert forged.outcome is Outcome.DENY
+    allowed(of)
+
+
+def test_a_permit_sends_one_command_once() -> None:
+    of = loaded()
+    permit = allowed(of)
+    assert isinstance(of.executor.dispatch(permit, START.monotonic_us), Dispatch)
+    assert of.executor.dispatch(permit, START.monotonic_us) is PermitRefusal.USED
+    assert isinstance(of.executor.stand_in(permit, 1, 0, START.monotonic_us), Dispatch)
+    assert of.executor.stand_in(permit, 1, 0, START.monotonic_us) is PermitRefusal.USED
+
+
+def test_a_permit_of_another_session_is_worth_nothing() -> None:
+    of = loaded()
+    later = Executor(bytes(32), Commands(of.bundle.policy, of.bundle.mission))
+    assert later.dispatch(allowed(of), START.monotonic_us) is PermitRefusal.FORGED

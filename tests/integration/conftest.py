@@ -1,0 +1,149 @@
+"""`rtshcua run` as a user starts it: a process of its own, real keys, real files, real UDP, the simulated vehicle."""
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.wire.keys import Duty
+
+TESTS = str(Path(__file__).resolve().parents[1])
+if TESTS not in sys.path:
+    sys.path.insert(0, TESTS)
+
+from virtual import case  # noqa: E402  needs the path above
+
+PATIENCE_S = 60.0
+COMMAND = [sys.executable, "-m", "rtshcua.cli.app"]
+
+
+class Run:
+    """One `rtshcua run --json`, or another command that says what happens in JSON lines, under way in `folder`."""
+
+    def __init__(self, folder: Path, words: Sequence[str]) -> None:
+        self.cwd = folder
+        self.until_s = time.monotonic() + PATIENCE_S
+        self.events: list[dict[str, Any]] = []
+        self.code: int | None = None
+        self.stderr = ""
+        self._rest = b""
+        self.process = subprocess.Popen(
+            [*COMMAND, *words], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+
+    def until(self, event: str, **fields: Any) -> dict[str, Any]:
+        """Wait for an event with these fields."""
+        looked = 0
+        while True:
+            for found in self.events[looked:]:
+                looked += 1
+                if found["event"] == event and all(found.get(name) == value for name, value in fields.items()):
+                    return found
+            assert self._read(), f"it ended without {event} {fields}: {self.events} {self.end().stderr}"
+
+    def end(self) -> "Run":
+        """Wait until it ends by itself."""
+        while self._read():
+            pass
+        self.stderr = self.process.stderr.read().decode()
+        self.code = self.process.wait(PATIENCE_S)
+        assert "Traceback" not in self.stderr, self.stderr
+        return self
+
+    def signal(self, number: signal.Signals) -> None:
+        self.process.send_signal(number)
+
+    def child(self, module: str) -> int:
+        """The process of a module that it started."""
+        pid = self.process.pid
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        (found,) = [child for child in children if module in Path(f"/proc/{child}/cmdline").read_text()]
+        return int(found)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        return next(event for event in self.events if event["event"] == "summary")
+
+    @property
+    def folder(self) -> Path:
+        """The run's own folder; there is one."""
+        (folder,) = (self.cwd / "runs").iterdir()
+        return folder
+
+    def log(self) -> list[dict[str, Any]]:
+        """The records of the log."""
+        return [json.loads(line) for line in (self.folder / "log.jsonl").read_text().splitlines()]
+
+    def effects(self) -> list[str]:
+        """The effects in the log, by slug."""
+        return [record["event"] for record in self.log() if record["type"] == "effect"]
+
+    def dispatched(self) -> list[str]:
+        """The skills that were dispatched, in order."""
+        return [r["detail"] for r in self.log() if r["type"] == "effect" and r["event"] == "dispatched"]
+
+    def _read(self) -> bool:
+        out = self.process.stdout
+        left = self.until_s - time.monotonic()
+        assert left > 0 and select.select([out], [], [], left)[0], f"it took too long: {self.events}"
+        data = os.read(out.fileno(), 65_536)
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        self.events += [json.loads(line) for line in lines]
+        return bool(data)
+
+
+class Ground:
+    """A user's machine: keys, bundles, and what was started on it."""
+
+    def __init__(self, folder: Path, data: Path) -> None:
+        self.folder = folder
+        self.store = KeyStore(data)
+        now_us = time.time_ns() // 1_000
+        self.store.create(
+            lambda: os.urandom(32), development=True, passphrase=None, now_us=now_us, expires_us=now_us + case.YEAR_US
+        )
+        self.started: list[Run] = []
+
+    def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight") -> str:
+        """A bundle issued now, of these steps or else the short ones; its file's name."""
+        keys = {duty: self.store.signing_key(duty) for duty in (Duty.POLICY, Duty.MISSION)}
+        mission = case.mission(case.short_steps() if steps is None else steps, time.time_ns() // 1_000)
+        (self.folder / f"{name}.bundle").write_bytes(case.seal(mission, keys=keys))
+        return f"{name}.bundle"
+
+    def start(self, *words: str) -> Run:
+        self.started.append(Run(self.folder, words))
+        return self.started[-1]
+
+    def run(self, bundle: str, *words: str, speed: int = 20) -> Run:
+        """`rtshcua run`, at a speed at which a busy machine still keeps up."""
+        return self.start("run", bundle, "--json", "--speed", str(speed), *words)
+
+
+@pytest.fixture
+def ground(tmp_path: Path, own_world: None) -> Iterator[Ground]:
+    made = Ground(tmp_path, Path(os.environ["RTSHCUA_DATA_DIR"]))
+    yield made
+    for run in made.started:
+        if run.process.poll() is None:
+            run.process.kill()
+        run.process.communicate()
+
+
+@pytest.fixture
+def port() -> int:
+    """A UDP port that nobody has now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

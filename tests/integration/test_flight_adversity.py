@@ -1,0 +1,182 @@
+"""What goes wrong in flight, over real UDP: each ends with its own exit code and a whole log."""
+
+import os
+import signal
+import socket
+import threading
+from random import Random
+from typing import Any
+
+import pytest
+
+
+def closed(run: Any, ending: str) -> None:
+    """The log is whole, and was closed with this ending."""
+    last = run.log()[-1]
+    assert (last["type"], last["ending"]) == ("close", ending)
+    assert last["count"] == len(run.log()) - 1
+    assert run.summary["whole"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_falls_back_first(ground: Any, number: signal.Signals) -> None:
+    run = ground.run(ground.bundle())
+    run.until("dispatched", step=1)
+    run.signal(number)
+    assert run.end().code == 130
+    closed(run, "interrupted")
+    assert "interrupted" in run.effects()
+    assert run.dispatched()[-1] in ("return_home", "emergency_land")
+
+
+def test_a_stop_on_the_ground_sends_nothing(ground: Any) -> None:
+    run = ground.run(ground.bundle(), "--fault", "gps-loss,at=0s")
+    run.until("plan")
+    run.signal(signal.SIGINT)
+    assert run.end().code == 130
+    closed(run, "interrupted")
+    assert run.dispatched() == []
+
+
+def test_three_stops_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
+    run = ground.run(ground.bundle(), speed=2)
+    run.until("dispatched", step=1)
+    for count in range(3):
+        run.signal(signal.SIGINT)
+        if count < 2:
+            run.until("note")
+            run.events.clear()
+    assert run.end().code == 130
+    closed(run, "interrupted")
+    assert run.effects()[-1] == "left"
+
+
+def test_a_pilot_takes_over(ground: Any) -> None:
+    run = ground.run(ground.bundle(), "--fault", "pilot,at=15s,mode=position").end()
+    assert run.code == 7
+    closed(run, "stood-down")
+    assert "taken-over" in run.effects()
+
+
+def test_a_low_battery_turns_it_home(ground: Any) -> None:
+    run = ground.run(ground.bundle(), "--fault", "battery,at=12s,level=20%").end()
+    assert run.code == 6
+    closed(run, "aborted")
+    assert run.dispatched()[-1] == "return_home"
+    assert "violated" in run.effects()
+
+
+def test_a_low_battery_on_the_ground_is_refused(ground: Any) -> None:
+    run = ground.run(ground.bundle(), "--battery", "20").end()
+    assert run.code == 5
+    closed(run, "refused")
+    assert run.dispatched() == []
+
+
+def test_a_vehicle_that_goes_silent(ground: Any) -> None:
+    run = ground.run(ground.bundle(), "--fault", "link-silence,at=12s").end()
+    assert run.code == 8
+    closed(run, "link-lost")
+    assert "link-lost" in run.effects()
+
+
+def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
+    run = ground.run(ground.bundle())
+    run.until("dispatched", step=1)
+    os.kill(run.child("rtshcua.simulation"), signal.SIGKILL)
+    assert run.end().code == 8
+    closed(run, "link-lost")
+
+
+def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
+    run = ground.run(ground.bundle())
+    run.until("dispatched", step=1)
+    os.kill(run.child("rtshcua.cli.live"), signal.SIGKILL)
+    assert run.end().code == 74  # it flew, and nobody was told all of it
+    assert run.log()[-1]["ending"] == "completed"
+
+
+def test_a_view_that_is_stopped_stops_nothing(ground: Any) -> None:
+    run = ground.run(ground.bundle())
+    run.until("dispatched", step=1)
+    view = run.child("rtshcua.cli.live")
+    os.kill(view, signal.SIGSTOP)
+    while not (run.folder / "summary.json").exists():
+        assert run.process.poll() is None
+        threading.Event().wait(0.05)
+    os.kill(view, signal.SIGCONT)
+    assert run.end().code == 0
+
+
+class Relay(threading.Thread):
+    """Stands between vehicle and runtime, and adds garbage to what the vehicle says."""
+
+    def __init__(self, to: int) -> None:
+        super().__init__(daemon=True)
+        self.to = ("127.0.0.1", to)
+        self.inner = self.bound()
+        self.outer = self.bound()
+        self.port = self.inner.getsockname()[1]
+        self.added = 0
+
+    @staticmethod
+    def bound() -> socket.socket:
+        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        made.bind(("127.0.0.1", 0))
+        return made
+
+    def run(self) -> None:
+        chance = Random(7)
+        vehicle = None
+
+        def back() -> None:
+            while True:
+                data = self.outer.recv(65_535)
+                if vehicle is not None:
+                    self.inner.sendto(data, vehicle)
+
+        threading.Thread(target=back, daemon=True).start()
+        while True:
+            data, vehicle = self.inner.recvfrom(65_535)
+            bent = bytearray(data)
+            bent[chance.randrange(len(bent))] ^= 1 + chance.randrange(255)
+            for garbage in (chance.randbytes(chance.randrange(1, 300)), bytes(bent), data[: chance.randrange(len(data))]):
+                self.added += 1
+                self.outer.sendto(garbage, self.to)
+            self.outer.sendto(data, self.to)
+
+
+def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
+    relay = Relay(port)
+    relay.start()
+    ground.start("sim", "--port", str(relay.port), "--speed", "20", "--json").until("ready")
+    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}").end()
+    assert run.code == 0, run.stderr
+    closed(run, "completed")
+    assert relay.added > 1_000
+
+
+def test_a_run_that_was_killed_in_the_air_comes_down_and_does_not_resume(ground: Any, port: int) -> None:
+    ground.start("sim", "--port", str(port), "--speed", "20", "--json").until("ready")
+    bundle = ground.bundle()
+    words = ("--connect", f"udpin:127.0.0.1:{port}")
+    first = ground.run(bundle, *words)
+    first.until("dispatched", step=1)
+    first.process.kill()
+    second = ground.run(bundle, *words, "--runs", "later").end()
+    assert second.code == 6, second.stderr
+    assert not [event for event in second.events if event["event"] == "dispatched" and event.get("step", -1) >= 0]
+    assert second.until("resumed")
+    third = ground.run(bundle, *words).end()
+    assert third.code == 5
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_sim_serves_a_run_and_ends_cleanly(ground: Any, port: int, flavour: str) -> None:
+    vehicle = ground.start("sim", "--connect", f"udpout:127.0.0.1:{port}", "--flavour", flavour, "--speed", "50", "--json")
+    ready = vehicle.until("ready")
+    assert (ready["flavour"], ready["peer"]) == (flavour, port)
+    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", speed=50).end()
+    assert run.code == 0, run.stderr
+    vehicle.signal(signal.SIGINT)
+    assert vehicle.end().code == 0

@@ -1,0 +1,134 @@
+"""What keeps a flight from beginning: a documented exit code, one clear message, no traceback, and nothing sent."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from rtshcua.cli import launch
+from rtshcua.cli.app import main
+
+
+@pytest.fixture(autouse=True)
+def here(ground: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """In the ground's folder, with little patience, and no simulated vehicle that could be spoken to."""
+    monkeypatch.chdir(ground.folder)
+    monkeypatch.setattr(launch, "HEARTBEAT_S", 0.3)
+    yield
+    assert not Path("runs").exists()
+
+
+def refused(capfd: Any, *words: str) -> tuple[int, str]:
+    code = main(["run", *words])
+    out, err = capfd.readouterr()
+    assert "Traceback" not in err
+    assert err.startswith("error: ")
+    assert out == ""
+    return code, err
+
+
+def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:
+    code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}")
+    assert code == 8
+    assert "no heartbeat of a vehicle" in err
+    assert "rtshcua sim" in err
+    assert not (ground.folder / "runs").exists()
+
+
+def test_no_vehicle_leaves_the_bundle_unopened(ground: Any, capfd: Any, port: int) -> None:
+    bundle = ground.bundle()
+    refused(capfd, bundle, "--connect", f"udpin:127.0.0.1:{port}")
+    assert not (ground.store.folder.parent / "state").exists()
+
+
+def test_a_busy_port(ground: Any, capfd: Any) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        busy = other.getsockname()[1]
+        code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{busy}")
+    assert code == 8
+    assert f"cannot listen at udp 127.0.0.1:{busy}: address already in use" in err
+
+
+def test_an_address_that_is_not_ours(ground: Any, capfd: Any) -> None:
+    assert refused(capfd, ground.bundle(), "--connect", "udpin:203.0.113.7:14550")[0] == 8
+
+
+@pytest.mark.parametrize("text", ["udpin:127.0.0.1", "14550", "udpin:host:99999", "udpout:127.0.0.1:14550", "tcp:a:1"])
+def test_an_address_that_is_none(ground: Any, capfd: Any, text: str) -> None:
+    assert refused(capfd, ground.bundle(), "--connect", text)[0] == 2
+
+
+def test_any_changed_byte_is_untrusted(ground: Any, capfd: Any) -> None:
+    bundle = ground.bundle()
+    good = Path(bundle).read_bytes()
+    chance = Random(11)
+    for at in [0, 1, len(good) - 1, *(chance.randrange(len(good)) for _ in range(40))]:
+        bad = bytearray(good)
+        bad[at] ^= 1 << chance.randrange(8)
+        Path("bad.bundle").write_bytes(bad)
+        code, _ = refused(capfd, "bad.bundle")
+        assert code == 4, at
+
+
+@pytest.mark.parametrize("data", [b"", b"\0" * 5_000, b"mission m {}\n", bytes(range(256)) * 9], ids=len)
+def test_what_is_no_bundle_is_untrusted(ground: Any, capfd: Any, data: bytes) -> None:
+    Path("no.bundle").write_bytes(data)
+    assert refused(capfd, "no.bundle")[0] == 4
+
+
+def test_a_truncated_bundle_is_untrusted(ground: Any, capfd: Any) -> None:
+    good = Path(ground.bundle()).read_bytes()
+    for length in range(1, len(good), len(good) // 17):
+        Path("cut.bundle").write_bytes(good[:length])
+        assert refused(capfd, "cut.bundle")[0] == 4
+
+
+def test_a_missing_bundle(ground: Any, capfd: Any) -> None:
+    code, err = refused(capfd, "none.bundle")
+    assert (code, err) == (3, "error: no such file or directory: `none.bundle`\n")
+
+
+def test_another_vehicle(ground: Any, capfd: Any) -> None:
+    code, err = refused(capfd, ground.bundle(), "--vehicle", "quad-08")
+    assert code == 5
+    assert "`quad-08`" in err
+
+
+def test_mode_none_with_another_vehicle(ground: Any, capfd: Any, port: int) -> None:
+    code, err = refused(capfd, ground.bundle(), "--mode", "none", "--connect", f"udpin:127.0.0.1:{port}")
+    assert code == 5
+    assert "mode `none`" in err
+
+
+def test_options_that_do_not_go_together(ground: Any, capfd: Any) -> None:
+    for words in (
+        ["--connect", "udpin:127.0.0.1:14550", "--battery", "50"],
+        ["--connect", "udpin:127.0.0.1:14550", "--fresh-state"],
+        ["--connect", "udpin:0.0.0.0:14550", "--speed", "2"],
+        ["--state-dir", "state", "--fresh-state"],
+        ["--battery", "101"],
+        ["--fault", "meteor,at=3s"],
+        ["--wind", "strong"],
+        ["--speed", "0"],
+        ["--mode", "sideways"],
+    ):
+        assert refused(capfd, ground.bundle(), *words)[0] == 2, words
+
+
+def test_no_keys(ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    bundle = ground.bundle()
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(ground.folder / "nobody"))
+    code, err = refused(capfd, bundle)
+    assert code == 4
+    assert "rtshcua keys init" in err
+
+
+def test_a_simulated_vehicle_that_cannot_start(ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rtshcua.adapters.simulator._MODULE", "rtshcua.no_such_module")
+    code, err = refused(capfd, ground.bundle())
+    assert code == 8
+    assert "the simulated vehicle did not start: " in err

@@ -1,0 +1,229 @@
+"""What goes wrong on real links and vehicles: refusals, losses, take-overs, garbage, silence."""
+
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import AirState, Failed, LinkBack, LinkLost, Readings, Ready, Succeeded, TakenOver
+from rtshcua.simulation.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss, LinkSilence, PilotMode
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.place import Home
+
+Make = Callable[..., Any]
+COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
+
+
+def of_command(frame: bytes, number: int) -> bool:
+    (received,) = Codec(1, 1).parse(frame)
+    return received.name in COMMANDS and received.message.command == number
+
+
+def test_pilot_takes_over_while_it_flies(flyer: Make, flavour: str) -> None:
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(3)
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    begun = one.now_us
+    taken = one.until(TakenOver, 5)
+    assert taken.mode == {"px4": "Position", "ardupilot": "POSHOLD"}[flavour]
+    assert taken.at_us - begun < 500_000  # the heartbeat was asked for at 5 Hz
+    assert not any(isinstance(event, (TakenOver, Failed, Succeeded)) for event in one.wait(30))
+
+
+def test_pilot_takes_over_after_the_last_command_succeeded(flyer: Make) -> None:
+    one = flyer().up()
+    one.wait(5)
+    one.vehicle.simulation.inject(PilotMode(0, Mode.ALTITUDE))
+    one.until(TakenOver, 5)
+
+
+@pytest.mark.parametrize("kind", [MotionKind.FLY, MotionKind.HOLD, MotionKind.HOME])
+def test_its_own_failsafe_takes_over(flyer: Make, kind: MotionKind) -> None:
+    one = flyer().up()
+    one.begin(kind, *([(300_000, 0)] if kind == MotionKind.FLY else []), altitude=20_000)
+    one.wait(3)
+    one.vehicle.simulation.inject(BatteryLevel(0, 300))
+    assert one.until(TakenOver, 10).mode in ("Land", "LAND")
+
+
+def test_nothing_more_is_sent_after_release(flyer: Make) -> None:
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000)
+    one.vehicle.release()
+    moving: list[str] = []
+    one.vehicle.lose = lambda frame: moving.extend(f.name for f in Codec(1, 1).parse(frame)) or False
+    one.wait(10)
+    assert set(moving) == {"HEARTBEAT"}
+
+
+def test_refused_arming_fails_with_the_reason(flyer: Make, flavour: str) -> None:
+    one = flyer()
+    one.until(Ready)
+    one.vehicle.simulation.inject(GpsLoss(0))
+    one.wait(10)
+    end = one.fly(MotionKind.CLIMB, altitude=20_000)
+    assert isinstance(end, Failed)
+    assert end.reason in ("refused/temporarily", "refused/failed")
+    if flavour == "ardupilot":  # PX4 says nothing to an onboard controller
+        assert "requires position" in end.text
+    assert not one.truth.armed
+
+
+@pytest.mark.parametrize("kind", [MotionKind.FLY, MotionKind.COVER, MotionKind.HOLD])
+def test_what_stands_disarmed_cannot_go_anywhere(flyer: Make, kind: MotionKind) -> None:
+    one = flyer()
+    one.until(Ready)
+    end = one.fly(kind, *([(30_000, 0)] if kind != MotionKind.HOLD else []), altitude=20_000)
+    assert (type(end), end.reason) == (Failed, "disarmed")
+
+
+@pytest.mark.parametrize("command", [
+    mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF,
+    mavlink.MAV_CMD_DO_REPOSITION, mavlink.MAV_CMD_DO_CHANGE_SPEED,
+])  # fmt: skip
+def test_lost_acknowledgements_change_nothing(flyer: Make, command: int) -> None:
+    """What was obeyed and not acknowledged is seen by its effect; the retry's refusal is not taken for the first's."""
+
+    def drop(datagram: bytes) -> list[bytes]:
+        found = Codec(1, 1).parse(datagram)
+        lost = any(f.name == "COMMAND_ACK" and f.message.command == command for f in found)
+        return [] if lost and len(dropped) < 2 and not dropped.append(1) else [datagram]
+
+    dropped: list[int] = []
+    one = flyer()
+    one.vehicle.hurt = drop
+    one.up()
+    assert isinstance(one.fly(MotionKind.FLY, (40_000, 0), altitude=20_000, speed=5_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.HOME), Succeeded)
+
+
+@pytest.mark.parametrize("command", [
+    mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF,
+    mavlink.MAV_CMD_DO_REPOSITION, mavlink.MAV_CMD_DO_CHANGE_SPEED,
+])  # fmt: skip
+def test_lost_commands_are_sent_again(flyer: Make, command: int) -> None:
+    confirmations: list[int] = []
+
+    def lose(frame: bytes) -> bool:
+        if not of_command(frame, command) or len(confirmations) >= 2:
+            return False
+        confirmations.append(getattr(Codec(1, 1).parse(frame)[0].message, "confirmation", len(confirmations)))
+        return True
+
+    one = flyer()
+    one.vehicle.lose = lose
+    one.up()
+    assert isinstance(one.fly(MotionKind.FLY, (40_000, 0), altitude=20_000, speed=5_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.HOME), Succeeded)
+    assert confirmations in ([], [0, 1])
+
+
+def test_flies_on_a_poor_and_slow_link(flyer: Make) -> None:
+    one = flyer(faults=(LinkLoss(0, 2_000), LinkDelay(0, 300_000)), seed=5)
+    one.up()
+    assert isinstance(one.fly(MotionKind.FLY, (40_000, 30_000), altitude=20_000, speed=5_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.HOME), Succeeded)
+
+
+def test_no_answer_at_all_is_a_failure_and_not_a_success(flyer: Make) -> None:
+    one = flyer()
+    one.until(Ready)
+    one.vehicle.lose = lambda frame: True
+    end = one.fly(MotionKind.CLIMB, altitude=20_000)
+    assert (type(end), end.reason) == (Failed, "no-effect")
+
+
+def test_stopping_short_is_a_failure(flyer: Make) -> None:
+    """As on PX4, which acknowledges a target outside of its fence, sets off, and stops at the edge."""
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
+    one.wait(6)
+    one.vehicle.lose = lambda frame: True
+    one.vehicle.simulation._autopilot.vehicle.hold()
+    assert one.until(Failed, 40).reason == "stopped-short"
+
+
+def test_garbage_and_foreign_systems_change_nothing(flyer: Make) -> None:
+    chance = Random(3)
+    stranger = Codec(9, 1)
+    neighbour = Codec(1, 154)
+
+    def mix(datagram: bytes) -> list[bytes]:
+        bent = bytearray(datagram)
+        bent[chance.randrange(len(bent))] ^= 1 << chance.randrange(8)
+        return [
+            chance.randbytes(chance.randrange(1, 80)),
+            datagram[: chance.randrange(len(datagram))],
+            bytes(bent) if bent[0] == 0xFD else b"",
+            stranger.pack(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)),
+            stranger.pack(mavlink.MAVLink_global_position_int_message(1, 0, 0, 0, 99_000, 0, 0, 0, 0)),
+            stranger.pack(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 4)),
+            neighbour.pack(mavlink.MAVLink_heartbeat_message(26, 8, 0, 77, 4, 3)),
+            neighbour.pack(mavlink.MAVLink_extended_sys_state_message(0, 1)),
+            neighbour.pack(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 4)),
+            datagram,
+        ]
+
+    one = flyer()
+    one.until(Ready)
+    one.vehicle.hurt = mix
+    one.events.clear()
+    assert isinstance(one.fly(MotionKind.CLIMB, altitude=20_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.LAND), Succeeded)
+    assert all(abs(value) < 30_000 for e in one.events if isinstance(e, Readings) for slot, value in e.values if slot == 1)
+    assert [e.airborne for e in one.events if isinstance(e, AirState)].count(True) == 1
+
+
+def test_an_acknowledgement_for_somebody_else_is_not_ours(flyer: Make) -> None:
+    autopilot = Codec(1, 1)
+    refusal = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 4, 0, 0, 255, 190)
+    one = flyer()
+    one.until(Ready)
+    one.vehicle.hurt = lambda datagram: [autopilot.pack(refusal), datagram]
+    assert isinstance(one.fly(MotionKind.CLIMB, altitude=20_000), Succeeded)
+
+
+def test_silence_is_noticed_and_so_is_its_end(flyer: Make) -> None:
+    one = flyer().up()
+    one.vehicle.simulation.inject(LinkSilence(0, None))
+    begun = one.now_us
+    lost = one.until(LinkLost, 10)
+    assert 2_700_000 < lost.at_us - begun < 3_300_000
+    assert not any(isinstance(event, LinkLost) for event in one.wait(10))
+    one.vehicle.simulation._link(silent=False)
+    one.until(LinkBack, 3)
+
+
+def test_streams_that_stop_are_asked_for_again(flyer: Make) -> None:
+    one = flyer()
+    one.until(Ready)
+    one.vehicle.simulation._autopilot.streams.set(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, -1)
+    one.wait(6)
+    one.events.clear()
+    one.wait(1)
+    assert any(slot == 1 for event in one.events if isinstance(event, Readings) for slot, _ in event.values)
+
+
+def test_a_vehicle_far_from_the_policys_home_is_not_ready(flyer: Make) -> None:
+    one = flyer(home=Home(473_977_400, 85_475_900, 488_000))
+    assert not any(isinstance(event, Ready) for event in one.wait(10))
+    assert one.vehicle.driver.unready == "it stands 150 m from the policy's home, more than 50 m"
+
+
+def test_a_vehicle_without_a_fix_is_not_ready(flyer: Make) -> None:
+    one = flyer(faults=(GpsLoss(0),))
+    assert not any(isinstance(event, Ready) for event in one.wait(10))
+    assert one.vehicle.driver.unready == "no 3D position fix"
+
+
+def test_a_battery_too_low_to_arm_is_not_ready(flyer: Make) -> None:
+    one = flyer(battery=500)
+    assert not any(isinstance(event, Ready) for event in one.wait(10))
+    assert one.vehicle.driver.unready is not None
+    assert one.vehicle.driver.unready.startswith("its own checks before arming fail")

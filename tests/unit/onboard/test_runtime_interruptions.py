@@ -1,0 +1,252 @@
+"""What may come between: the pilot, the operator, a lost link, a full disk, a boundary that does not answer."""
+
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+from reference.flat_case import OBSTACLE, WIND, M, S
+from reference.world import FakeVehicle, Run, assert_covered, loaded
+
+from rtshcua.onboard.ports import (
+    AirState,
+    Dispatch,
+    Ending,
+    EvidenceFailed,
+    Failed,
+    Interrupted,
+    LinkBack,
+    LinkLost,
+    TakenOver,
+)
+from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.wire.response import Status, encode_refusal
+
+
+def waiting() -> Run:
+    return Run(ready=False)
+
+
+def deferred_on_the_ground() -> Run:
+    vehicle = FakeVehicle()
+    vehicle.values[WIND] = None
+    return Run(vehicle=vehicle)
+
+
+def taking_off() -> Run:
+    return Run()
+
+
+def running() -> Run:
+    return Run().until_flies("inspect_area")
+
+
+def holding() -> Run:
+    run = Run().until_flies("goto")
+    run.vehicle.values[OBSTACLE] = None
+    return run.until_flies("hover")
+
+
+def falling() -> Run:
+    run = Run().until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    return run.until_flies("hover")
+
+
+def returning() -> Run:
+    return falling().until_flies("return_home")
+
+
+GROUND = (waiting, deferred_on_the_ground)
+AIR = (taking_off, running, holding, falling, returning)
+Situation = Callable[[], Run]
+
+
+@pytest.mark.parametrize("situation", GROUND + AIR)
+def test_the_pilot_wins_at_once(situation: Situation) -> None:
+    run = situation()
+    flown = list(run.flown)
+    run.tick(TakenOver(0, "POSCTL"))
+    assert run.ending is Ending.STOOD_DOWN
+    assert run.vehicle.released
+    assert run.flown == flown
+    assert run.events[-2:] == ["taken-over", "stood-down"] or run.events[-3:-1] == ["taken-over", "released"]
+
+
+@pytest.mark.parametrize("situation", GROUND)
+def test_interrupted_on_the_ground_ends_at_once(situation: Situation) -> None:
+    run = situation()
+    run.tick(Interrupted(0))
+    assert run.ending is Ending.INTERRUPTED
+    assert run.flown == []
+
+
+@pytest.mark.parametrize("situation", AIR)
+@pytest.mark.parametrize("again", [0, 1, 40])
+def test_interrupted_in_the_air_falls_back_first(situation: Situation, again: int) -> None:
+    run = situation()
+    run.tick(Interrupted(0))
+    assert run.ending is None
+    for _ in range(again):
+        run.tick(Interrupted(0))
+    run.until_over()
+    assert run.ending is Ending.INTERRUPTED
+    assert run.flown[-1] in ("return_home", "emergency_land")
+    assert not run.vehicle.airborne
+    assert_covered(run)
+
+
+def test_interrupted_holds_by_the_running_step_and_else_by_the_contingency() -> None:
+    run = running()
+    run.tick(Interrupted(0))
+    assert run.decisions[-1][:3] == (1, 2, 0)
+    run = holding()
+    run.tick(Interrupted(0))
+    assert run.decisions[-1][:3] == (2, -1, 0)
+
+
+def test_a_link_that_comes_back_lets_the_skill_go_on() -> None:
+    run = running()
+    run.tick(LinkLost(0))
+    run.vehicle.mute = True
+    for _ in range(100):
+        run.tick(LinkLost(0))
+    run.vehicle.mute = False
+    run.tick(LinkBack(0), LinkBack(0))
+    assert run.until_over().ending is Ending.COMPLETED
+    assert run.events.count("link-lost") == run.events.count("link-back") == 1
+
+
+@pytest.mark.parametrize("situation", GROUND + AIR)
+def test_a_link_that_stays_away_ends_the_run(situation: Situation) -> None:
+    run = situation()
+    run.vehicle.mute = True
+    began = run.clock.now().monotonic_us
+    run.tick(LinkLost(0))
+    flown = list(run.flown)
+    run.until_over()
+    assert run.ending is Ending.LINK_LOST
+    assert run.flown == flown, "nothing is sent that would not arrive"
+    assert run.clock.now().monotonic_us - began >= 30 * S
+
+
+def test_a_failsafe_while_the_link_was_lost_is_the_autopilots() -> None:
+    run = running()
+    run.tick(LinkLost(0))
+    run.tick(LinkBack(0), TakenOver(0, "RTL"))
+    assert run.ending is Ending.STOOD_DOWN
+
+
+def test_what_failed_meanwhile_falls_back_once_the_link_is_back() -> None:
+    run = running()
+    token = run.vehicle.commands[-1].token
+    run.tick(LinkLost(0), Failed(0, token, "no-effect"))
+    assert run.flown[-1] == "inspect_area"
+    run.tick(LinkBack(0))
+    assert run.flown[-1] == "hover"
+    assert run.until_over().ending is Ending.ABORTED
+
+
+def test_interrupted_while_the_link_is_lost_falls_back_once_it_is_back() -> None:
+    run = running()
+    run.tick(LinkLost(0), Interrupted(0))
+    run.tick()
+    run.tick(LinkBack(0))
+    assert run.flown[-1] == "hover"
+    assert run.until_over().ending is Ending.INTERRUPTED
+
+
+@pytest.mark.parametrize("situation", GROUND)
+def test_no_evidence_no_flight(situation: Situation) -> None:
+    run = situation()
+    run.tick(EvidenceFailed(0, "disk full"))
+    assert run.ending is Ending.EVIDENCE_LOST
+    assert run.flown == []
+
+
+@pytest.mark.parametrize("situation", AIR)
+def test_a_lost_disk_brings_the_vehicle_down_and_the_gap_is_recorded_once(situation: Situation) -> None:
+    run = situation()
+    sent = len(run.flown)
+    run.tick(EvidenceFailed(0, "disk full"))
+    run.tick(EvidenceFailed(0, "disk full"), Interrupted(0))
+    run.until_over()
+    assert run.ending is Ending.EVIDENCE_LOST
+    assert run.events.count("gap") == 1
+    assert not run.vehicle.airborne
+    after = [action for action in run.actions if isinstance(action, Dispatch)][sent:]
+    assert not any(dispatch.needs_record for dispatch in after), "nothing new is allowed any more"
+    assert all(
+        dispatch.needs_record
+        for dispatch in run.actions
+        if isinstance(dispatch, Dispatch) and dispatch.command.skill == "takeoff"
+    )
+
+
+def test_the_gravest_cause_names_the_ending() -> None:
+    run = falling()
+    run.tick(Interrupted(0))
+    run.tick(EvidenceFailed(0, "disk full"))
+    run.tick(Interrupted(0))
+    assert run.until_over().ending is Ending.EVIDENCE_LOST
+
+
+def test_landing_by_the_air_state_alone_ends_a_fallback() -> None:
+    run = returning()
+    run.tick(AirState(0, False, False))
+    assert run.ending is Ending.ABORTED
+    assert run.events[-1] == "landed"
+
+
+class Deaf:
+    """A boundary that answers until it is told not to, as one whose process died."""
+
+    def __init__(self, run_boundary: object) -> None:
+        self.boundary = run_boundary
+        self.answer: bytes | None = None
+
+    def enforce(self, request: bytes) -> bytes:
+        return self.boundary.enforce(request) if self.answer is None else self.answer  # type: ignore[attr-defined, no-any-return]
+
+
+@pytest.mark.parametrize("answer", [b"", b"\x00" * 40, encode_refusal(Status.MALFORMED)])
+def test_a_boundary_that_does_not_answer_leaves_the_standing_permits(answer: bytes) -> None:
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    run = Run(replace(of, boundary=deaf)).until_flies("goto")
+    deaf.answer = answer
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"], "undecided in the air is the contingency"
+    assert run.ending is Ending.ABORTED
+    assert run.events.count("undecided") == 3
+    assert_covered(run)
+
+
+def test_a_boundary_that_never_answers_lets_nothing_fly() -> None:
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    deaf.answer = b""
+    run = Run(replace(of, boundary=deaf))
+    assert run.ending is Ending.REFUSED
+    assert run.flown == []
+
+
+def test_an_undecided_link_of_a_running_step_flies_by_its_standing_permit() -> None:
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    run = Run(replace(of, boundary=deaf)).until_flies("goto")
+    deaf.answer = b""
+    run.vehicle.values[WIND] = 12 * M
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"]
+    dispatched = [(r["kind"], r["step"], r["link"]) for r in run.records if r.get("event") == "dispatched"]
+    assert dispatched[-2:] == [(1, 1, 0), (1, 1, 1)]
+
+
+def test_a_vehicle_that_never_moves_again_is_stood_down_from() -> None:
+    skills = {"hover", "return_home", "emergency_land"}
+    run = Run(vehicle=FakeVehicle(deaf=skills), limits=Limits(tries=2, retry_us=S)).until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until_over(3 * 3600)
+    assert run.ending is Ending.ABORTED
+    assert run.events[-1] == "stood-down"
+    assert run.runtime.view(run.clock.now()).stage is Stage.ENDED

@@ -1,0 +1,440 @@
+"""Whole runs over a fake vehicle: what the mission does on each outcome (design section 4.4)."""
+
+from collections.abc import Iterator
+
+import pytest
+from msgspec.structs import replace
+from reference.flat_case import (
+    BATTERY,
+    CONTRACTS,
+    FIX,
+    GOTO,
+    HOVER,
+    INSPECT,
+    INVOCATIONS,
+    LINK,
+    MISSION,
+    OBSTACLE,
+    POLICY,
+    RULES,
+    TAKEOFF,
+    WIND,
+    M,
+    S,
+)
+from reference.world import TICK, FakeVehicle, Run, assert_covered, loaded
+
+from rtshcua.model.flat.contract import QUANTITY, Motion, MotionKind, Parameter
+from rtshcua.model.flat.mission import Mission, OnInadmissible, Plan
+from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import AirState, Ending, Failed, Readings, Ready, Succeeded
+from rtshcua.onboard.runtime.flight import Limits, Stage
+
+RUNS: list[Run] = []
+
+
+@pytest.fixture(autouse=True)
+def all_covered() -> Iterator[None]:
+    """Whatever a run of this file does, each of its commands is covered by an earlier record."""
+    yield
+    while RUNS:
+        assert_covered(RUNS.pop())
+
+
+def start(*args: object, **options: object) -> Run:
+    run = Run(*args, **options)  # type: ignore[arg-type]
+    RUNS.append(run)
+    return run
+
+
+def without_permit(*skills: int) -> Policy:
+    rules = tuple(r for r in RULES if r.kind != RuleKind.PERMIT or not set(skills) & set(r.skills))
+    return replace(POLICY, rules=rules)
+
+
+def on_inadmissible(step: int, behaviour: OnInadmissible) -> Mission:
+    changed = tuple(replace(each, on_inadmissible=behaviour) if each.step == step else each for each in INVOCATIONS)
+    return replace(MISSION, invocations=changed)
+
+
+# ------------------------------------------------------------------------------------------------ all is well
+
+
+def test_a_normal_flight_completes() -> None:
+    run = start().until_over()
+    assert run.ending is Ending.COMPLETED
+    assert run.flown == ["takeoff", "goto", "inspect_area", "return_home"]
+    assert run.decisions == [(0, step, -1, "allow", "admitted") for step in range(4)]
+    assert run.events == ["ready", *["dispatched", "succeeded"] * 4]
+    assert run.step() == [], "nothing is done after the end"
+
+
+def test_the_same_events_give_the_same_bytes() -> None:
+    first, second = start(), start()
+    assert first.until_over().lines == second.until_over().lines
+
+
+def test_what_dispatch_took_is_measured() -> None:
+    run = start().until_over()
+    remaining = [record["context"]["remaining_us"] for record in run.records if record["type"] == "decision"]  # type: ignore[index]
+    assert remaining == [20_000] * 4, "conservative until there are enough measurements"
+
+
+def test_a_hold_of_the_mission_ends_by_its_time() -> None:
+    time = Parameter("time", QUANTITY, "duration", 0, S, 60 * S, ())
+    hover = replace(CONTRACTS[HOVER], parameters=(time,), motion=Motion(MotionKind.HOLD, -1, -1, 0), reads=(FIX,))
+    chain = tuple(replace(link, arguments=(S,)) if link.skill == HOVER else link for link in POLICY.contingency)
+    contracts = tuple(
+        replace(
+            hover if contract.name == "hover" else contract,
+            fallback=tuple(
+                replace(link, arguments=(S,)) if link.skill == HOVER else link for link in contract.fallback
+            ),
+        )
+        for contract in CONTRACTS
+    )
+    policy = replace(POLICY, contracts=contracts, contingency=chain)
+    step = replace(
+        INVOCATIONS[1],
+        skill=HOVER,
+        arguments=(30 * S,),
+        contract=contracts[HOVER],
+        plan=Plan(MotionKind.HOLD, (), 0, 0),
+    )
+    again = tuple(replace(each, contract=contracts[each.skill]) for each in INVOCATIONS)
+    mission = replace(MISSION, invocations=(again[0], step, *again[2:]))
+    vehicle = FakeVehicle()
+    run = start(loaded(policy, mission), vehicle).until_flies("hover")
+    began = run.clock.now().monotonic_us
+    vehicle.values |= {5: 110 * M, 6: -20 * M}
+    run.until_flies("inspect_area")
+    assert run.clock.now().monotonic_us - began == 30 * S, "taken up after 2 s, over after its time"
+    assert run.until_over().ending is Ending.COMPLETED
+
+
+# ----------------------------------------------------------------------------------------- while a skill runs
+
+
+def test_battery_falling_returns_by_the_degrade_rule() -> None:
+    run = start().until_flies("inspect_area")
+    run.vehicle.values[BATTERY] = 2_000
+    run.until_over()
+    assert run.flown[-2:] == ["inspect_area", "return_home"]
+    assert run.decisions[-1] == (1, 2, -1, "allow", "admitted"), "the rule's target, before the step's own chain"
+    assert "violated" in run.events
+    assert run.ending is Ending.ABORTED
+
+
+def test_wind_over_the_limit_holds_for_its_time_and_then_returns() -> None:
+    run = start().until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until_flies("hover")
+    began = run.clock.now().monotonic_us
+    run.until_flies("return_home")
+    assert run.clock.now().monotonic_us - began == 20 * S
+    assert run.until_over().ending is Ending.ABORTED
+    assert run.events[-5:] == ["violated", "dispatched", "time-over", "dispatched", "landed"]
+
+
+def test_a_signal_may_be_missing_within_the_grace() -> None:
+    run = start().until_flies("inspect_area")
+    run.vehicle.values[OBSTACLE] = None
+    for _ in range(9):  # 450 ms of the 500 ms that are granted
+        run.tick()
+    run.vehicle.values[OBSTACLE] = 20 * M
+    assert run.until_over().ending is Ending.COMPLETED
+
+
+def test_a_signal_that_stays_away_longer_counts_as_false() -> None:
+    run = start().until_flies("inspect_area")
+    run.vehicle.values[OBSTACLE] = None
+    run.until_over()
+    assert run.ending is Ending.ABORTED
+    assert run.flown[-2:] == ["hover", "return_home"]
+
+
+def test_a_signal_that_falls_silent_grows_stale_without_an_event() -> None:
+    run = start().until_flies("inspect_area")
+    run.vehicle.silent = {OBSTACLE}
+    run.vehicle.deaf = {"inspect_area"}
+    assert run.until_over().ending is Ending.ABORTED
+
+
+def test_a_skill_that_lasts_too_long_is_given_up() -> None:
+    run = start(vehicle=FakeVehicle(deaf={"goto"}))
+    run.until_over(400)
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"]
+    assert [record["detail"] for record in run.records if record.get("event") == "violated"] == [
+        "lasts longer than it may"
+    ]
+
+
+def test_it_came_down_without_being_told_to() -> None:
+    run = start().until_flies("goto")
+    run.tick(AirState(0, False, False))
+    assert run.ending is Ending.ABORTED
+    assert run.flown[-1] == "goto"
+
+
+# ------------------------------------------------------------------------------------- not admitted in the air
+
+
+def test_missing_and_back_before_the_deadline_goes_on_from_a_hold() -> None:
+    run = start().until_flies("goto")
+    run.vehicle.values[OBSTACLE] = None
+    run.until_flies("hover")
+    for _ in range(20):
+        run.tick()
+    run.vehicle.values[OBSTACLE] = 20 * M
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "inspect_area", "return_home"]
+    assert run.ending is Ending.COMPLETED
+    deferred = [decision for decision in run.decisions if decision[3] == "defer"]
+    assert deferred == [(0, 2, -1, "defer", "state/unknown")], "the same answer is recorded once"
+    assert "repeated" in run.events
+
+
+def test_missing_past_the_deadline_falls_back() -> None:
+    run = start().until_flies("goto")
+    run.vehicle.values[OBSTACLE] = None
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "hover", "return_home"]
+    assert (0, 2, -1, "fallback", "timing/no-slack") in run.decisions
+    assert run.ending is Ending.ABORTED
+
+
+def test_denied_in_the_air_flies_the_contingency() -> None:
+    run = start(loaded(without_permit(GOTO))).until_over()
+    assert run.flown == ["takeoff", "hover", "return_home"]
+    assert (0, 1, -1, "deny", "authority/not-permitted") in run.decisions
+    assert (2, -1, 0, "allow", "admitted") in run.decisions
+    assert run.ending is Ending.ABORTED
+
+
+def test_denied_in_the_air_ignores_what_the_step_says() -> None:
+    run = start(loaded(without_permit(GOTO), on_inadmissible(1, OnInadmissible.SKIP))).until_over()
+    assert run.flown == ["takeoff", "hover", "return_home"]
+    assert "skipped" not in run.events
+
+
+def test_inadmissible_may_be_skipped() -> None:
+    vehicle = FakeVehicle()
+    run = start(loaded(mission=on_inadmissible(2, OnInadmissible.SKIP)), vehicle).until_flies("goto")
+    vehicle.values[OBSTACLE] = M
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "return_home"]
+    assert "skipped" in run.events
+    assert run.ending is Ending.COMPLETED
+
+
+def test_inadmissible_may_be_held_for() -> None:
+    run = start(loaded(mission=on_inadmissible(2, OnInadmissible.HOLD))).until_flies("goto")
+    run.vehicle.values[OBSTACLE] = M
+    run.until_flies("hover")
+    run.vehicle.values[OBSTACLE] = 20 * M
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "inspect_area", "return_home"]
+    assert run.ending is Ending.COMPLETED
+
+
+def test_held_for_in_vain_falls_back_at_the_deadline() -> None:
+    run = start(loaded(mission=on_inadmissible(2, OnInadmissible.HOLD))).until_flies("goto")
+    run.vehicle.values[OBSTACLE] = M
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "hover", "return_home"]
+    assert run.ending is Ending.ABORTED
+
+
+def test_a_step_that_awaits_an_approval_is_not_timed_by_its_deadline() -> None:
+    low = INVOCATIONS[2]
+    step = replace(low, arguments=(low.arguments[0], 8 * M, *low.arguments[2:]), plan=replace(low.plan, altitude=8 * M))
+    run = start(loaded(mission=replace(MISSION, invocations=(*INVOCATIONS[:2], step, INVOCATIONS[3]))))
+    run.until_flies("hover")
+    began = run.clock.now().monotonic_us
+    run.until(lambda run: (0, 2, -1, "deny", "approval/timed-out") in run.decisions)
+    assert run.clock.now().monotonic_us - began >= 30 * S
+    assert run.until_over().flown == ["takeoff", "goto", "hover", "hover", "return_home"]
+
+
+# -------------------------------------------------------------------------------------------------- on the ground
+
+
+@pytest.mark.parametrize(
+    ("policy", "values", "reason"),
+    [
+        (without_permit(TAKEOFF), {}, "authority/not-permitted"),
+        (POLICY, {BATTERY: 2_000}, "state/violated"),
+        (POLICY, {WIND: 12 * M}, "state/violated"),
+    ],
+)
+def test_refused_on_the_ground_sends_nothing(policy: Policy, values: dict[int, int], reason: str) -> None:
+    vehicle = FakeVehicle()
+    vehicle.values |= values
+    run = start(loaded(policy), vehicle)
+    assert run.ending is Ending.REFUSED
+    assert run.flown == []
+    assert run.decisions[0][4] == reason
+
+
+def test_deferred_on_the_ground_waits_for_the_deadline_and_is_refused() -> None:
+    vehicle = FakeVehicle()
+    vehicle.values[FIX] = None
+    run = start(vehicle=vehicle)
+    for _ in range(39):
+        run.tick()
+    assert run.ending is None
+    run.until_over()
+    assert run.ending is Ending.REFUSED
+    assert run.flown == []
+
+
+def test_deferred_on_the_ground_may_still_start() -> None:
+    vehicle = FakeVehicle()
+    vehicle.values[FIX] = None
+    run = start(vehicle=vehicle)
+    run.tick()
+    vehicle.values[FIX] = 3
+    assert run.until_over().ending is Ending.COMPLETED
+
+
+def test_a_vehicle_that_refuses_to_arm_ends_refused() -> None:
+    run = start(vehicle=FakeVehicle(fails={"takeoff"}))
+    run.until_over()
+    assert run.flown == ["takeoff"]
+    assert run.ending is Ending.REFUSED
+
+
+def test_an_airborne_vehicle_is_left_alone() -> None:
+    run = start(vehicle=FakeVehicle(airborne=True, armed=True))
+    assert run.ending is Ending.REFUSED
+    assert run.flown == []
+
+
+def test_a_vehicle_that_is_never_ready() -> None:
+    run = start(ready=False, limits=Limits(ready_us=5 * S))
+    run.until_over()
+    assert run.ending is Ending.REFUSED
+    assert "never-ready" in run.events
+
+
+def test_ready_without_a_word_on_the_air_state_waits() -> None:
+    run = start(ready=False)
+    run.tick(Ready(0))
+    assert run.flown == []
+    run.tick(Ready(0), AirState(0, False, False))
+    assert run.flown == ["takeoff"]
+
+
+@pytest.mark.parametrize(("airborne", "flown"), [(True, ["hover", "return_home"]), (False, [])])
+def test_a_restart_brings_down_what_flies_and_starts_nothing(airborne: bool, flown: list[str]) -> None:
+    vehicle = FakeVehicle(airborne=airborne, armed=airborne)
+    run = start(vehicle=vehicle, resumed=True).until_over()
+    assert run.flown == flown
+    assert run.ending is (Ending.ABORTED if airborne else Ending.REFUSED)
+
+
+# ------------------------------------------------------------------------------------------- how a chain goes on
+
+
+def test_a_link_that_fails_gives_way_to_the_next() -> None:
+    run = start(vehicle=FakeVehicle(fails={"hover", "return_home"})).until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until_flies("return_home")
+    run.until_over()
+    assert run.flown[-3:] == ["hover", "return_home", "emergency_land"]
+    assert run.ending is Ending.ABORTED
+
+
+def test_a_link_that_may_not_fly_is_passed_over() -> None:
+    run = start().until_flies("goto")
+    run.vehicle.values[FIX] = 0
+    run.vehicle.fails = {"goto"}
+    run.until_over()
+    assert run.flown[-1] == "emergency_land"
+
+
+def test_a_chain_that_is_used_up_is_followed_by_the_contingency() -> None:
+    run = start(vehicle=FakeVehicle(fails={"hover", "return_home", "emergency_land"})).until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until(lambda run: run.flown.count("emergency_land") == 2)
+    assert run.flown[2:] == ["hover", "return_home", "emergency_land"] * 2
+    run.vehicle.fails = set()
+    assert run.until_over().ending is Ending.ABORTED
+
+
+def test_the_last_link_is_tried_again_and_then_the_run_stands_down() -> None:
+    run = start(
+        vehicle=FakeVehicle(fails={"hover", "return_home", "emergency_land"}), limits=Limits(tries=3, retry_us=S)
+    )
+    run.until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until_over()
+    assert run.flown[-5:] == ["return_home", *["emergency_land"] * 4]
+    assert run.events[-2:] == ["stranded", "stood-down"]
+    assert run.vehicle.released
+    assert run.ending is Ending.ABORTED
+
+
+def test_a_mission_that_ends_in_the_air_is_brought_down() -> None:
+    run = start(loaded(mission=replace(MISSION, invocations=INVOCATIONS[:2]))).until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"]
+    assert run.ending is Ending.ABORTED
+
+
+def test_words_about_commands_that_are_over_mean_nothing() -> None:
+    run = start().until_flies("goto")
+    token = run.vehicle.commands[0].token
+    run.tick(Succeeded(0, token), Failed(0, token, "late"), Succeeded(0, 10**9))
+    assert run.flown[-1] == "goto"
+    assert run.until_over().ending is Ending.COMPLETED
+
+
+def test_a_command_that_was_not_sent_in_time_falls_back() -> None:
+    run = start().until_flies("goto")
+    run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+    assert run.flown[-1] == "hover"
+
+
+def test_readings_that_make_no_sense_are_unknown_or_ignored() -> None:
+    run = start().until_flies("inspect_area")
+    run.tick(Readings(run.clock.now().monotonic_us + TICK, ((99, 1), (-1, 1), (OBSTACLE, 1 << 80))))
+    reading = next(r for r in run.runtime.view(run.clock.now()).signals if r.name == "obstacle.distance")
+    assert reading.values == (None,)
+
+
+# --------------------------------------------------------------------------------------------------- mode none
+
+
+def test_mode_none_records_what_it_does_not_enforce() -> None:
+    run = Run(loaded(without_permit(GOTO), mode=Mode.NONE)).until_over()
+    assert (0, 1, -1, "deny", "authority/not-permitted") in run.decisions
+    assert run.flown == ["takeoff", "goto", "inspect_area", "return_home"]
+    assert run.ending is Ending.COMPLETED
+
+
+# -------------------------------------------------------------------------------------------------------- view
+
+
+def test_the_view_follows_the_run() -> None:
+    run = start(ready=False)
+    view = run.runtime.view(run.clock.now())
+    assert (view.stage, view.contract, view.left_us, view.airborne) == (Stage.WAITING, "takeoff", None, None)
+    run.tick(AirState(0, False, False), Ready(0))
+    run.until_flies("goto")
+    run.tick()
+    view = run.runtime.view(run.clock.now())
+    assert (view.stage, view.phase, view.step, view.steps) == (Stage.RUNNING, "inspection", 1, 4)
+    assert view.contract == "goto"
+    assert view.left_us == 5 * 60 * S - TICK
+    assert view.decisions[-1].outcome == "allow"
+    assert next(r for r in view.signals if r.name == "battery").values == (9_000,)
+    run.vehicle.values[OBSTACLE] = None
+    run.until_flies("hover")
+    view = run.runtime.view(run.clock.now())
+    assert view.stage is Stage.DECIDING
+    assert view.left_us == 2 * S
+    assert view.decisions[-2].reason == "state/unknown"
+    run.until_over()
+    view = run.runtime.view(run.clock.now())
+    assert (view.stage, view.left_us, view.ending) == (Stage.ENDED, None, Ending.ABORTED)

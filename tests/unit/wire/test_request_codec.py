@@ -1,0 +1,124 @@
+import struct
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.wire import artefact, cbor, names, request
+from rtshcua.wire.request import MAX_AGE_US, MAX_SIZE, MAX_SLOTS, STEP, Malformed, Request
+
+TIME = st.integers(0, MAX_VALUE)
+
+
+def plain(slots: int = 3) -> Request:
+    state = State(tuple([None, 7, -7] * slots)[:slots], tuple(range(slots)))
+    return Request(STEP, 2, -1, bytes(range(32)), Now(10, 20, 30), state, 5, 1, 400)
+
+
+@st.composite
+def requests(draw: st.DrawFn) -> Request:
+    slots = draw(st.integers(0, MAX_SLOTS))
+    values = draw(st.lists(st.none() | st.integers(-MAX_VALUE, MAX_VALUE), min_size=slots, max_size=slots))
+    ages = draw(st.lists(st.integers(0, MAX_AGE_US), min_size=slots, max_size=slots))
+    return Request(
+        draw(st.integers(0, 2)),
+        draw(st.integers(-1, 1 << 14)),
+        draw(st.integers(-1, 8)),
+        draw(st.binary(min_size=32, max_size=32)),
+        Now(draw(TIME), draw(TIME), draw(TIME)),
+        State(tuple(values), tuple(ages)),
+        draw(TIME),
+        draw(st.integers(0, 63)),
+        draw(TIME),
+    )
+
+
+@given(requests())
+def test_what_is_encoded_is_read_back_and_fits(asked: Request) -> None:
+    data = request.encode(asked)
+    assert len(data) <= MAX_SIZE
+    assert request.decode(data, len(asked.state.values)) == asked
+
+
+def test_the_largest_request_fits() -> None:
+    state = State((MAX_VALUE,) * MAX_SLOTS, (MAX_AGE_US,) * MAX_SLOTS)
+    now = Now(MAX_VALUE, MAX_VALUE, MAX_VALUE)
+    largest = Request(2, (1 << 15) - 1, (1 << 15) - 1, bytes(32), now, state, MAX_VALUE, (1 << 15) - 1, MAX_VALUE)
+    assert len(request.encode(largest)) <= MAX_SIZE
+
+
+@given(requests(), st.data())
+def test_a_changed_byte_is_refused_or_is_another_request(asked: Request, data: st.DataObject) -> None:
+    good = request.encode(asked)
+    at = data.draw(st.integers(0, len(good) - 1))
+    bad = bytearray(good)
+    bad[at] ^= data.draw(st.integers(1, 255))
+    read = request.decode(bytes(bad), len(asked.state.values))
+    if isinstance(read, Request):
+        assert request.encode(read) == bytes(bad), "one request, one encoding"
+
+
+@given(st.binary(max_size=1500))
+def test_any_bytes_are_an_answer_and_never_an_exception(data: bytes) -> None:
+    assert isinstance(request.decode(data, 4), Malformed)
+
+
+GOOD = request.encode(plain())
+HEAD = GOOD[: -(79 + 12 * 3)]  # what comes before kind
+
+
+def changed(at: int, octets: bytes) -> bytes:
+    """The good request with other octets at an offset of its body."""
+    start = len(HEAD) + at
+    return GOOD[:start] + octets + GOOD[start + len(octets) :]
+
+
+BIG = (MAX_VALUE + 1).to_bytes(8)
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        (b"", "not a request of version 1 for a state of 3 slots"),
+        (bytes(MAX_SIZE + 1), "not a request"),
+        (GOOD + b"\0", "not a request"),
+        (GOOD[:-1], "not a request"),
+        (cbor.encode(("rtshcua/request", 2, bytes(123))), "not a request"),
+        (cbor.encode(("rtshcua/permit!", 1, bytes(123))), "not a request"),
+        (artefact.wrap(names.REQUEST, 7), "not a request"),
+        (changed(0, b"\3"), "a kind, step or link out of range"),
+        (changed(1, b"\xff\xfe"), "a kind, step or link out of range"),
+        (changed(3, b"\x80\0"), "a kind, step or link out of range"),
+        (changed(37, BIG), "a time out of range"),
+        (changed(45, BIG), "a time out of range"),
+        (changed(53, BIG), "a time out of range"),
+        (changed(61, BIG), "a time out of range"),
+        (changed(69, BIG), "a time out of range"),
+        (changed(79, BIG), "a state value out of range"),
+        (changed(95, (-MAX_VALUE - 1).to_bytes(8, signed=True)), "a state value out of range"),
+    ],
+)
+def test_each_rule_is_named(data: bytes, text: str) -> None:
+    read = request.decode(data, 3)
+    assert isinstance(read, Malformed)
+    assert text in read.text
+
+
+def test_the_body_is_one_artefact() -> None:
+    body = artefact.unwrap(names.REQUEST, GOOD)
+    assert isinstance(body, bytes)
+    assert HEAD + body == GOOD
+
+
+def test_a_state_of_another_policy_is_refused() -> None:
+    assert isinstance(request.decode(request.encode(plain(3)), 3), Request)
+    assert isinstance(request.decode(request.encode(plain(3)), 4), Malformed)
+
+
+def test_no_monitor_makes_what_does_not_fit() -> None:
+    too_old = msgspec.structs.replace(plain(1), state=State((1,), (MAX_AGE_US + 1,)))
+    with pytest.raises(struct.error):
+        request.encode(too_old)

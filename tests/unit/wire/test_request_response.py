@@ -1,0 +1,84 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.wire import artefact, cbor, names, permit, response
+from rtshcua.wire.permit import SIZE, Permit
+from rtshcua.wire.response import Answer, Status, Unusable
+
+ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE)
+
+
+@given(
+    st.sampled_from(list(Outcome)),
+    st.sampled_from(list(Reason)),
+    st.integers(-(1 << 15) - 1, 1 << 16),
+    st.just(b"") | st.binary(min_size=SIZE, max_size=SIZE),
+)
+def test_what_is_encoded_is_read_back(outcome: Outcome, reason: Reason, number: int, permit: bytes) -> None:
+    answer = Answer(outcome, reason, 1, number, number, abs(number), 1, permit)
+    assert response.decode(response.encode(answer)) == answer
+
+
+@pytest.mark.parametrize("status", [status for status in Status if status])
+def test_a_refusal_is_its_status(status: Status) -> None:
+    assert response.decode(response.encode_refusal(status)) is status
+
+
+PLAIN = response.encode(Answer(Outcome.ALLOW, Reason.ADMITTED, 8, -1, -2, 0, 0))
+REFUSAL = response.encode_refusal(Status.NOT_CURRENT)
+
+
+def changed(data: bytes, at: int, octet: int) -> bytes:
+    """`data` with another octet at an offset of its body of 21 octets."""
+    start = len(data) - 21 + at
+    return data[:start] + bytes([octet]) + data[start + 1 :]
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        (b"", "not a response of version 1"),
+        (PLAIN + b"\0", "not a response of version 1"),
+        (PLAIN[:-1], "not a response of version 1"),
+        (PLAIN + b"p" * SIZE, "not a response of version 1"),
+        (response.encode(ANSWER)[:-1], "not a response of version 1"),
+        (cbor.encode(("rtshcua/response", 2, bytes(21))), "not a response of version 1"),
+        (artefact.wrap(names.RESPONSE, 1), "not a response of version 1"),
+        (changed(PLAIN, 1, len(Outcome)), "an outcome or a reason that there is not"),
+        (changed(PLAIN, 2, len(Reason)), "an outcome or a reason that there is not"),
+        (changed(REFUSAL, 0, len(Status)), "a refusal with more than its status"),
+        (changed(REFUSAL, 20, 1), "a refusal with more than its status"),
+    ],
+)
+def test_what_is_no_response_says_why(data: bytes, text: str) -> None:
+    read = response.decode(data)
+    assert isinstance(read, Unusable)
+    assert text in read.text
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_are_read_without_an_exception(data: bytes) -> None:
+    assert isinstance(response.decode(data), Unusable)
+
+
+KEY = bytes(range(32))
+PERMIT = Permit(1, 3, -2, 17, 3, 2, 1 << 53)
+
+
+def test_a_permit_opens_under_its_key_alone() -> None:
+    sealed = permit.seal(PERMIT, KEY)
+    assert len(sealed) == SIZE
+    assert permit.open_permit(sealed, KEY) == PERMIT
+    assert permit.open_permit(sealed, bytes(32)) is None
+
+
+def test_no_bit_of_a_permit_may_change() -> None:
+    sealed = permit.seal(PERMIT, KEY)
+    for bit in range(8 * SIZE):
+        changed = bytearray(sealed)
+        changed[bit // 8] ^= 1 << bit % 8
+        assert permit.open_permit(bytes(changed), KEY) is None
+    assert permit.open_permit(sealed[:-1], KEY) is None
+    assert permit.open_permit(sealed + b"\0", KEY) is None

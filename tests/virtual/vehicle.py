@@ -1,0 +1,79 @@
+"""The simulated vehicle behind its real driver, in one process and in explicit time: the `Vehicle` and `Clock` ports."""
+
+from collections.abc import Sequence
+
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.ports import Command, Event, Readings
+from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.world import Simulation
+
+TICK_US = 20_000
+SECOND = 1_000_000
+#: where the clock starts: a monotonic time that is not 0, and a UTC time
+START = Now(7_000_000, 1_767_225_600_000_000, 1_000)
+
+
+class VirtualClock:
+    """Time that only moves when it is told to."""
+
+    def __init__(self, start: Now = START) -> None:
+        self.elapsed_us = 0
+        self._start = start
+
+    def now(self) -> Now:
+        start = self._start
+        return Now(start.monotonic_us + self.elapsed_us, start.utc_us + self.elapsed_us, start.utc_error_us)
+
+
+class VirtualVehicle:
+    """Steps the simulation tick by tick; what would be datagrams are method calls.
+
+    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives the
+    bytes that come in place of a datagram from it.
+    """
+
+    def __init__(self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None) -> None:
+        self.simulation = Simulation(config)
+        self.driver = Driver(policy)
+        self.clock = clock or VirtualClock()
+        self.received = self.sent = 0
+        self.lose = lambda frame: False
+        self.hurt = lambda datagram: [datagram]
+        self._pending: list[Event] = []
+
+    def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
+        """Let time pass, at most `timeout_us`; comes back early for anything but readings."""
+        events, self._pending = self._pending, []
+        end_us = self.clock.elapsed_us + timeout_us
+        while True:
+            happened, frames = self.driver.tick(self.clock.now().monotonic_us)
+            events += happened
+            self._send(frames, events)
+            if self.clock.elapsed_us >= end_us or any(not isinstance(event, Readings) for event in events):
+                return events
+            self.clock.elapsed_us = min(end_us, self.clock.elapsed_us + TICK_US)
+            self._take(self.simulation.advance(self.clock.elapsed_us), events)
+
+    def begin(self, command: Command, now_us: int) -> None:
+        events, frames = self.driver.begin(command, now_us)
+        self._send(frames, events)
+        self._pending += events
+
+    def release(self) -> None:
+        self.driver.release()
+
+    def _send(self, frames: Sequence[bytes], events: list[Event]) -> None:
+        for frame in frames:
+            self.sent += 1
+            if not self.lose(frame):
+                self._take(self.simulation.receive(frame, self.clock.elapsed_us), events)
+
+    def _take(self, datagrams: Sequence[bytes], events: list[Event]) -> None:
+        for original in datagrams:
+            for datagram in self.hurt(original):
+                heard = self.driver.receive(datagram, self.clock.now().monotonic_us)
+                self.received += len(heard.frames)
+                events += heard.events
+                self._send(heard.answers, events)

@@ -18,7 +18,6 @@ from msgspec.structs import replace
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference import flat_case as flat
-
 from rtshcua.decision.authority import authority
 from rtshcua.decision.case import Case, situation
 from rtshcua.decision.decide import decide
@@ -202,7 +201,7 @@ def cedar_for_decide() -> Callable[[], object]:
         f'permit({who}, {skill}, resource) when {{ context.area == "bridge_a" && context.altitude <= 30000 && '
         "context.daytime >= 28800 && context.daytime <= 64800 && context.fix >= 3 && context.battery > 3500 && "
         "context.quality >= 4000 && context.wind < 10000 && context.obstacle > 5000 };",
-        f'permit(principal, action in [Action::"s1", Action::"s4", Action::"s5"], resource);',
+        'permit(principal, action in [Action::"s1", Action::"s4", Action::"s5"], resource);',
         f"forbid(principal, {skill}, resource) when {{ context.altitude < 10000 }};",
         "forbid(principal, action, resource) when { context.battery < 2500 };",
         f"forbid(principal, {skill}, resource) when {{ context.battery < 1000 }};",

@@ -25,6 +25,10 @@ class LinkClock(Protocol):
         """How long `us` of this clock last on the machine's, for waiting."""
         ...
 
+    def us_in(self, seconds: float) -> int:
+        """How far this clock goes, at most, in that time of the machine's."""
+        ...
+
 
 class SystemClock:
     """Monotonic time and UTC of the machine, in us. UTC is read once and carried on: a clock step moves nothing."""
@@ -45,13 +49,18 @@ class SystemClock:
         """The same in seconds."""
         return us / 1_000_000
 
+    def us_in(self, seconds: float) -> int:
+        """The same in us."""
+        return int(seconds * 1_000_000)
+
 
 class PacedClock:
     """Time as a simulated vehicle has it that lives `speed` times as fast; never for a real one.
 
     It runs on from the vehicle's boot time as frames bring it, at most `LEAD_US` ahead: when the vehicle's process or
     this one is held up for a moment, which at such a speed is a long time, the age of a signal does not jump. Only when
-    nothing was heard for `PATIENCE_NS` of the machine's time does it run free, so that silence is still noticed.
+    nothing was heard for `PATIENCE_NS` of the machine's time does it run free, so that silence is still noticed. Until
+    the vehicle first tells its time, this is the machine's.
     """
 
     LEAD_US = 200_000
@@ -71,10 +80,11 @@ class PacedClock:
     def now(self) -> Now:
         """The present moment; never before the last."""
         silent_ns = self._machine_ns() - self._heard_ns
-        run_us = int(silent_ns * self._speed) // 1_000
-        if self._boot_us is not None:
+        if self._boot_us is None:
+            run_us = silent_ns // 1_000
+        else:
             free_us = int(max(0, silent_ns - self.PATIENCE_NS) * self._speed) // 1_000
-            run_us = min(run_us, self.LEAD_US) + free_us
+            run_us = min(int(silent_ns * self._speed) // 1_000, self.LEAD_US) + free_us
         self._last_us = max(self._last_us, self._base_us + run_us)
         return Now(self._last_us, self._last_us + self._ahead_us, self._utc_error_us)
 
@@ -91,3 +101,7 @@ class PacedClock:
     def real_seconds(self, us: int) -> float:
         """The same on the machine's clock."""
         return us / 1_000_000 / self._speed
+
+    def us_in(self, seconds: float) -> int:
+        """The same on this one."""
+        return int(seconds * 1_000_000 * self._speed)

@@ -103,9 +103,9 @@ class Flight:
         return code, summary
 
     def _follow(self) -> Ending:
-        wait_us = max(_WAIT_US, int(_FASTEST_WAIT_S * 1_000_000 * self._speed))
+        wait_us = max(_WAIT_US, self._clock.us_in(_FASTEST_WAIT_S))
         loop = Loop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us)
-        also, self._early = self._early, []
+        also = [*self._early, *self._backlog()]
         while True:
             match self._interrupts.wish():
                 case Wish.LAND:
@@ -121,6 +121,13 @@ class Flight:
             if ending is not None:
                 return ending
             also = []
+
+    def _backlog(self) -> list[Event]:
+        """What the vehicle said while this was put together, so that the runtime begins with the present."""
+        events: list[Event] = []
+        while said := self._vehicle.poll(self._clock.now().monotonic_us, 0):
+            events += said
+        return events
 
     def _leave(self) -> Ending:
         """Stop watching: send nothing more, and say so in the log."""

@@ -177,7 +177,7 @@ def _meet(order: Launch, vehicle: UdpVehicle, clock: LinkClock, interrupts: Inte
                 ExitCode.LINK, "no-vehicle", f"no heartbeat of {where} within {HEARTBEAT_S:.0f} s",
                 "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try",
             )  # fmt: skip
-        events += vehicle.poll(clock.now().monotonic_us, int(_POLL_S * order.speed * 1_000_000))
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     return events
 
 
@@ -192,7 +192,7 @@ def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: Li
     seen = vehicle.driver.seen
     until_s = time.monotonic() + AIR_S
     while not seen.landed_state and time.monotonic() < until_s:
-        events += vehicle.poll(clock.now().monotonic_us, int(_POLL_S * order.speed * 1_000_000))
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if seen.airborne:
         return True
     text = f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"

@@ -29,7 +29,7 @@ def run(
     ] = None,
     mode: Annotated[Mode, typer.Option(help="how decisions are enforced; `none` flies the simulated vehicle only")]
     = Mode.SOFTWARE,
-    speed: Annotated[float, typer.Option(min=0.1, max=200, help="seconds of flight in a second; in simulation")] = 1.0,
+    speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
     flavour: simulated.Flavour = None,
     battery: simulated.Battery = None,
     wind: simulated.Wind = None,

@@ -29,7 +29,6 @@ class Row(NamedTuple):
 COMMANDS = (
     Row("check", "write", "report everything that is wrong with sources or a mission specification"),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
-    Row("explain", "write", "print the page of a diagnostic code"),
     Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),
     Row("keys", "fly", "make and list signing keys and the trust root"),
     Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),

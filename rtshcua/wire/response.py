@@ -22,6 +22,7 @@ NO_TARGET: Final = -(1 << 15) - 1
 #: `clause` where the contract itself decided
 NO_CLAUSE: Final = -1
 
+_OUTCOMES: Final = tuple(Outcome)
 _HEAD: Final = Struct(">BBBBiiqB")
 
 
@@ -100,11 +101,11 @@ def decode(data: bytes) -> Answer | Status | Unusable:
         if refused is None or data != encode_refusal(refused):
             return Unusable("a refusal with more than its status")
         return refused
-    if outcome >= len(Outcome) or reason >= len(WIRE_REASONS):
+    if outcome >= len(_OUTCOMES) or reason >= len(WIRE_REASONS):
         return Unusable("an outcome or a reason that there is not")
     clause, target, valid_until_us, consumed = numbers
     return Answer(
-        Outcome(outcome), WIRE_REASONS[reason], rule_step, clause, target, valid_until_us, consumed, data[start:]
+        _OUTCOMES[outcome], WIRE_REASONS[reason], rule_step, clause, target, valid_until_us, consumed, data[start:]
     )
 
 

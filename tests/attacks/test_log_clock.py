@@ -12,8 +12,9 @@ def moved(number: int, field: str, by: int) -> list[bytes]:
 
 
 def test_monotonic_time_going_back() -> None:
-    assert expect(rewritten(moved(EFFECT, "at_us", -60_000_000))) == ("clock/backwards", EFFECT)
-    assert expect(signed(moved(EFFECT, "at_us", -60_000_000))) == ("clock/backwards", EFFECT)
+    back = read(LINES[EFFECT - 1])["at_us"] - read(LINES[EFFECT])["at_us"] - 1
+    assert expect(rewritten(moved(EFFECT, "at_us", back))) == ("clock/backwards", EFFECT)
+    assert expect(signed(moved(EFFECT, "at_us", back))) == ("clock/backwards", EFFECT)
 
 
 def test_monotonic_time_going_too_far() -> None:
@@ -32,7 +33,5 @@ def test_utc_set_back_by_less_than_its_error_is_what_a_clock_may_do() -> None:
 
 def test_a_dispatch_after_its_permit_was_over() -> None:
     number = next(n for n, line in enumerate(LINES) if read(line).get("event") == "dispatched")
-    late = [
-        edit(line, at_us=read(line)["at_us"] + 3_600_000_000) if n >= number else line for n, line in enumerate(LINES)
-    ]
-    assert expect(signed(late)) == ("dispatch/late", number)
+    after = [edit(line, at_us=read(line)["at_us"] + 3_600_000_000) for line in LINES[number:]]
+    assert expect(signed([*LINES[:number], *after])) == ("dispatch/late", number)

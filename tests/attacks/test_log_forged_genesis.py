@@ -25,28 +25,34 @@ def flipped(field: str, at: int) -> str:
     [
         ({"vehicle": "quad-08"}, "trust/bundle-wrong-vehicle"),
         ({"mission": "another"}, "genesis/mission"),
-        ({"format": "rtshcua/diary"}, "genesis/format"),
-        ({"version": 2}, "genesis/format"),
         ({"bundle": "AAAA"}, "trust/bundle-malformed"),
         ({"bundle": ""}, "trust/bundle-malformed"),
         ({"bundle": "no base64"}, "genesis/base64"),
         ({"root": GENESIS["root"].rstrip("=") + "\n"}, "genesis/base64"),
         ({"root": "AAAA"}, "trust/root-malformed"),
         ({"root": GENESIS["bundle"]}, "trust/root-malformed"),
-        ({"utc_us": 0}, "trust/bundle"),
+    ],
+)
+def test_a_forged_field(fields: dict[str, object], slug: str) -> None:
+    """Each is seen at once, even when the log key's holder wrote the rest anew; without that, by the chain."""
+    assert expect(signed(begun(**fields))) == (slug, 0)
+    assert expect(begun(**fields)) == ("chain/broken", 0)
+
+
+@pytest.mark.parametrize(
+    ("fields", "slug"),
+    [
+        ({"format": "rtshcua/diary"}, "genesis/format"),
+        ({"version": 2}, "genesis/format"),
         ({"boot": "00"}, "record/malformed"),
         ({"log_key": "00"}, "record/malformed"),
+        ({"log_kid": "00" * 16}, "genesis/log-key"),
         ({"seq": 1}, "chain/sequence"),
         ({"_prev": "11" * 32}, "chain/broken"),
     ],
 )
-def test_a_forged_field(fields: dict[str, object], slug: str) -> None:
-    found, record = expect(begun(**fields))
-    if slug == "trust/bundle":  # an earlier time: nothing had expired, and nothing proves the time but the records
-        assert (found, record) == ("chain/broken", 0)
-        return
-    assert record == 0
-    assert found == slug or (found, slug.partition("/")[0]) == ("chain/broken", "trust"), found
+def test_a_field_that_no_genesis_has(fields: dict[str, object], slug: str) -> None:
+    assert expect(begun(**fields)) == (slug, 0)
 
 
 @pytest.mark.parametrize("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])

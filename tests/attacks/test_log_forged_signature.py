@@ -83,7 +83,7 @@ def test_one_byte_of_the_signature() -> None:
 
 
 def test_the_key_holder_may_rewrite_and_the_report_says_so() -> None:
-    """No key can tell what its holder wrote first. Effects that decide nothing can be rewritten: only a witness knows."""
+    """No key tells what its holder wrote first. Effects that decide nothing can be rewritten: only a witness knows."""
     number = next(n for n, line in enumerate(LINES) if read(line).get("event") == "succeeded")
     forged = signed([*LINES[:number], edit(LINES[number], detail="rewritten"), *LINES[number + 1 :]])
     report = prove(forged).report

@@ -29,7 +29,8 @@ def with_line(line: str | bytes) -> list[bytes]:
         json.dumps(dict(reversed(read(LINE).items())), separators=(",", ":")),
         TEXT.replace('"seq":2', '"seq":2.0', 1),
         TEXT.replace('"seq":2', '"seq":2e0', 1),
-        TEXT.replace('"type":"effect"', '"type":"\\u0065ffect"', 1),
+        TEXT.replace('"type":"decision"', '"type":"\\u0064ecision"', 1),
+        TEXT.replace('"mode":"software"', '"mode":"\\u0073oftware"', 1),
     ],
 )
 def test_whitespace_order_and_escapes(line: str) -> None:

@@ -106,9 +106,7 @@ GOOD_LINK = clause("link.quality >= 40 %", apply(Op.GE, signal(LINK), const(4_00
 CALM = clause("wind.speed < 10 m/s", apply(Op.LT, signal(WIND), const(10 * M)))
 FREE = clause("obstacle.distance > 5 m", apply(Op.GT, signal(OBSTACLE), const(5 * M)))
 NEAR_AREA = clause("position inside grow(area, 15 m)", (Op.POSITION_IN_ARGUMENT, 0, GROW_15))
-NOT_HIGH = clause(
-    "height <= altitude + 5 m", apply(Op.LE, signal(HEIGHT), apply(Op.ADD, argument(1), const(5 * M)))
-)
+NOT_HIGH = clause("height <= altitude + 5 m", apply(Op.LE, signal(HEIGHT), apply(Op.ADD, argument(1), const(5 * M))))
 
 
 def link(skill: int, *arguments: int, limit_us: int = 0) -> Link:
@@ -307,12 +305,8 @@ def invocation(step: int, phase: int, skill: int, plan: Plan, *arguments: int, *
 INSPECTION_STEP = 2
 INVOCATIONS = (
     invocation(0, DEPARTURE, TAKEOFF, Plan(MotionKind.CLIMB, (), 20 * M, 0), 20 * M),
-    invocation(
-        1, INSPECTION, GOTO, Plan(MotionKind.FLY, (110 * M, -20 * M), 20 * M, 0), 110 * M, -20 * M, 20 * M
-    ),
-    invocation(
-        2, INSPECTION, INSPECT, Plan(MotionKind.COVER, PATH, 20 * M, 4 * M), BRIDGE, 20 * M, 0, 4 * M
-    ),
+    invocation(1, INSPECTION, GOTO, Plan(MotionKind.FLY, (110 * M, -20 * M), 20 * M, 0), 110 * M, -20 * M, 20 * M),
+    invocation(2, INSPECTION, INSPECT, Plan(MotionKind.COVER, PATH, 20 * M, 4 * M), BRIDGE, 20 * M, 0, 4 * M),
     invocation(3, RECOVERY, HOME, Plan(MotionKind.HOME, (0, 0), 0, 0)),
 )
 MISSION = Mission(

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import product
 
 from reference.naive_geometry import circle_far, circle_near, corners, in_shape, touches, widened
-
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone

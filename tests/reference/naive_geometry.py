@@ -21,9 +21,7 @@ def on_segment(p: Point, a: Point, b: Point) -> bool:
     """p is a + t (b - a) for some t in 0..1."""
     if a == b:
         return p == a
-    along = [
-        Fraction(p[axis] - a[axis], b[axis] - a[axis]) if a[axis] != b[axis] else None for axis in (0, 1)
-    ]
+    along = [Fraction(p[axis] - a[axis], b[axis] - a[axis]) if a[axis] != b[axis] else None for axis in (0, 1)]
     if any(t is None and p[axis] != a[axis] for axis, t in enumerate(along)):
         return False
     places = {t for t in along if t is not None}
@@ -89,8 +87,7 @@ def in_hull(p: Point, outline: list[Point]) -> bool:
     if len(outline) < 3:
         return on_segment(p, outline[0], outline[-1])
     return all(
-        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0
-        for a, b in pairwise([*outline, outline[0]])
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0 for a, b in pairwise([*outline, outline[0]])
     )
 
 

@@ -4,7 +4,6 @@ from itertools import pairwise
 from math import ceil, isqrt
 
 from reference.naive_code import Leg, Truths, World, truths
-
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
 from rtshcua.model.flat.mission import Invocation
@@ -49,7 +48,9 @@ class Oracle:
         (letter,) = truths(clause.code, self.world(arguments, legs))
         return letter
 
-    def world(self, arguments: tuple[int, ...], legs: list[Leg] | None, heights: tuple[int, int] | None = None) -> World:
+    def world(
+        self, arguments: tuple[int, ...], legs: list[Leg] | None, heights: tuple[int, int] | None = None
+    ) -> World:
         return World(self.policy, self.slots, arguments, self.now.utc_us, self.now.utc_error_us, legs, heights)
 
     # ------------------------------------------------------------------------------------------ planned volume

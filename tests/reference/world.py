@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from msgspec.structs import replace
+
 from reference.flat_case import (
     BATTERY,
     FIX,
@@ -23,8 +24,8 @@ from reference.flat_case import (
     M,
     S,
 )
-
 from rtshcua.evidence.chain import Recorder
+from rtshcua.ground.auditor.audit import audit
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -59,10 +60,11 @@ SESSION_KEY = bytes(range(32))
 START = Now(monotonic_us=500 * S, utc_us=ISSUED + 60 * S, utc_error_us=20_000)
 TICK = 50_000  # us
 SKILL_US = 2 * S  # how long the fake vehicle takes for anything
+NEVER = 1 << 60
 
-POLICY_KEY, MISSION_KEY, LOG_KEY = (
+ROOT_KEY, POLICY_KEY, MISSION_KEY, LOG_KEY = (
     SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True)
-    for number, duty in enumerate((Duty.POLICY, Duty.MISSION, Duty.LOG), 1)
+    for number, duty in enumerate((Duty.ROOT, Duty.POLICY, Duty.MISSION, Duty.LOG))
 )
 ROOT = TrustRoot(
     version=1,
@@ -73,15 +75,19 @@ ROOT = TrustRoot(
         POLICY_KEY.verification(vehicles=(VEHICLE,)),
         MISSION_KEY.verification(roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,)),
         LOG_KEY.verification(vehicles=(VEHICLE,)),
+        ROOT_KEY.verification(),
     ),
 )
 
 
 def sealed(policy: Policy = POLICY, mission: Mission = MISSION) -> bytes:
     """A bundle of both, bound and signed."""
-    payload = bundle.policy_payload(policy)
-    bound = binding.bind(mission, bundle.policy_digest(payload))
-    return bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY_KEY, mission_key=MISSION_KEY)
+    return _seal(policy, binding.bind(mission, bundle.policy_digest(bundle.policy_payload(policy))))
+
+
+def _seal(policy: Policy, bound: Mission) -> bytes:
+    payload, mission = bundle.policy_payload(policy), bundle.mission_payload(bound)
+    return bundle.seal(payload, mission, policy_key=POLICY_KEY, mission_key=MISSION_KEY)
 
 
 def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = False) -> Loaded | LoadRefusal:
@@ -151,7 +157,8 @@ class FakeVehicle:
     def begin(self, command: Command, now_us: int) -> None:
         assert not self.released, "nothing is sent after standing down"
         self.commands.append(command)
-        self._current, self._ends_us = command, now_us + SKILL_US
+        lasting_us = (command.hold_us or NEVER) if command.kind == MotionKind.HOLD else SKILL_US
+        self._current, self._ends_us = command, now_us + lasting_us
         self.armed = True
         if command.path and command.kind in (MotionKind.FLY, MotionKind.COVER):
             self.values |= {POSITION_X: command.path[-2], POSITION_Y: command.path[-1]}
@@ -162,7 +169,8 @@ class FakeVehicle:
         values = tuple((slot, value) for slot, value in self.values.items() if slot not in self.silent)
         events: list[Event] = [Readings(now_us, values)]
         command = self._current
-        if command is not None and now_us >= self._ends_us and command.skill not in self.deaf:
+        over = now_us >= self._ends_us or (command is not None and command.skill in self.fails)
+        if command is not None and over and command.skill not in self.deaf:
             self._current = None
             if command.skill in self.fails:
                 events.append(Failed(now_us, command.token, "no-effect", "because"))
@@ -201,8 +209,8 @@ class Run:
         self.lines = [
             recorder.genesis(
                 START,
-                bundle=b"b",
-                root=b"r",
+                bundle=_seal(self.loaded.bundle.policy, self.loaded.bundle.mission),
+                root=ROOT.sign(ROOT_KEY),
                 boot=bytes(16),
                 vehicle=VEHICLE,
                 mission=self.loaded.bundle.mission.name,
@@ -282,6 +290,14 @@ class Run:
 def dispatches(actions: Sequence[Action]) -> list[Command]:
     """The commands that were to be sent."""
     return [action.command for action in actions if isinstance(action, Dispatch)]
+
+
+def assert_audited(run: Run) -> None:
+    """The log, closed, verifies with nothing but the root's key: each decision derives again, each dispatch is covered."""
+    close = run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)
+    report = audit([*run.lines, close], ROOT_KEY.public).report
+    assert report.failure is None, report.failure
+    assert report.shortfall is None
 
 
 def assert_covered(run: Run) -> None:

@@ -8,9 +8,9 @@ from random import Random
 
 from hypothesis import strategies as st
 from msgspec.structs import replace
+
 from reference import flat_case as flat
 from reference.flat_case import M, S
-
 from rtshcua.decision.reads import slots_read
 from rtshcua.decision.values import MISSING, Sets, Value, interval, maybe, members, point
 from rtshcua.model.flat.code import Clause, Op

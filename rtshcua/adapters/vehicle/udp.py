@@ -11,10 +11,10 @@ from rtshcua.onboard.ports import Command, Event
 
 _LARGEST = 65_535
 _BUFFER = 4 << 20  # asked for; what the system allows is enough for a moment of being held up
-#: One poll takes no more datagrams, and no more of the clock's time, than this: a flood must not starve the runtime,
-#: and a backlog is worked off in order.
+#: One poll takes no more datagrams, and no more time, by its clock or the machine's, than this: a flood must not starve
+#: the runtime, and a backlog is worked off in order.
 _BATCH = 256
-_SLICE_US = 50_000
+_SLICE_US, _SLICE_S = 50_000, 0.002
 
 
 class UdpVehicle:
@@ -33,6 +33,7 @@ class UdpVehicle:
         self._keep = keep
         self._peer: tuple[str, int] | None = None
         self._pending: list[Event] = []
+        self._slice_us = max(_SLICE_US, clock.us_in(_SLICE_S))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind(address)
@@ -59,7 +60,7 @@ class UdpVehicle:
         events, self._pending = [*self._pending, *events], []
         wait = 0.0 if events else max(0.0, self._clock.real_seconds(timeout_us))
         if select.select([self._socket], [], [], wait)[0]:
-            self._drain(now_us + _SLICE_US, events)
+            self._drain(now_us + self._slice_us, events)
         return events
 
     def begin(self, command: Command, now_us: int) -> None:

@@ -28,6 +28,9 @@ from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 #: the signals that every decision reads, in the order of their slots: where the vehicle is, how high, how much energy
 WELL_KNOWN: Mapping[str, Type] = {POSITION_SIGNAL: POSITION, "height": HEIGHT, "battery": RATIO}
 
+#: whoever flies the vehicle; a rule `by any` is about this role too, where no rule names it
+OPERATOR = "operator"
+
 
 @dataclass(frozen=True, slots=True)
 class LoweredPolicy:
@@ -111,7 +114,8 @@ def _skills(context: Context, policy: PolicyDecl, files: frozenset[str]) -> list
 
 
 def _roles(policy: PolicyDecl) -> tuple[str, ...]:
-    named = {role.text for rule in policy.rules for role in rule.roles}
+    """The roles of a policy, sorted: those that its rules name, and the one that every vehicle has."""
+    named = {OPERATOR, *(role.text for rule in policy.rules for role in rule.roles)}
     return tuple(sorted(named | {rule.approver.text for rule in policy.rules if rule.approver is not None}))
 
 

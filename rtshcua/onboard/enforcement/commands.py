@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rtshcua.model.flat.contract import PLACE, Link, MotionKind
+from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
@@ -37,8 +37,9 @@ class Commands:
 
     def _of_step(self, step: int, token: int) -> Command:
         invocation, geo = self._steps[_index(step)]
-        plan = invocation.plan
-        return Command(token, invocation.contract.name, plan.kind, plan.path, geo, plan.altitude, plan.speed)
+        plan, contract = invocation.plan, invocation.contract
+        held_us = hold_us(contract, invocation.arguments)
+        return Command(token, contract.name, plan.kind, plan.path, geo, plan.altitude, plan.speed, held_us)
 
     def _of_link(self, link: Link, token: int) -> Command:
         contract = self._policy.contracts[link.skill]
@@ -48,11 +49,17 @@ class Commands:
             cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
             path = link.arguments[cell : cell + 2]
         altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
-        return Command(token, contract.name, motion.kind, path, self._geo(path), altitude, speed)
+        held_us = hold_us(contract, link.arguments)
+        return Command(token, contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us)
 
     def _geo(self, path: Sequence[int]) -> tuple[int, ...]:
         projection = self._policy.projection
         return tuple([part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(projection, x, y)])
+
+
+def hold_us(contract: Contract, arguments: tuple[int, ...]) -> int:
+    """How long a skill is to hold (`hold for time`), 0 where it does not say."""
+    return arguments[contract.motion.time] if contract.motion.time >= 0 else 0
 
 
 def _index(number: int) -> int:

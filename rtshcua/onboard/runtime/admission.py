@@ -104,8 +104,9 @@ class Admission:
 
     def _show(self, now: Now, key: Key, answer: Answer, clause: str) -> None:
         subject = self._subject(*key)
-        self.recent.append(Decided(now.monotonic_us, subject, answer.outcome.name.lower(), answer.reason, clause))
-        text = f"{answer.outcome.name.lower()} {subject}: {answer.reason}" + (f" (`{clause}`)" if clause else "")
+        outcome, reason = answer.outcome.name.lower(), answer.reason.value
+        self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
+        text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
         self._journal.add(Show("decision", text, key[1]))
 
     def _subject(self, kind: int, step: int, link: int) -> str:

@@ -16,7 +16,7 @@ from rtshcua.onboard.runtime.admission import Admission
 from rtshcua.onboard.runtime.craft import Craft
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
 from rtshcua.onboard.runtime.fallback import Fallback, Progress
-from rtshcua.onboard.runtime.flight import Limits, Stage, hold_us
+from rtshcua.onboard.runtime.flight import Limits, Stage
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.queue import InvocationQueue
@@ -188,8 +188,7 @@ class Conduct:
         return True
 
     def _start(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
-        lasting_us = hold_us(invocation.contract, invocation.arguments)
-        if not self.dispatcher.fly(now, answer.permit, (STEP, invocation.step, -1), lasting_us):
+        if not self.dispatcher.fly(now, answer.permit, (STEP, invocation.step, -1), None):
             return self._inadmissible(now, invocation)
         prepared = self.loaded.invocations[invocation.step]
         self._supervisor = Supervisor(prepared, self.loaded.policy, now.monotonic_us)
@@ -230,14 +229,8 @@ class Conduct:
                 return
 
     def _supervise(self, now: Now) -> bool:
-        active, supervisor = self.dispatcher.active, self._supervisor
-        if active is None or supervisor is None:
-            return False
-        if active.until_us is not None and now.monotonic_us >= active.until_us:
-            self.dispatcher.end(now, "succeeded")
-            self.advance(now)
-            return True
-        violated = supervisor.violated(self.monitor.state(now.monotonic_us), now)
+        supervisor = self._supervisor
+        violated = supervisor and supervisor.violated(self.monitor.state(now.monotonic_us), now)
         if violated is None:
             return False
         self.dispatcher.end(now, "violated", violated)

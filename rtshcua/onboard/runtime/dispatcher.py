@@ -21,7 +21,7 @@ class Dispatcher:
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
 
     def fly(self, now: Now, permit: bytes, key: Key, lasting_us: int | None) -> bool:
-        """Dispatch what the permit is for, to be over after `lasting_us` (None: when it succeeds or fails).
+        """Dispatch what the permit is for, for at most `lasting_us` (None: until it succeeds or fails).
 
         False if the executor refused, and then nothing is sent.
         """

@@ -78,6 +78,6 @@ class Fallback:
         policy = self._loaded.bundle.policy
         lasting_us = link_us(link, policy.contracts[link.skill], policy.vehicle.endurance_us)
         answer = self._admission.ask(now, state, key)
-        if answer is not None and answer.permit:
-            return self._dispatcher.fly(now, answer.permit, key, lasting_us)
+        if answer is not None and answer.permit and self._dispatcher.fly(now, answer.permit, key, lasting_us):
+            return True
         return (answer is None or insist) and self._dispatcher.stand_in(now, key, lasting_us)

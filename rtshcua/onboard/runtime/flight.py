@@ -39,7 +39,7 @@ Key: TypeAlias = tuple[int, int, int]
 
 
 class Active(Frozen):
-    """A command that was dispatched and has not ended; it is over by itself at `until_us`, if there is such a time."""
+    """A command that was dispatched and has not ended. A link's time is over at `until_us`; a step has None."""
 
     kind: int
     step: int
@@ -69,13 +69,6 @@ class Chain(msgspec.Struct):
     wait_until_us: int = 0
 
 
-def hold_us(contract: Contract, arguments: tuple[int, ...]) -> int | None:
-    """How long a skill that holds is to hold (`hold for time`), None where it does not say."""
-    if contract.motion.kind != MotionKind.HOLD or contract.motion.time < 0:
-        return None
-    return arguments[contract.motion.time]
-
-
 def link_us(link: Link, contract: Contract, endurance_us: int) -> int:
-    """How long a link may take: its own limit, the time it holds, its skill's, or as long as anything can fly."""
-    return link.limit_us or hold_us(contract, link.arguments) or contract.duration_us or endurance_us
+    """How long a link may take: its own limit, else its skill's, else as long as anything can fly."""
+    return link.limit_us or contract.duration_us or endurance_us

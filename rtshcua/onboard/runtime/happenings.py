@@ -1,6 +1,5 @@
 """What each event means: it changes what is known, and sometimes the stage; what follows is `Conduct.turn`'s."""
 
-from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
     AirState,
@@ -81,8 +80,6 @@ class Happenings:
         active = conduct.dispatcher.active
         if active is None or not conduct.dispatcher.flies(token):
             return
-        if active.command.kind == MotionKind.HOLD and (active.until_us is not None or conduct.stage is Stage.DECIDING):
-            return  # the hold is taken up; it is over when its time is, or when something replaces it
         conduct.dispatcher.end(now, "succeeded")
         running = conduct.stage is Stage.RUNNING
         if active.homeward:

@@ -4,10 +4,10 @@ from random import Random
 
 import pytest
 from hypothesis import assume, given, settings
+
 from reference import worlds
 from reference.naive_code import TooNear
 from reference.oracle import Oracle
-
 from rtshcua.decision.case import is_situation, situation
 from rtshcua.decision.decide import decide, possible
 from rtshcua.decision.links import START, choose_contingency, choose_fallback, link_admissible

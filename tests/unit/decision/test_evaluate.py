@@ -3,10 +3,10 @@
 from random import Random
 
 from hypothesis import assume, given, settings
+
 from reference import flat_case as flat
 from reference import worlds
 from reference.naive_code import Leg, TooNear, World, truths
-
 from rtshcua.decision.case import situation
 from rtshcua.decision.evaluate import Condition, Environment, build
 from rtshcua.decision.prepare import prepare
@@ -44,9 +44,7 @@ def naive(code: tuple[int, ...], arguments: tuple[int, ...], state: State, now: 
 
 
 def compiled(condition: Condition, arguments: tuple[int, ...], sets: Sets) -> int:
-    return condition(
-        Environment([*sets.values, MISSING], tuple(map(point, arguments)), sets.utc_us, sets.utc_error_us)
-    )
+    return condition(Environment([*sets.values, MISSING], tuple(map(point, arguments)), sets.utc_us, sets.utc_error_us))
 
 
 @settings(max_examples=500)

@@ -7,50 +7,32 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+
 from reference import flat_case as flat
+from reference.asking import POLICY, STEP, ask
 from reference.flat_case import (
     BATTERY,
     FIX,
     INSPECT,
-    INSPECTION_STEP,
-    INVOCATIONS,
     LINK,
-    M,
     MIN,
     NOW,
     OBSTACLE,
     POSITION_X,
-    S,
     TRACK,
     WIND,
+    M,
+    S,
 )
-
-from rtshcua.decision.decide import Decision, decide, possible
+from rtshcua.decision.decide import decide
 from rtshcua.decision.links import DEGRADE
-from rtshcua.decision.prepare import prepare, prepare_invocation, prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.case import situation
-from rtshcua.model.flat.mission import Invocation, Plan
+from rtshcua.decision.prepare import prepare_mission
+from rtshcua.model.flat.mission import Plan
 from rtshcua.model.outcome import Outcome, Reason
 
-POLICY = prepare(flat.POLICY)
-assert isinstance(POLICY, PreparedPolicy)
-STEP = INVOCATIONS[INSPECTION_STEP]
 HIGHER = replace(STEP, arguments=(flat.BRIDGE, 40 * M, 0, 4 * M), plan=replace(STEP.plan, altitude=40 * M))
 TRACKING = flat.invocation(2, flat.INSPECTION, TRACK, Plan(0, (), 0, 0))
 LATER = replace(NOW, utc_us=flat.ISSUED + 11 * MIN)
-
-
-def decided(
-    invocation: Invocation = STEP, state: dict[str, Any] | None = None, now: flat.Now = NOW, **context: Any
-) -> Decision:
-    prepared = prepare_invocation(invocation, POLICY)
-    assert isinstance(prepared, PreparedInvocation), prepared
-    situation_now = flat.state(**(state or {}))
-    decision = decide(prepared, situation_now, POLICY, flat.context(invocation, **context), now)
-    same = possible(prepared, situation(situation_now, POLICY, now), POLICY, flat.context(invocation, **context))
-    assert same == {(decision.outcome, decision.reason, decision.target)}
-    return decision
 
 
 ALLOW, DENY, DEFER, FALLBACK = Outcome
@@ -58,12 +40,12 @@ ALLOW, DENY, DEFER, FALLBACK = Outcome
 CASES: dict[str, tuple[dict[str, Any], Outcome, Reason]] = {
     "normal allow": ({}, ALLOW, Reason.ADMITTED),
     "no slack": ({"released_us": NOW.monotonic_us - 2 * S}, FALLBACK, Reason.NO_SLACK),
-    "low battery": ({"state": {"values": {BATTERY: 3_000}}}, FALLBACK, Reason.STATE_VIOLATED),
-    "degraded link": ({"state": {"values": {LINK: 1_000}}}, FALLBACK, Reason.STATE_VIOLATED),
-    "obstacle near": ({"state": {"values": {OBSTACLE: 2 * M}}}, FALLBACK, Reason.STATE_VIOLATED),
-    "wind over limit": ({"state": {"values": {WIND: 12 * M}}}, FALLBACK, Reason.STATE_VIOLATED),
-    "GPS missing": ({"state": {"values": {FIX: None}}}, DEFER, Reason.STATE_UNKNOWN),
-    "stale state": ({"state": {"ages": {POSITION_X: S}}}, DEFER, Reason.SAFETY_UNKNOWN),
+    "low battery": ({"values": {BATTERY: 3_000}}, FALLBACK, Reason.STATE_VIOLATED),
+    "degraded link": ({"values": {LINK: 1_000}}, FALLBACK, Reason.STATE_VIOLATED),
+    "obstacle near": ({"values": {OBSTACLE: 2 * M}}, FALLBACK, Reason.STATE_VIOLATED),
+    "wind over limit": ({"values": {WIND: 12 * M}}, FALLBACK, Reason.STATE_VIOLATED),
+    "GPS missing": ({"values": {FIX: None}}, DEFER, Reason.STATE_UNKNOWN),
+    "stale state": ({"ages": {POSITION_X: S}}, DEFER, Reason.SAFETY_UNKNOWN),
     "skill not permitted": ({"invocation": TRACKING}, DENY, Reason.FORBIDDEN),
     "argument out of scope": ({"invocation": HIGHER}, DENY, Reason.OUT_OF_SCOPE),
     "binding tampered": ({"binding": bytes(32)}, DENY, Reason.BINDING_MISMATCH),
@@ -76,7 +58,7 @@ CASES: dict[str, tuple[dict[str, Any], Outcome, Reason]] = {
 @pytest.mark.parametrize("name", CASES)
 def test_reference_case(name: str) -> None:
     given, outcome, reason = CASES[name]
-    decision = decided(**given)
+    decision = ask(**given)
     assert (decision.outcome, decision.reason) == (outcome, reason)
 
 
@@ -86,7 +68,7 @@ def test_the_outcomes_are_those_of_the_design() -> None:
 
 def test_an_admission_is_bounded_by_the_first_thing_to_go_stale() -> None:
     """Height and position hold for 500 ms and are 10 ms old; the deadline is 2 s, the validity 10 min."""
-    assert decided().valid_until_us == NOW.monotonic_us + 490_000
+    assert ask().valid_until_us == NOW.monotonic_us + 490_000
 
 
 @pytest.mark.parametrize(
@@ -98,25 +80,25 @@ def test_an_admission_is_bounded_by_the_first_thing_to_go_stale() -> None:
     ],
 )
 def test_an_admission_is_bounded_by_deadline_and_validity(context: dict[str, Any], now: flat.Now, until: int) -> None:
-    decision = decided(now=now, **context)
+    decision = ask(now=now, **context)
     assert (decision.outcome, decision.valid_until_us) == (ALLOW, until)
 
 
 def test_a_denial_names_no_target_and_a_fallback_the_first_link_that_may_fly() -> None:
-    assert (decided(binding=bytes(32)).link, decided(binding=bytes(32)).target) == (None, None)
-    wind = decided(state={"values": {WIND: 12 * M}})
+    assert (ask(binding=bytes(32)).link, ask(binding=bytes(32)).target) == (None, None)
+    wind = ask(values={WIND: 12 * M})
     assert (wind.link, wind.target) == (0, flat.CHAIN[0])
-    no_fix = decided(state={"values": {WIND: 12 * M, FIX: 2}})  # hover and return need a fix
+    no_fix = ask(values={WIND: 12 * M, FIX: 2})  # hover and return need a fix
     assert (no_fix.link, no_fix.target) == (2, flat.CHAIN[2])
 
 
 def test_a_matching_degrade_names_the_target() -> None:
-    low = decided(state={"values": {BATTERY: 2_000}})
+    low = ask(values={BATTERY: 2_000})
     assert (low.reason, low.link, low.target) == (Reason.STATE_VIOLATED, DEGRADE, flat.RULES[6].target)
 
 
 def test_a_decision_names_the_clause_that_decided_with_its_span() -> None:
-    decision = decided(state={"values": {BATTERY: 3_000}})
+    decision = ask(values={BATTERY: 3_000})
     assert decision.step == 6
     assert decision.clause == flat.ENOUGH_CHARGE
     assert (decision.clause.start, decision.clause.end) == (100, 114)

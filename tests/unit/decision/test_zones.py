@@ -5,8 +5,8 @@ from math import cos, pi, sin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 
+from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.decision.places import Place, Sweep
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
 from rtshcua.decision.zones import PreparedZone
@@ -30,7 +30,12 @@ def flat(points: list[tuple[int, int]]) -> tuple[int, ...]:
 OUTLINES = st.lists(POINTS, min_size=3, max_size=24, unique=True).map(lambda points: polygon(*flat(points)))
 STARS = st.lists(st.integers(3, 30), min_size=17, max_size=40).map(
     lambda radii: polygon(
-        *flat([(int(r * cos(2 * pi * n / len(radii))), int(r * sin(2 * pi * n / len(radii)))) for n, r in enumerate(radii)])
+        *flat(
+            [
+                (int(r * cos(2 * pi * n / len(radii))), int(r * sin(2 * pi * n / len(radii))))
+                for n, r in enumerate(radii)
+            ]
+        )
     )
 )
 CIRCLES = st.builds(lambda c, r: Zone("c", CIRCLE, LOWEST, HIGHEST, (*c, r)), POINTS, st.integers(1, 200))

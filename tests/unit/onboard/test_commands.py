@@ -1,7 +1,7 @@
 import pytest
 from msgspec.structs import replace
-from reference.flat_case import GOTO, MISSION, PATH, POLICY, RULES, M, link
 
+from reference.flat_case import GOTO, MISSION, PATH, POLICY, RULES, M, link
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import project
 from rtshcua.onboard.enforcement.commands import Commands

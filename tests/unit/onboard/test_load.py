@@ -2,9 +2,9 @@
 
 import pytest
 from msgspec.structs import replace
+
 from reference.flat_case import BATTERY, INVOCATIONS, ISSUED, MISSION, POLICY, SIGNALS, H
 from reference.world import MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, loaded, sealed, try_load
-
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
 from rtshcua.wire import binding, bundle

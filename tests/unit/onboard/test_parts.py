@@ -2,8 +2,8 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-from reference.flat_case import MISSION
 
+from reference.flat_case import MISSION
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor

@@ -9,9 +9,9 @@ from itertools import product
 
 import pytest
 from msgspec.structs import replace
+
 from reference.flat_case import OBSTACLE, WIND, M, S
 from reference.world import SESSION_KEY, VEHICLE, FakeVehicle, Run, assert_covered, loaded
-
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal

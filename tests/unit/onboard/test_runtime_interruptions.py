@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 import pytest
 from msgspec.structs import replace
-from reference.flat_case import OBSTACLE, WIND, M, S
-from reference.world import FakeVehicle, Run, assert_covered, loaded
 
+from reference.flat_case import OBSTACLE, WIND, M, S
+from reference.world import FakeVehicle, Run, assert_audited, loaded
+from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
     Dispatch,
@@ -92,7 +93,7 @@ def test_interrupted_in_the_air_falls_back_first(situation: Situation, again: in
     assert run.ending is Ending.INTERRUPTED
     assert run.flown[-1] in ("return_home", "emergency_land")
     assert not run.vehicle.airborne
-    assert_covered(run)
+    assert_audited(run)
 
 
 def test_interrupted_holds_by_the_running_step_and_else_by_the_contingency() -> None:
@@ -218,7 +219,7 @@ def test_a_boundary_that_does_not_answer_leaves_the_standing_permits(answer: byt
     assert run.flown == ["takeoff", "goto", "hover", "return_home"], "undecided in the air is the contingency"
     assert run.ending is Ending.ABORTED
     assert run.events.count("undecided") == 3
-    assert_covered(run)
+    assert_audited(run)
 
 
 def test_a_boundary_that_never_answers_lets_nothing_fly() -> None:
@@ -250,3 +251,46 @@ def test_a_vehicle_that_never_moves_again_is_stood_down_from() -> None:
     assert run.ending is Ending.ABORTED
     assert run.events[-1] == "stood-down"
     assert run.runtime.view(run.clock.now()).stage is Stage.ENDED
+
+
+class Echo:
+    """A boundary whose answers are kept, and played again when told to."""
+
+    def __init__(self, of: Loaded) -> None:
+        self._boundary = of.boundary
+        self.kept: list[bytes] = []
+        self.playing = False
+
+    def enforce(self, request: bytes) -> bytes:
+        if self.playing:
+            return self.kept[-1]
+        self.kept.append(self._boundary.enforce(request))
+        return self.kept[-1]
+
+
+def test_an_old_answer_played_again_sends_nothing() -> None:
+    of = loaded()
+    echo = Echo(of)
+    run = Run(replace(of, boundary=echo)).until_flies("takeoff")
+    echo.playing = True
+    run.until_over()
+    detail = [record["detail"] for record in run.records if record.get("event") == "refused"]
+    assert detail[0] == "permit/used"
+    assert run.flown == ["takeoff", "emergency_land"], "only what stands behind the step that was sent"
+
+
+def test_the_boundary_fails_while_a_chain_is_flown() -> None:
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    run = Run(replace(of, boundary=deaf), FakeVehicle(fails={"hover", "return_home", "emergency_land"}))
+    run.until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until_flies("hover")
+    deaf.answer = b""
+    run.until_over()
+    assert run.flown[2:] == ["hover", "return_home", "emergency_land"] * 2, (
+        "each standing permit is good for one dispatch"
+    )
+    assert run.vehicle.released
+    assert run.events[-2:] == ["stranded", "stood-down"]
+    assert_audited(run)

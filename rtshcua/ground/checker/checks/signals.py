@@ -148,10 +148,12 @@ def _field(
         mirrored = None if enum.dialect is None else enum.dialect.text
         if field.unit or field.type in ("float", "double") or (mirrored is not None and field.enum != mirrored):
             has = f"has values of `{field.enum}`" if field.enum else "has no enumeration"
+            help = f"declare an enumeration that mirrors it: `enum ... = {field.enum} {{ ... }}`" if field.enum else None
             context.report.add(
                 codes.FIELD_ENUM,
                 name.span,
                 f"`{name.text}` {has}, and the signal is a `{signal.type.text}`",
+                help=help,
                 labels=[(enum.name.span, f"`{enum.name.text}` is declared here")],
             )
     elif type is not None and type.dimension is not None and field.unit not in UNITS[type.dimension]:

@@ -1,0 +1,81 @@
+"""Each code of the checker has twins: two sources that differ in one assumption, which their first line names.
+
+The accepted one is compiled without a finding, the rejected one has findings of that code alone, and what a person reads
+then is kept beside this file. `UPDATE_GOLDENS=1` writes it anew, for a look at the difference.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.render import render
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.agent.specification import load_specification
+from rtshcua.ground.compiler.program import check_program, compile_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+HERE = Path(__file__).resolve().parent
+TESTS = HERE.parents[1]
+CHECKOUT = TESTS.parent
+#: skills and policies that the twins build on, kept apart from those that ship, which may change
+LIBRARY = "tests/golden/checker/library"
+
+REJECTED = sorted(path.name for path in (TESTS / "rejected").iterdir() if path.is_file())
+#: what no small source can bring about: bytes that are no text, size, depth, numbers of findings, a compiler's own fault
+WITHOUT_TWINS = {codes.NOT_TEXT, codes.TOO_LARGE, codes.TOO_DEEP, codes.TOO_MANY_FINDINGS, codes.REFUSED_ON_BOARD}
+
+
+def findings(side: str, name: str) -> tuple[tuple[Diagnostic, ...], dict[str, Source]]:
+    """What compiling a twin finds; a source without a mission is only checked."""
+    path = f"tests/{side}/{name}"
+
+    def read(file: str) -> bytes:
+        return Path(file).read_bytes()
+
+    if name.endswith(".json"):
+        program, specification = load_specification(path, [], read, LIBRARY)
+        compiled = compile_program(program, dialect.load(), mission=None, issued_at_us=0)
+        return specification.pointed(compiled.diagnostics), program.sources
+    program = load([path], read, LIBRARY)
+    if program.units and program.units[0].missions and "not_in_policy" not in name:
+        found = compile_program(program, dialect.load(), mission=None, issued_at_us=0).diagnostics
+    else:
+        found = check_program(program, dialect.load())
+    return found, program.sources
+
+
+@pytest.fixture(autouse=True)
+def _in_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(CHECKOUT)
+
+
+@pytest.mark.parametrize("name", REJECTED)
+def test_the_rejected_twin_has_its_one_code_and_reads_well(name: str) -> None:
+    found, sources = findings("rejected", name)
+    assert {diagnostic.code.id.lower() for diagnostic in found} == {name.partition("_")[0]}
+    golden = HERE / f"{Path(name).stem}.txt"
+    text = render(found, sources)
+    if os.environ.get("UPDATE_GOLDENS"):
+        golden.write_text(text, encoding="utf-8")
+    assert text == golden.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", REJECTED)
+def test_the_accepted_twin_has_no_finding(name: str) -> None:
+    found, sources = findings("accepted", name)
+    assert found == (), render(found, sources)
+
+
+def test_every_code_has_twins_named_by_it() -> None:
+    slugs = {f"{code.id.lower()}_{code.slug.replace('-', '_')}" for code in codes.REGISTRY.values()}
+    without = {f"{code.id.lower()}_{code.slug.replace('-', '_')}" for code in WITHOUT_TWINS}
+    assert {Path(name).stem for name in REJECTED} == slugs - without
+    assert sorted(path.name for path in (TESTS / "accepted").iterdir() if path.is_file()) == REJECTED
+
+
+def test_no_golden_is_left_over() -> None:
+    assert {path.stem for path in HERE.glob("*.txt")} == {Path(name).stem for name in REJECTED}

@@ -1,0 +1,59 @@
+"""Asks about one step of the hand-written mission, with what the test changes, in both ways that there are to ask."""
+
+from typing import Any
+
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from rtshcua.decision.case import situation
+from rtshcua.decision.decide import Decision, decide, possible
+from rtshcua.decision.prepare import prepare, prepare_invocation
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy, Rule
+
+STEP = flat.INVOCATIONS[flat.INSPECTION_STEP]
+
+
+def loaded(policy: Policy = flat.POLICY) -> PreparedPolicy:
+    found = prepare(policy)
+    assert isinstance(found, PreparedPolicy), found
+    return found
+
+
+def ready(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation:
+    found = prepare_invocation(invocation, policy)
+    assert isinstance(found, PreparedInvocation), found
+    return found
+
+
+POLICY = loaded()
+
+
+def ask(
+    invocation: Invocation = STEP,
+    values: dict[int, int | None] | None = None,
+    ages: dict[int, int] | None = None,
+    now: flat.Now = flat.NOW,
+    policy: PreparedPolicy = POLICY,
+    **context: Any,
+) -> Decision:
+    """The decision; `possible` over the one situation must give the same and nothing else."""
+    prepared, state = ready(invocation, policy), flat.state(values, ages)
+    circumstances = flat.context(invocation, **context)
+    decision = decide(prepared, state, policy, circumstances, now)
+    same = possible(prepared, situation(state, policy, now), policy, circumstances)
+    assert same == {(decision.outcome, decision.reason, decision.target)}
+    return decision
+
+
+def with_rules(*rules: Rule) -> PreparedPolicy:
+    return loaded(replace(flat.POLICY, rules=rules))
+
+
+def with_contract(skill: int, **fields: Any) -> tuple[PreparedPolicy, Contract]:
+    """The policy with one contract changed, and that contract."""
+    contract = replace(flat.CONTRACTS[skill], **fields)
+    contracts = tuple(contract if n == skill else other for n, other in enumerate(flat.CONTRACTS))
+    return loaded(replace(flat.POLICY, contracts=contracts)), contract

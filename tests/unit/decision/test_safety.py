@@ -1,0 +1,334 @@
+"""Steps 6 and 7 by hand: state, envelope, airspace and `maintain` over the planned volume, energy, `degrade`."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+from reference import flat_case as flat
+from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract
+from reference.flat_case import (
+    BATTERY,
+    FIX,
+    GOTO,
+    HEIGHT,
+    HOME,
+    INSPECT,
+    LAND,
+    OBSTACLE,
+    POSITION_X,
+    POSITION_Y,
+    TAKEOFF,
+    WIND,
+    M,
+    clause,
+)
+
+from rtshcua.decision.energy import Energy
+from rtshcua.decision.places import WellKnown
+from rtshcua.decision.values import MISSING, interval, maybe, point
+from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
+from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.contract import Motion, MotionKind
+from rtshcua.model.flat.mission import Invocation, Plan
+from rtshcua.model.flat.policy import Airspace
+from rtshcua.model.flat.zone import LOWEST
+from rtshcua.model.outcome import Outcome, Reason
+
+ALLOW, DENY, DEFER, FALLBACK = Outcome
+T, F, U = 1, 2, 4
+
+# ------------------------------------------------------------------------------------------------------ 6 state
+
+
+@pytest.mark.parametrize(
+    ("values", "outcome", "clause_"),
+    [
+        ({}, ALLOW, None),
+        ({BATTERY: 3_500}, FALLBACK, flat.ENOUGH_CHARGE),
+        ({BATTERY: None}, DEFER, flat.ENOUGH_CHARGE),
+        ({BATTERY: None, WIND: 20 * M}, FALLBACK, flat.CALM),  # false and unknown together are false
+        ({BATTERY: None, WIND: None}, DEFER, flat.ENOUGH_CHARGE),  # the first is named
+        ({FIX: 2, WIND: 20 * M}, FALLBACK, flat.FIX_IS_GOOD),
+    ],
+)
+def test_state(values: dict[int, int | None], outcome: Outcome, clause_: Any) -> None:
+    decision = ask(values=values)
+    assert (decision.outcome, decision.clause) == (outcome, clause_)
+
+
+@pytest.mark.parametrize("slot", range(flat.SLOTS))
+def test_a_slot_that_is_missing_stale_or_beyond_sense_is_unknown(slot: int) -> None:
+    stale = next(s.stale_us for s in flat.SIGNALS if s.slot in (slot, slot - (s.kind == 2)))
+    assert ask(values={slot: None}).outcome is DEFER
+    assert ask(ages={slot: stale + 1}).outcome is DEFER
+    assert ask(ages={slot: stale}).outcome is ALLOW
+    assert ask(ages={slot: -1}).outcome is DEFER
+    assert ask(values={slot: 1 << 53}).outcome is DEFER
+    assert ask(values={slot: -(1 << 53)}).outcome is DEFER
+
+
+@pytest.mark.parametrize(("values", "ages"), [((), ()), ((0,) * 9, (0,) * 9), ((9_000,) * 8, (0,) * 7)])
+def test_nothing_of_a_state_of_the_wrong_size_is_believed(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
+    from rtshcua.decision.decide import decide
+
+    decision = decide(ready(STEP, POLICY), flat.State(values, ages), POLICY, flat.context(), flat.NOW)
+    assert (decision.outcome, decision.reason) == (DEFER, Reason.STATE_UNKNOWN)
+
+
+# ------------------------------------------------------------------------------------------------ 7 envelope etc.
+
+
+def goto(x: int, y: int, altitude: int = 20 * M, speed: int = 0) -> Invocation:
+    return flat.invocation(1, 1, GOTO, Plan(MotionKind.FLY, (x, y), altitude, speed), x, y, altitude)
+
+
+def test_a_plan_faster_than_the_vehicle() -> None:
+    assert ask(goto(110 * M, 0, speed=12 * M)).outcome is ALLOW
+    decision = ask(goto(110 * M, 0, speed=12 * M + 1))
+    assert (decision.outcome, decision.reason, decision.clause) == (FALLBACK, Reason.ENVELOPE, None)
+
+
+@pytest.mark.parametrize(
+    ("start", "to", "altitude", "reason"),
+    [
+        ((110, -20), (150, 20), 20, Reason.ADMITTED),
+        ((110, -20), (496, 0), 20, Reason.ADMITTED),  # 4 m from the edge of the city, 3 m position error
+        ((110, -20), (497, 0), 20, Reason.AIRSPACE),
+        ((-200, 300), (200, 300), 20, Reason.AIRSPACE),  # both ends are outside the school, the leg is not
+        ((-200, 190), (200, 190), 20, Reason.ADMITTED),  # passes it at 10 m
+        ((600, 0), (110, 0), 20, Reason.AIRSPACE),  # starts outside
+        ((0, 250), (110, 0), 20, Reason.AIRSPACE),  # starts over the school
+    ],
+)
+def test_airspace_along_the_leg(start: Any, to: Any, altitude: int, reason: Reason) -> None:
+    values = {POSITION_X: start[0] * M, POSITION_Y: start[1] * M}
+    decision = ask(goto(to[0] * M, to[1] * M, altitude * M), values=values)
+    assert decision.reason is reason
+    assert decision.clause == (flat.POLICY.airspace if reason is Reason.AIRSPACE else None)
+
+
+def test_airspace_between_the_present_height_and_the_planned_one() -> None:
+    low_city = replace(flat.ZONES[0], ceiling=50 * M)
+    policy = loaded(replace(flat.POLICY, zones=(low_city, *flat.ZONES[1:])))
+    assert ask(goto(110 * M, 0, 30 * M), policy=policy).outcome is ALLOW
+    assert ask(goto(110 * M, 0, 50 * M), policy=policy).reason is Reason.AIRSPACE  # the ceiling is outside
+    assert ask(goto(110 * M, 0, 30 * M), values={HEIGHT: 60 * M}, policy=policy).reason is Reason.AIRSPACE
+
+
+def test_no_airspace_is_no_limit() -> None:
+    policy = loaded(replace(flat.POLICY, airspace=None))
+    assert ask(goto(600 * M, 300 * M), policy=policy).outcome is ALLOW
+
+
+@pytest.mark.parametrize(
+    ("values", "reason", "clause_"),
+    [
+        ({POSITION_X: 89 * M}, Reason.ADMITTED, None),  # 15 m around the bridge, less the position error
+        ({POSITION_X: 88 * M}, Reason.INVARIANT, flat.NEAR_AREA),
+        ({HEIGHT: 25 * M}, Reason.ADMITTED, None),
+        ({HEIGHT: 25 * M + 1}, Reason.INVARIANT, flat.NOT_HIGH),
+        ({POSITION_X: None}, Reason.SAFETY_UNKNOWN, flat.POLICY.airspace),
+        ({HEIGHT: None}, Reason.SAFETY_UNKNOWN, flat.POLICY.airspace),
+        ({POSITION_X: None, BATTERY: 3_600}, Reason.SAFETY_UNKNOWN, flat.POLICY.airspace),
+    ],
+)
+def test_maintain_over_the_planned_volume(values: dict[int, int | None], reason: Reason, clause_: Any) -> None:
+    decision = ask(values=values)
+    assert (decision.reason, decision.clause) == (reason, clause_)
+
+
+def test_maintain_along_the_whole_path() -> None:
+    outside = (*flat.PATH[:2], 300 * M, 0)
+    assert ask(replace(STEP, plan=replace(STEP.plan, path=outside))).reason is Reason.INVARIANT
+
+
+def test_a_negated_place_must_hold_everywhere_as_well() -> None:
+    away = clause("not position inside school", (Op.POSITION_IN, flat.SCHOOL, 0, Op.NOT, 0, 0))
+    reads = (WIND, flat.LINK, FIX)
+    policy, contract = with_contract(GOTO, maintain=(away,), reads=(HEIGHT, *reads, POSITION_X, POSITION_Y))
+    policy = loaded(replace(policy.policy, airspace=None))
+    over = replace(goto(200 * M, 300 * M), contract=contract)
+    values = {POSITION_X: -200 * M, POSITION_Y: 300 * M}
+    assert ask(over, values=values, policy=policy).reason is Reason.INVARIANT
+    assert ask(replace(goto(0, 0), contract=contract), values=values, policy=policy).outcome is ALLOW
+
+
+# ------------------------------------------------------------------------------------------------------- energy
+
+
+def test_charge_to_finish_to_come_home_and_in_reserve() -> None:
+    """200 m + 1 m rounding at 12 m/s is 16.67 s of 18 min: 155; with 500 to finish and 1,000 in reserve 1,655."""
+    step = goto(200 * M, 0)
+    needed = 500 + 1_000 + 155
+    assert ask(step, values={BATTERY: needed}).reason is Reason.DEGRADED  # the charge suffices, but is below 25 %
+    decision = ask(step, values={BATTERY: needed - 1})
+    assert (decision.outcome, decision.reason, decision.clause) == (FALLBACK, Reason.ENERGY, None)
+    assert ask(step, values={BATTERY: None}).reason is Reason.SAFETY_UNKNOWN
+
+
+def test_the_farthest_place_counts_even_if_it_is_the_start() -> None:
+    energy = Energy(flat.CONTRACTS[GOTO], flat.POLICY.vehicle)
+    planner = Planner(MotionKind.FLY, (10 * M, 0), 20 * M, 0)
+    known = WellKnown(0, 1, 2, 3)
+    far = planner.volume([point(30 * M), point(40 * M), point(0)], known)
+    near = planner.volume([point(3 * M), point(4 * M), point(0)], known)
+    assert (far.farthest, near.farthest) == ((50 * M, 50 * M), (10 * M, 10 * M))
+    assert energy.needed(50 * M) - energy.needed(10 * M) == 39 - 8
+
+
+@pytest.mark.parametrize("skill", [HOME, LAND])
+def test_what_ends_on_the_ground_needs_no_way_home_and_no_reserve(skill: int) -> None:
+    motion = flat.CONTRACTS[skill].motion
+    step = flat.invocation(3, 2, skill, Plan(motion.kind, (), 0, 0))
+    assert ask(step, values={BATTERY: 800}).reason is (Reason.ADMITTED if skill == HOME else Reason.DEGRADED)
+    assert ask(step, values={BATTERY: 799, POSITION_X: 400 * M}).reason is (
+        Reason.ENERGY if skill == HOME else Reason.DEGRADED
+    )
+
+
+ENERGY = Energy(flat.CONTRACTS[GOTO], flat.POLICY.vehicle)
+
+
+def volume(near: int, far: int, gap: int = 0) -> Volume:
+    return Volume(UNKNOWN_VOLUME.place, (0, 0, gap, None), (near, far))
+
+
+@pytest.mark.parametrize(
+    ("battery", "planned", "truth"),
+    [
+        (point(9_000), volume(0, 0), T),
+        (point(1_500), volume(0, 0), T),
+        (point(1_499), volume(0, 0), F),
+        (interval(1_499, 1_500), volume(0, 0), T | F),
+        (point(1_500), volume(0, 1), T | F),
+        (point(1_501), volume(0, 1), T),
+        (point(1_499), volume(0, 1), F),
+        (MISSING, volume(0, 0), U),
+        (maybe(point(9_000)), volume(0, 0), T | U),
+        (point(9_000), volume(0, 0, 1), T | U),
+        (point(9_000), UNKNOWN_VOLUME, U),
+    ],
+)
+def test_energy_over_sets(battery: Any, planned: Volume, truth: int) -> None:
+    assert ENERGY.suffices(battery, planned) == truth
+
+
+# ------------------------------------------------------------------------------------------------------- degrade
+
+
+def test_degrade() -> None:
+    assert ask(goto(110 * M, 0), values={BATTERY: 2_500}).outcome is ALLOW
+    decision = ask(goto(110 * M, 0), values={BATTERY: 2_499})
+    assert (decision.reason, decision.clause, decision.target) == (
+        Reason.DEGRADED,
+        flat.RULES[6],
+        flat.RULES[6].target,
+    )
+
+
+# ------------------------------------------------------------------------------------------------ planned volume
+
+KNOWN = WellKnown(0, 1, 2, 3)
+START = [point(100), point(200), point(5_000), MISSING]
+BOX = (-3, -3, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "path", "altitude", "parts", "heights"),
+    [
+        (MotionKind.HOLD, (), None, [((100, 200), 5_000, 5_000)], (5_000, 5_000)),
+        (MotionKind.CLIMB, (), 9_000, [((100, 200), 5_000, 9_000)], (5_000, 9_000)),
+        (MotionKind.LAND, (), None, [((100, 200), 0, 5_000)], (0, 5_000)),
+        (
+            MotionKind.FLY,
+            (7, 8),
+            2_000,
+            [((100, 200, 7, 8), 2_000, 5_000), ((7, 8), 2_000, 5_000)],
+            (2_000, 5_000),
+        ),
+        (
+            MotionKind.COVER,
+            (7, 8, 9, 9),
+            9_000,
+            [((100, 200, 7, 8), 5_000, 9_000), ((7, 8, 9, 9), 5_000, 9_000)],
+            (5_000, 9_000),
+        ),
+        (MotionKind.HOME, (), None, [((100, 200, 0, 0), 5_000, 5_000), ((0, 0), 0, 5_000)], (0, 5_000)),
+        (MotionKind.HOME, (), 9_000, [((100, 200, 0, 0), 5_000, 9_000), ((0, 0), 0, 9_000)], (0, 9_000)),
+    ],
+)
+def test_planned_volume(kind: int, path: Any, altitude: int | None, parts: Any, heights: Any) -> None:
+    found = Planner(kind, path, altitude, 3).volume(START, KNOWN)
+    assert [(sweep.path, low, high) for sweep, low, high in found.place.parts] == parts
+    assert {sweep.box for sweep, _, _ in found.place.parts} == {BOX}
+    assert (found.height, found.place.unknown) == ((*heights, 0, None), 0)
+
+
+def test_below_home_a_landing_goes_no_further_down_than_the_vehicle_is() -> None:
+    below = [point(0), point(0), point(-700), MISSING]
+    assert Planner(MotionKind.LAND, (), None, 0).volume(below, KNOWN).height == point(-700)
+    assert Planner(MotionKind.HOME, (), None, 0).volume(below, KNOWN).height == point(-700)
+
+
+@pytest.mark.parametrize("slot", [0, 1, 2])
+def test_without_position_or_height_the_volume_is_unknown(slot: int) -> None:
+    gone = [MISSING if n == slot else value for n, value in enumerate(START)]
+    planner = Planner(MotionKind.FLY, (7, 8), 2_000, 3)
+    assert planner.volume(gone, KNOWN) is UNKNOWN_VOLUME
+    doubtful = [maybe(value) if n == slot else value for n, value in enumerate(START)]
+    found = planner.volume(doubtful, KNOWN)
+    assert (found.place.unknown, found.height[2]) == (U, 1)
+
+
+def test_from_a_set_of_starts_the_leg_covers_every_leg() -> None:
+    starts = [interval(100, 300), interval(-50, 50), interval(1_000, 5_000), MISSING]
+    found = Planner(MotionKind.FLY, (0, 0), 2_000, 3).volume(starts, KNOWN)
+    (leg, low, high), _ = found.place.parts
+    assert (leg.path, leg.box, low, high) == ((100, -50, 0, 0), (-3, -3, 203, 103), 1_000, 5_000)
+    assert found.farthest == (100, 305)
+
+
+def test_the_last_start_is_remembered_and_a_change_of_height_keeps_the_leg() -> None:
+    planner = Planner(MotionKind.FLY, (7, 8), 2_000, 3)
+    first = planner.volume(START, KNOWN)
+    assert planner.volume(list(START), KNOWN) is first
+    higher = planner.volume([*START[:2], point(6_000), MISSING], KNOWN)
+    assert higher is not first
+    assert higher.place.parts[0][0] is first.place.parts[0][0]
+    moved = planner.volume([point(101), *START[1:]], KNOWN)
+    assert moved.place.parts[0][0] is not first.place.parts[0][0]
+    assert moved.place.parts[1][0] is first.place.parts[1][0]
+
+
+def test_a_floor_of_zero_forbids_the_take_off_and_no_floor_does_not() -> None:
+    takeoff, on_ground = flat.INVOCATIONS[0], {HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0}
+    assert ask(takeoff, values=on_ground).outcome is ALLOW
+    floored = replace(flat.ZONES[0], floor=0)
+    policy = loaded(replace(flat.POLICY, zones=(floored, *flat.ZONES[1:])))
+    assert ask(takeoff, values=on_ground, policy=policy).reason is Reason.AIRSPACE
+    assert flat.ZONES[0].floor == LOWEST
+
+
+def test_a_policy_without_a_position_defers_what_is_about_places() -> None:
+    contracts = tuple(replace(c, reads=tuple(s for s in c.reads if s not in (5, 6))) for c in flat.CONTRACTS)
+    policy = loaded(
+        replace(flat.POLICY, vehicle=replace(flat.POLICY.vehicle, position=-1), contracts=contracts)
+    )
+    takeoff = replace(flat.INVOCATIONS[0], contract=contracts[TAKEOFF])
+    assert ask(takeoff, policy=policy).reason is Reason.SAFETY_UNKNOWN
+    inspect = replace(STEP, contract=contracts[INSPECT])
+    assert ask(inspect, values={OBSTACLE: 1 * M}, policy=policy).reason is Reason.STATE_VIOLATED
+
+
+def test_an_airspace_of_several_zones() -> None:
+    both = Airspace((flat.CITY, flat.BRIDGE_GROWN), (flat.SCHOOL, flat.SCHOOL_GROWN), "", 0, 0, 1)
+    policy = loaded(replace(flat.POLICY, airspace=both))
+    assert ask(policy=policy).outcome is ALLOW
+    assert ask(goto(300 * M, 0), policy=policy).reason is Reason.AIRSPACE
+
+
+def test_motion_without_an_altitude_of_its_own_stays_at_the_present_height() -> None:
+    _, contract = with_contract(HOME, motion=Motion(MotionKind.HOME, -1, -1))
+    policy = loaded(replace(flat.POLICY, zones=(replace(flat.ZONES[0], ceiling=30 * M), *flat.ZONES[1:])))
+    home = replace(flat.INVOCATIONS[3], contract=contract, plan=Plan(MotionKind.HOME, (), 100 * M, 0))
+    assert ask(home, policy=policy).outcome is ALLOW

@@ -1,0 +1,157 @@
+"""Whatever happens on a flight, its log is audited without a flaw; and what it proves is said exactly."""
+
+from collections.abc import Sequence
+
+import pytest
+from msgspec.structs import replace
+
+from reference.forgery import LOG_KEY, ROOT_KEY, edit, flight, prove, read, signed
+from rtshcua.evidence.report import Verdict
+from rtshcua.ground.auditor.audit import Audit, audit
+from rtshcua.model.flat.mission import Mission, OnInadmissible
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import Event, Interrupted
+from rtshcua.simulation.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
+from rtshcua.wire.keys import Duty
+from virtual import case
+from virtual.flight import Flight
+
+S, M = case.S, case.M
+
+
+def fly(
+    *faults: Fault,
+    of: Mission | None = None,
+    kind: str = "px4",
+    mode: Mode = Mode.SOFTWARE,
+    interrupt_us: int | None = None,
+) -> list[bytes]:
+    mission = of or case.mission(case.short_steps())
+    run = Flight(case.seal(mission), case.simulated(kind, faults=faults), mode=mode)
+
+    def each(flight: Flight) -> Sequence[Event]:
+        now = flight.clock.now().monotonic_us
+        return [Interrupted(now)] if interrupt_us is not None and now >= interrupt_us else []
+
+    return run.fly(each).lines
+
+
+def sound(lines: Sequence[bytes]) -> Audit:
+    result = prove(lines)
+    assert result.report.failure is None, result.report.failure
+    assert result.report.verdict is Verdict.VERIFIED
+    assert result.derived == sum(read(line)["type"] == "decision" for line in lines)
+    assert result.dispatches == sum(read(line).get("event") == "dispatched" for line in lines)
+    return result
+
+
+FAULTS: dict[str, tuple[Fault, ...]] = {
+    "none": (),
+    "low battery": (BatteryLevel(15 * S, 2_000),),
+    "empty battery on the ground": (BatteryLevel(0, 1_500),),
+    "wind": (WindStep(15 * S, 14 * M),),
+    "no fix": (GpsLoss(15 * S),),
+    "no fix for a while": (GpsLoss(12 * S, 4 * S),),
+    "obstacle": (Obstacle(15 * S, 2 * M),),
+    "pilot": (PilotMode(15 * S),),
+    "silence": (LinkSilence(15 * S),),
+}
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("faults", FAULTS.values(), ids=FAULTS.keys())
+def test_the_log_of_every_kind_of_flight_is_sound(faults: tuple[Fault, ...], kind: str) -> None:
+    sound(fly(*faults, kind=kind))
+
+
+@pytest.mark.parametrize("behaviour", list(OnInadmissible))
+@pytest.mark.parametrize("kind", ["wind", "no fix for a while", "low battery"])
+def test_whatever_the_mission_does_when_a_step_is_not_admitted(behaviour: OnInadmissible, kind: str) -> None:
+    mission = case.mission()
+    steps = tuple(replace(step, on_inadmissible=behaviour) for step in mission.invocations)
+    sound(fly(*FAULTS[kind], of=replace(mission, invocations=steps)))
+
+
+def test_a_flight_that_was_interrupted() -> None:
+    assert sound(fly(interrupt_us=20 * S)).report.close
+
+
+def test_what_is_proven_and_what_is_not() -> None:
+    report = sound(flight()).report
+    assert [claim.slug for claim in report.proven] == [
+        "trust", "bundle", "chain", "signed-close", "decisions", "dispatches",
+    ]  # fmt: skip
+    assert [claim.slug for claim in report.unproven] == ["anchor", "state", "development"]
+    texts = " ".join(claim.text for claim in report.proven)
+    assert "3 decisions derived again" in texts
+    assert "3 dispatches, each after a record" in texts
+    assert LOG_KEY.kid.hex() in texts
+
+
+def test_one_is_not_many() -> None:
+    lines = fly(BatteryLevel(0, 1_500))
+    texts = [claim.text for claim in sound(lines).report.proven]
+    decisions = sum(read(line)["type"] == "decision" for line in lines)
+    assert f"{decisions} decision{'' if decisions == 1 else 's'} derived again, each with the same answer" in texts
+    assert "0 dispatches, each after a record that permits it" in texts
+
+
+def test_a_log_that_was_cut_still_proves_its_beginning() -> None:
+    report = prove(flight()[:-1]).report
+    assert report.verdict is Verdict.INCOMPLETE
+    assert [claim.slug for claim in report.proven] == ["trust", "bundle", "chain", "decisions", "dispatches"]
+    assert "signed-close" in [claim.slug for claim in report.unproven]
+
+
+def test_a_log_that_fails_proves_nothing() -> None:
+    report = prove([flight()[0], *flight()[2:]]).report
+    assert report.proven == ()
+    assert [claim.slug for claim in report.unproven] == ["log"]
+    report = prove(signed([flight()[0], edit(flight()[2], outcome="deny"), flight()[-1]])).report
+    assert (report.proven, report.shortfall) == ((), None)
+    assert [claim.slug for claim in report.unproven] == ["log"]
+
+
+def test_mode_none_needs_no_permits_and_says_so() -> None:
+    lines = fly(of=case.mission(), mode=Mode.NONE)
+    report = sound_without_permits(lines)
+    assert "enforcement" in [claim.slug for claim in report.report.unproven]
+    assert "dispatches" not in [claim.slug for claim in report.report.proven]
+
+
+def sound_without_permits(lines: Sequence[bytes]) -> Audit:
+    result = prove(lines)
+    assert result.report.failure is None, result.report.failure
+    return result
+
+
+@pytest.mark.parametrize("length", [16, 32])
+def test_the_pin_is_a_key_or_its_name(length: int) -> None:
+    root = case.KEYS[Duty.ROOT]
+    pinned = root.kid if length == 16 else root.public
+    assert audit(flight(), pinned).report.failure is None
+
+
+def test_another_pin_trusts_nothing() -> None:
+    for pinned in (bytes(16), bytes(32), case.KEYS[Duty.POLICY].public):
+        report = audit(flight(), pinned).report
+        assert report.failure is not None
+        assert report.failure.slug.startswith("trust/root-")
+        assert report.failure.record == 0
+
+
+def test_a_changed_record_is_named_by_the_chain_before_its_meaning() -> None:
+    lines = list(flight())
+    number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
+    lines[number] = edit(lines[number], outcome="deny")
+    report = audit(lines, ROOT_KEY).report
+    assert report.failure is not None
+    assert (report.failure.slug, report.failure.record) == ("chain/broken", number)
+
+
+def test_a_record_that_means_something_wrong_at_the_very_end() -> None:
+    lines = flight()
+    number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
+    report = audit([*lines[:number], edit(lines[number], outcome="deny")], ROOT_KEY).report
+    assert report.failure is not None
+    assert (report.failure.slug, report.failure.record) == ("decision/outcome", number)

@@ -14,7 +14,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def check(
-    paths: Annotated[list[Path], typer.Argument(help="sources (.rts)")],
+    paths: Annotated[list[Path], typer.Argument(help="sources (.rts), or a mission specification (.json) first")],
     deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:

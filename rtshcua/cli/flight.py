@@ -40,6 +40,7 @@ EXIT_CODES = {
 }
 
 _SNAPSHOT_S = 0.1
+_BACKLOG_S = 1.0
 _WAITING_NOTE_S = 5.0
 _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
@@ -125,7 +126,8 @@ class Flight:
     def _backlog(self) -> list[Event]:
         """What the vehicle said while this was put together, so that the runtime begins with the present."""
         events: list[Event] = []
-        while said := self._vehicle.poll(self._clock.now().monotonic_us, 0):
+        until_s = time.monotonic() + _BACKLOG_S
+        while time.monotonic() < until_s and (said := self._vehicle.poll(self._clock.now().monotonic_us, 0)):
             events += said
         return events
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
-from rtshcua.adapters.files.keystore import KeyStore, read_key, read_root
+from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.files.replay import FileReplayStore
 from rtshcua.adapters.files.runs import RunFolder
 from rtshcua.adapters.simulator import Simulator, SimulatorError
@@ -21,12 +21,14 @@ from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.tape import Tape
+from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
 from rtshcua.onboard.ports import Event
+from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
 from rtshcua.wire.keys import Duty, SigningKey
-from rtshcua.wire.trust import TrustRoot, open_root
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 #: How long a heartbeat is waited for, and then word of whether the vehicle is in the air, in seconds.
@@ -49,8 +51,8 @@ class Launch:
     speed: float
     vehicle: str | None
     root: Path | None
-    pin: str | None
     log_key: Path | None
+    passphrase_file: Path | None
     data: Path
     state: Path
     runs: Path
@@ -108,26 +110,18 @@ def _read(path: Path) -> bytes:
 
 
 def _trust(order: Launch, now_us: int) -> tuple[TrustRoot, bytes, SigningKey]:
-    """The trust root, its signed bytes, and the key that will sign the log. Raises `Untrusted` and `Refused`."""
+    """The trust root, its signed bytes, and the key that will sign the log. Raises `Untrusted` and `Refused`.
+
+    A root that is named on the command line is trusted for being named there.
+    """
     store = KeyStore(order.data)
     signed = store.root() if order.root is None else read_root(order.root)
-    pinned = store.pin() if order.root is None else _pinned(order.pin)
-    root = open_root(signed, pinned=pinned, now_us=now_us)
-    key = store.signing_key(Duty.LOG) if order.log_key is None else read_key(order.log_key, Duty.LOG, passphrase=None)
+    root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
+    key = unlock(store, Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
     if key.kid not in root.keys_for(Duty.LOG):
         text = f"the trust root names no log key {key.kid.hex()}: nobody could verify the log"
         raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, "`--log-key` gives one that it names")
     return root, signed, key
-
-
-def _pinned(text: str | None) -> bytes | None:
-    try:
-        pinned = None if text is None else bytes.fromhex(text)
-    except ValueError:
-        pinned = b""
-    if pinned is not None and len(pinned) not in (16, 32):
-        raise Refused(ExitCode.USAGE, "pin", f"`{text}` is no public key and no key id in hexadecimal")
-    return pinned
 
 
 def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Loaded:

@@ -38,9 +38,8 @@ def run(
     vehicle: Annotated[str | None, typer.Option(metavar="IDENTITY", help="who this vehicle is (as the bundle says)")]
     = None,
     root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
-    pin: Annotated[str | None, typer.Option(metavar="HEX", help="the root's public key, where `--root` is given")]
-    = None,
     log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
     runs: Annotated[Path, typer.Option(help="where the run's folder is made")] = Path("runs"),
     state_dir: Annotated[Path | None, typer.Option(help="where it is kept which bundles flew (the data folder)")]
     = None,
@@ -72,9 +71,20 @@ def run(
         if fresh_state:
             state = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rtshcua-")))
         order = Launch(
-            bundle=bundle, link=link, simulator=words, mode=mode, speed=speed, vehicle=vehicle, root=root, pin=pin,
-            log_key=log_key, data=data_folder(), state=state, runs=runs, style=_style(plain=plain, as_json=as_json),
-        )  # fmt: skip
+            bundle=bundle,
+            link=link,
+            simulator=words,
+            mode=mode,
+            speed=speed,
+            vehicle=vehicle,
+            root=root,
+            log_key=log_key,
+            passphrase_file=passphrase_file,
+            data=data_folder(),
+            state=state,
+            runs=runs,
+            style=_style(plain=plain, as_json=as_json),
+        )
         try:
             return launch(order)
         except Refused as refused:

@@ -1,12 +1,12 @@
 """The smallest change of values that makes a condition true, or false: read off the condition itself."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, Tables, build, total
 from rtshcua.decision.truth import FALSE, TRUE
-from rtshcua.decision.values import Value
+from rtshcua.decision.values import Value, point
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
 
 
@@ -19,9 +19,19 @@ class Change(NamedTuple):
     high: int
     choices: frozenset[int] | None
 
+    @property
+    def subject(self) -> "Subject":
+        """What changes."""
+        return (self.argument, self.at)
+
     def allows(self, value: int) -> bool:
         """Whether a value satisfies it."""
         return self.low <= value <= self.high if self.choices is None else value in self.choices
+
+
+Subject: TypeAlias = tuple[bool, int | None]
+#: the value that each subject is given
+Made: TypeAlias = dict[Subject, int]
 
 
 class Changes:
@@ -52,6 +62,17 @@ class Changes:
                 return (Change(False, None, start, min(end, DAY - 1), None),)
             case _:
                 return None
+
+    def help(self, node: tree.Node, goal: bool, made: Made) -> bool:
+        """Whether the condition has the truth `goal` once subjects have the values given; a clock is then exact."""
+        slots, arguments, utc = list(self._at.slots), list(self._at.arguments), self._at.utc
+        for (argument, at), value in made.items():
+            if at is None:
+                utc = ((value - self._tables.utc_offset_us,) * 2,)
+            else:
+                (arguments if argument else slots)[at] = point(value)
+        changed = Environment(slots, arguments, utc, (0, 0), self._at.place)
+        return build(node, self._tables)(changed) == (TRUE if goal else FALSE)
 
     def _all(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[Change, ...] | None:
         first, second = self.find(left, goal), self.find(right, goal)
@@ -92,14 +113,14 @@ class Changes:
 
 def _merged(changes: Sequence[Change]) -> tuple[Change, ...] | None:
     """One change for each subject, None when two contradict."""
-    merged: dict[tuple[bool, int | None], Change] = {}
+    merged: dict[Subject, Change] = {}
     for new in changes:
-        old = merged.setdefault((new.argument, new.at), new)
+        old = merged.setdefault(new.subject, new)
         if old is not new:
             both = _both(old, new)
             if both is None:
                 return None
-            merged[new.argument, new.at] = both
+            merged[new.subject] = both
     return tuple(merged.values())
 
 

@@ -198,13 +198,16 @@ def _inside(zone: PreparedZone, where: WellKnown) -> Condition:
 def _inside_argument(cell: int, table: tuple[int, ...], tables: Tables) -> Condition:
     each = tuple(_inside(tables.zones[zone], tables.known) for zone in table)
 
+    def inside(zone: int, at: Environment) -> Truth:
+        return each[zone](at) if 0 <= zone < len(each) else UNKNOWN  # an argument out of range is no zone
+
     def run(at: Environment) -> Truth:
         low, high, _, elements = at.arguments[cell]
         if low == high:
-            return each[low](at)
+            return inside(low, at)
         truth = 0
         for zone in elements or range(low, high + 1):
-            truth |= each[zone](at)
+            truth |= inside(zone, at)
         return truth
 
     return run

@@ -55,7 +55,7 @@ def fallbacks(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, after: int, exact: bool
 ) -> Iterator[Choice | None]:
     """The links that may be the choice, in order, and None if perhaps none flies; one situation has one answer."""
-    if after < DEGRADE and invocation.misfit is None:
+    if after < DEGRADE:
         at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
         for rule in invocation.candidates.degrades:
             matches = rule.condition(at)

@@ -1,10 +1,12 @@
 """What would have passed: computed only on refusal, from the condition that decided."""
 
+from typing import NamedTuple
+
 from rtshcua.decision.case import situation
-from rtshcua.decision.change import Changes
+from rtshcua.decision.change import Changes, Made
 from rtshcua.decision.decide import Decision
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.offer import Nearest, offer
+from rtshcua.decision.offer import Offer, offer
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.tree import Node
@@ -15,6 +17,19 @@ from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Reason
+
+
+class Nearest(NamedTuple):
+    """A value of `subject` (a parameter, a signal, or the local time) that would have passed, the nearest there is.
+
+    `value` is in the canonical unit of `dimension` (`daytime`: us since local midnight). For an enumeration or a zone,
+    `choices` are the names that would pass, and `value` is the ordinal or index of the first.
+    """
+
+    subject: str
+    dimension: str
+    value: int
+    choices: tuple[str, ...]
 
 
 def nearest(
@@ -58,10 +73,24 @@ def _fewest(
     fitting: list[tuple[Nearest, ...]] = []
     for node, goal in conditions:
         offers = [offer(change, contract, policy.policy, at) for change in changes.find(node, goal) or ()]
-        known = tuple(one for one in offers if one is not None)
-        if known and len(known) == len(offers):
-            fitting.append(known)
+        if offers and all(one.options for one in offers):
+            tried = _tried(offers, changes, node, goal)
+            if tried is not None:
+                fitting.append(tried)
     return min(fitting, key=len, default=())
+
+
+def _tried(offers: list[Offer], changes: Changes, node: Node, goal: bool) -> tuple[Nearest, ...] | None:
+    """The offers that hold when tried, for a change may undo what another part of the condition was content with."""
+    first: Made = {one.change.subject: one.options[0][0] for one in offers}
+    kept: list[Nearest] = []
+    for one in offers:
+        good = [option for option in one.options if changes.help(node, goal, first | {one.change.subject: option[0]})]
+        if not good:
+            return None
+        names = tuple(name for _, name in good if name)
+        kept.append(Nearest(one.subject, one.dimension, good[0][0], names))
+    return tuple(kept)
 
 
 def _in_range(invocation: PreparedInvocation) -> tuple[Nearest, ...]:

@@ -96,7 +96,8 @@ class Run:
     def _read(self) -> bool:
         out = self.process.stdout
         left = self.until_s - time.monotonic()
-        assert left > 0 and select.select([out], [], [], left)[0], f"it took too long: {self.events}"
+        ready = select.select([out], [], [], max(0.0, left))[0]
+        assert ready, f"it took too long: {self.events}"
         data = os.read(out.fileno(), 65_536)
         *lines, self._rest = (self._rest + data).split(b"\n")
         self.events += [json.loads(line) for line in lines]

@@ -140,7 +140,11 @@ class Relay(threading.Thread):
             data, vehicle = self.inner.recvfrom(65_535)
             bent = bytearray(data)
             bent[chance.randrange(len(bent))] ^= 1 + chance.randrange(255)
-            for garbage in (chance.randbytes(chance.randrange(1, 300)), bytes(bent), data[: chance.randrange(len(data))]):
+            for garbage in (
+                chance.randbytes(chance.randrange(1, 300)),
+                bytes(bent),
+                data[: chance.randrange(len(data))],
+            ):
                 self.added += 1
                 self.outer.sendto(garbage, self.to)
             self.outer.sendto(data, self.to)
@@ -173,7 +177,9 @@ def test_a_run_that_was_killed_in_the_air_comes_down_and_does_not_resume(ground:
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_sim_serves_a_run_and_ends_cleanly(ground: Any, port: int, flavour: str) -> None:
-    vehicle = ground.start("sim", "--connect", f"udpout:127.0.0.1:{port}", "--flavour", flavour, "--speed", "50", "--json")
+    vehicle = ground.start(
+        "sim", "--connect", f"udpout:127.0.0.1:{port}", "--flavour", flavour, "--speed", "50", "--json"
+    )
     ready = vehicle.until("ready")
     assert (ready["flavour"], ready["peer"]) == (flavour, port)
     run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", speed=50).end()

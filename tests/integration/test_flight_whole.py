@@ -61,7 +61,9 @@ def test_a_bundle_flies_once(ground: Any) -> None:
         again = ground.run(bundle, speed=50).end()
         assert again.code == 5
         assert "a bundle flies once" in again.stderr
-        assert again.events == [{"event": "refused", "slug": "replayed", "text": again.events[0]["text"], "exit_code": 5}]
+        assert again.events == [
+            {"event": "refused", "slug": "replayed", "text": again.events[0]["text"], "exit_code": 5}
+        ]
     assert len(list((ground.folder / "runs").iterdir())) == 1
     assert ground.run(bundle, "--fresh-state", speed=50).end().code == 0
 

@@ -293,7 +293,7 @@ def dispatches(actions: Sequence[Action]) -> list[Command]:
 
 
 def assert_audited(run: Run) -> None:
-    """The log, closed, verifies with nothing but the root's key: each decision derives again, each dispatch is covered."""
+    """The closed log verifies with the root's key alone: each decision derives again, each dispatch is covered."""
     close = run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)
     report = audit([*run.lines, close], ROOT_KEY.public).report
     assert report.failure is None, report.failure

@@ -1,11 +1,11 @@
-"""The hand-written policy and mission of tests/reference, made flyable: signals with sources, a bundle with real keys."""
+"""The hand-written policy and mission of tests/reference, made flyable: real signals, real keys, a bundle."""
 
 from collections.abc import Mapping, Sequence
 from math import cos, radians
 
 from msgspec.structs import replace
-from reference import flat_case as flat
 
+from reference import flat_case as flat
 from rtshcua.model.flat.contract import Contract, MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy
@@ -50,7 +50,8 @@ def policy() -> Policy:
     rules = list(flat.RULES)
     low = flat.apply(flat.Op.LE, flat.argument(1), flat.const(30 * M))
     scope = flat.clause(
-        "area inside bridge_a and altitude <= 30 m", flat.apply(flat.Op.AND, (flat.Op.ARGUMENT_IN, 0, flat.IN_BRIDGE), low)
+        "area inside bridge_a and altitude <= 30 m",
+        flat.apply(flat.Op.AND, (flat.Op.ARGUMENT_IN, 0, flat.IN_BRIDGE), low),
     )
     rules[0] = replace(rules[0], when=scope)
     return replace(flat.POLICY, signals=tuple(signals), rules=tuple(rules), projection=_projection())

@@ -5,11 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
-from virtual import case
-from virtual.vehicle import VirtualClock, VirtualVehicle
 
 from rtshcua.adapters.loop import Loop
 from rtshcua.evidence.chain import Recorder
+from rtshcua.ground.auditor.audit import Audit, Auditor
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
 from rtshcua.onboard.ports import Action, Ending, Event
@@ -17,6 +16,8 @@ from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.trust import TrustRoot
+from virtual import case
+from virtual.vehicle import VirtualClock, VirtualVehicle
 
 MONOTONIC_US = 7_000_000
 
@@ -53,6 +54,16 @@ class Flown:
 
     def __post_init__(self) -> None:
         self.records = [msgspec.json.decode(line) for line in self.lines]
+
+    def audit(self) -> Audit:
+        """What `verify-log` makes of the log."""
+        auditor = Auditor(case.KEYS[Duty.ROOT].kid)
+        for line in self.lines:
+            auditor.take(line)
+        return auditor.audit()
+
+    def dispatched(self) -> list[str]:
+        return [record["detail"] for record in self.effects("dispatched")]
 
     def effects(self, event: str) -> list[dict[str, Any]]:
         return [record for record in self.records if record["type"] == "effect" and record["event"] == event]

@@ -8,7 +8,9 @@ from rtshcua.model.flat.zone import SHIFT, Projection, unproject
 from rtshcua.simulation.config import HOME
 
 _EAST = cos(radians(HOME.latitude / 1e7))
-PROJECTION = Projection(HOME.latitude, HOME.longitude, round(11.1319 * _EAST * (1 << SHIFT)), round(11.1319 * (1 << SHIFT)))
+PROJECTION = Projection(
+    HOME.latitude, HOME.longitude, round(11.1319 * _EAST * (1 << SHIFT)), round(11.1319 * (1 << SHIFT))
+)
 
 BATTERY, HEIGHT, FIX, POSITION_X, WIND, LINK = 0, 1, 2, 3, 5, 6
 
@@ -34,7 +36,9 @@ SIGNALS = (
     )),
 )  # fmt: skip
 
-VEHICLE = Vehicle("quad", "quad-07", 50_000, 12_000, 3_000, 3_000, 18 * 60_000_000, 2_000, 0, POSITION_X, HEIGHT, BATTERY)
+VEHICLE = Vehicle(
+    "quad", "quad-07", 50_000, 12_000, 3_000, 3_000, 18 * 60_000_000, 2_000, 0, POSITION_X, HEIGHT, BATTERY
+)
 
 POLICY = Policy(
     name="driver", version=1, vehicle=VEHICLE, projection=PROJECTION, roles=("operator",), signals=SIGNALS, slots=7,

@@ -1,4 +1,4 @@
-"""The simulated vehicle behind its real driver, in one process and in explicit time: the `Vehicle` and `Clock` ports."""
+"""The simulated vehicle behind its real driver, in one process and explicit time: the `Vehicle` and `Clock` ports."""
 
 from collections.abc import Sequence
 
@@ -30,8 +30,8 @@ class VirtualClock:
 class VirtualVehicle:
     """Steps the simulation tick by tick; what would be datagrams are method calls.
 
-    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives the
-    bytes that come in place of a datagram from it.
+    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives
+    the bytes that come in place of a datagram from it.
     """
 
     def __init__(self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None) -> None:

@@ -6,7 +6,7 @@ A missing acknowledgement means that it is not known whether the command was exe
 from rtshcua.adapters.vehicle.flavour import Message, Stage
 
 RETRY_US = 1_000_000
-RETRIES = 3
+RETRIES = 5
 #: An answer may come this late; within it, a refusal may belong to an earlier sending of the same command.
 LATE_US = 5_000_000
 

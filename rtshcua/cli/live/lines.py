@@ -24,7 +24,8 @@ def sentence(what: Happening) -> str:
     """A happening as one line: the outcome or event, what it is about, and why."""
     subject = printable(what.subject)
     if what.event != "decision":
-        return f"{what.event:<11}  {subject}{'  ' if subject and what.detail else ''}{printable(what.detail)}".rstrip()
+        detail = "" if what.event == "dispatched" and subject else printable(what.detail)
+        return f"{what.event:<11}  {subject}{'  ' if subject and detail else ''}{detail}".rstrip()
     why = ""
     if what.outcome != "allow":
         why = f"  because {what.reason}{f': `{printable(what.clause)}`' if what.clause else ''}"

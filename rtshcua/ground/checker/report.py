@@ -1,6 +1,7 @@
 """Where checks put what they find."""
 
 from collections.abc import Iterable, Mapping
+from hashlib import sha256
 
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label, has_errors
@@ -13,6 +14,7 @@ class Report:
     def __init__(self, sources: Mapping[str, Source]) -> None:
         self.sources = sources
         self.found: list[Diagnostic] = []
+        self._digests: dict[str, bytes] = {}
 
     def add(
         self,
@@ -44,6 +46,14 @@ class Report:
         """The source text under a span as it stands."""
         source = self.sources.get(span.file)
         return "" if source is None else source.slice(span)
+
+    def digest(self, file: str) -> bytes:
+        """The SHA-256 of a file's text in UTF-8."""
+        digest = self._digests.get(file)
+        if digest is None:
+            text = self.sources[file].text
+            digest = self._digests[file] = sha256(text.encode("utf-8", "surrogatepass")).digest()
+        return digest
 
     def failed(self) -> bool:
         """Whether anything found so far forbids going on."""

@@ -1,9 +1,8 @@
 """The table of source files that spans on board refer to, with the digest of each."""
 
 from collections.abc import Mapping
-from hashlib import sha256
 
-from rtshcua.diagnostics.span import Source, Span
+from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.report import Report
 
 #: a clause's text is for a person; what is longer is cut
@@ -41,5 +40,4 @@ class Files:
     @property
     def digests(self) -> tuple[bytes, ...]:
         """The SHA-256 of each file's text in UTF-8."""
-        sources: Mapping[str, Source] = self._report.sources
-        return tuple(sha256(sources[name].text.encode("utf-8", "surrogatepass")).digest() for name in self._index)
+        return tuple(self._report.digest(name) for name in self._index)

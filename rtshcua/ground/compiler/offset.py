@@ -1,14 +1,14 @@
 """Grown and shrunk zones, snapped to whole millimetres on the safe side.
 
 `inner(shape, margin)` never has a point that the true set lacks, `outer` lacks none that it has; a positive margin
-grows, a negative one shrinks. The curve is shapely's (floats); its corners are rounded and the result is proved again
-in integers, with more slack where the proof fails.
+grows, a negative one shrinks. Convex polygons are offset in integers, all others by shapely (floats, whose corners are
+rounded); either way the result is proved in integers, with more slack where the proof fails.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 from rtshcua.ground.checker.polygons import contains, counter_clockwise, crossing, doubled_area
+from rtshcua.ground.compiler import convex
 from rtshcua.ground.compiler.distance import Edge, apart, within
 from rtshcua.ground.compiler.shapes import Disc, Outline, Point, Shape, edges
 
@@ -75,7 +75,16 @@ def _search(
 
 
 def _offset(shape: Outline, distance: int, join: str, *, fill: bool) -> Outline:
-    """Shapely's buffer, with corners rounded to whole millimetres."""
+    """The polygon grown or shrunk by `distance`, its corners rounded to whole millimetres."""
+    if not convex.is_convex(shape):
+        return _buffered(shape, distance, join, fill=fill)
+    if distance < 0:
+        return _outline(convex.shrunk(shape, -distance))
+    return _outline(convex.rounded(shape, distance) if join == "round" else convex.mitred(shape, distance))
+
+
+def _buffered(shape: Outline, distance: int, join: str, *, fill: bool) -> Outline:
+    """Shapely's buffer."""
     import shapely  # noqa: PLC0415  a third of a second, for the few sources that need it
 
     made = shapely.Polygon(shape.corners).buffer(distance, quad_segs=QUARTER, join_style=join, mitre_limit=MITRE_LIMIT)
@@ -85,11 +94,10 @@ def _offset(shape: Outline, distance: int, join: str, *, fill: bool) -> Outline:
         raise Unshapely("parts")
     if made.interiors and not fill:
         raise Unshapely("holes")
-    return _outline(made)
+    return _outline([(round(x), round(y)) for x, y in made.exterior.coords[:-1]])
 
 
-def _outline(made: Any) -> Outline:
-    corners = [(round(x), round(y)) for x, y in made.exterior.coords[:-1]]
+def _outline(corners: Sequence[Point]) -> Outline:
     kept = _without_straight(corners)
     if len(kept) < 3 or doubled_area(kept) == 0:
         raise Unshapely("nothing")
@@ -106,6 +114,8 @@ def _without_straight(corners: Sequence[Point]) -> list[Point]:
             kept.append(corner)
     while len(kept) > 1 and kept[0] == kept[-1]:
         kept.pop()
+    if len(kept) < 3:
+        return kept
     return [
         b
         for a, b, c in zip([kept[-1], *kept[:-1]], kept, [*kept[1:], kept[0]], strict=True)

@@ -18,8 +18,9 @@ from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, ZoneDecl
 from rtshcua.model.quantity import Dimension, display
 
-#: a zone that nothing is inside of: it has no height
+#: a zone that nothing is inside of, for it has no height, and one that everything is inside of
 NOWHERE = Zone("nowhere", CIRCLE, LOWEST, LOWEST, (0, 0, 1))
+EVERYWHERE = Zone("everywhere", CIRCLE, LOWEST, HIGHEST, (0, 0, MAX_COORDINATE * MAX_COORDINATE))
 
 
 class ZoneTable:
@@ -120,7 +121,7 @@ class ZoneTable:
         return NOWHERE if region is None else region.flat(derived_name(name, margin))
 
     def _entry(self, number: int, margin: int, *, smaller: bool) -> int:
-        """A zone that cannot be derived is none that the vehicle could be inside of."""
+        """Where a zone cannot be derived, the one that fails what asks for it."""
         if margin == 0:
             return number
         key = (number, margin, smaller)
@@ -129,8 +130,8 @@ class ZoneTable:
             try:
                 region = _grown(self.regions[number], margin, smaller=smaller)
                 zone = region.flat(derived_name(self._declarations[number].name.text, margin))
-            except Unshapely:
-                zone = NOWHERE
+            except Unshapely as unshapely:
+                zone = NOWHERE if smaller or unshapely.reason == "nothing" else EVERYWHERE
             found = self._derived[key] = self._add(zone)
         return found
 

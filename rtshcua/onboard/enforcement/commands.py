@@ -49,7 +49,7 @@ class Commands:
             cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
             path = link.arguments[cell : cell + 2]
         altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
-        held_us = hold_us(contract, link.arguments)
+        held_us = 0 if link.limit_us else hold_us(contract, link.arguments)  # the link's own time counts
         return Command(token, contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us)
 
     def _geo(self, path: Sequence[int]) -> tuple[int, ...]:

@@ -83,13 +83,17 @@ class Conduct:
     # -------------------------------------------------------- what ends a run, or turns it homeward
 
     def break_off(self, now: Now, cause: Ending) -> None:
-        """Give the mission up: what runs falls back, in the air the contingency flies, on the ground the run ends."""
+        """Give the mission up: what runs falls back, in the air the contingency flies, on the ground the run ends.
+
+        What already brings the vehicle home or down goes on.
+        """
         self._blame(cause)
+        active = self.dispatcher.active
         if not self.aloft:
             self.end(now, cause)
-        elif self.stage is Stage.RUNNING:
+        elif self.stage is Stage.RUNNING and not (active is not None and active.homeward):
             self.fall_back(FALLBACK_LINK, cause)
-        elif self.stage is not Stage.FALLING:
+        elif self.stage in (Stage.WAITING, Stage.DECIDING):
             self.fall_back(CONTINGENCY_LINK, cause)
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED) -> None:
@@ -159,6 +163,9 @@ class Conduct:
         return True
 
     def _decide(self, now: Now) -> bool:
+        if self._cause is not None:  # given up while a step of the mission brought the vehicle down
+            self.break_off(now, self._cause)
+            return True
         invocation = self.queue.current
         if invocation is None:
             return self._finish(now)
@@ -229,8 +236,9 @@ class Conduct:
                 return
 
     def _supervise(self, now: Now) -> bool:
-        supervisor = self._supervisor
-        violated = supervisor and supervisor.violated(self.monitor.state(now.monotonic_us), now)
+        if self._supervisor is None:
+            return False
+        violated = self._supervisor.violated(self.monitor.state(now.monotonic_us), now)
         if violated is None:
             return False
         self.dispatcher.end(now, "violated", violated)

@@ -1,7 +1,7 @@
 """Each code of the checker has twins: two sources that differ in one assumption, which their first line names.
 
-The accepted one is compiled without a finding, the rejected one has findings of that code alone, and what a person reads
-then is kept beside this file. `UPDATE_GOLDENS=1` writes it anew, for a look at the difference.
+The accepted one is compiled without a finding, the rejected one has findings of that code alone, and what a person
+reads then is kept beside this file. `UPDATE_GOLDENS=1` writes it anew, for a look at the difference.
 """
 
 import os
@@ -25,7 +25,7 @@ CHECKOUT = TESTS.parent
 LIBRARY = "tests/golden/checker/library"
 
 REJECTED = sorted(path.name for path in (TESTS / "rejected").iterdir() if path.is_file())
-#: what no small source can bring about: bytes that are no text, size, depth, numbers of findings, a compiler's own fault
+#: what no small source can bring about: bytes that are no text, size, depth, many findings, a compiler's own fault
 WITHOUT_TWINS = {codes.NOT_TEXT, codes.TOO_LARGE, codes.TOO_DEEP, codes.TOO_MANY_FINDINGS, codes.REFUSED_ON_BOARD}
 
 

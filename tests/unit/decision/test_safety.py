@@ -23,12 +23,13 @@ from reference.flat_case import (
     clause,
 )
 
+from rtshcua.decision.decide import decide
 from rtshcua.decision.energy import Energy
 from rtshcua.decision.places import WellKnown
 from rtshcua.decision.values import MISSING, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
 from rtshcua.model.flat.code import Op
-from rtshcua.model.flat.contract import Motion, MotionKind
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import LOWEST
@@ -69,8 +70,6 @@ def test_a_slot_that_is_missing_stale_or_beyond_sense_is_unknown(slot: int) -> N
 
 @pytest.mark.parametrize(("values", "ages"), [((), ()), ((0,) * 9, (0,) * 9), ((9_000,) * 8, (0,) * 7)])
 def test_nothing_of_a_state_of_the_wrong_size_is_believed(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
-    from rtshcua.decision.decide import decide
-
     decision = decide(ready(STEP, POLICY), flat.State(values, ages), POLICY, flat.context(), flat.NOW)
     assert (decision.outcome, decision.reason) == (DEFER, Reason.STATE_UNKNOWN)
 
@@ -328,7 +327,6 @@ def test_an_airspace_of_several_zones() -> None:
 
 
 def test_motion_without_an_altitude_of_its_own_stays_at_the_present_height() -> None:
-    _, contract = with_contract(HOME, motion=Motion(MotionKind.HOME, -1, -1))
     policy = loaded(replace(flat.POLICY, zones=(replace(flat.ZONES[0], ceiling=30 * M), *flat.ZONES[1:])))
-    home = replace(flat.INVOCATIONS[3], contract=contract, plan=Plan(MotionKind.HOME, (), 100 * M, 0))
+    home = replace(flat.INVOCATIONS[3], plan=Plan(MotionKind.HOME, (), 100 * M, 0))
     assert ask(home, policy=policy).outcome is ALLOW

@@ -1,8 +1,8 @@
 import pytest
 from msgspec.structs import replace
 
-from reference.flat_case import GOTO, MISSION, PATH, POLICY, RULES, M, link
-from rtshcua.model.flat.contract import MotionKind
+from reference.flat_case import CONTRACTS, GOTO, HOVER, MISSION, PATH, POLICY, RULES, M, S, link
+from rtshcua.model.flat.contract import QUANTITY, Motion, MotionKind, Parameter
 from rtshcua.model.flat.zone import project
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.ports import Command
@@ -54,3 +54,13 @@ def test_a_degrade_rule_has_a_target() -> None:
 def test_what_the_bundle_does_not_have(kind: int, step: int, link_number: int) -> None:
     with pytest.raises(LookupError):
         COMMANDS.command(kind, step, link_number, 1)
+
+
+def test_a_link_with_a_time_of_its_own_holds_for_that() -> None:
+    time = Parameter("time", QUANTITY, "duration", 0, S, 60 * S, ())
+    hover = replace(CONTRACTS[HOVER], parameters=(time,), motion=Motion(MotionKind.HOLD, -1, -1, 0))
+    contracts = tuple(hover if contract.name == "hover" else contract for contract in CONTRACTS)
+    chain = (link(HOVER, 10 * S, limit_us=20 * S), link(HOVER, 10 * S))
+    commands = Commands(replace(POLICY, contracts=contracts, contingency=chain), MISSION)
+    assert commands.command(CONTINGENCY_LINK, -1, 0, 1).hold_us == 0, "the runtime ends it after 20 s"
+    assert commands.command(CONTINGENCY_LINK, -1, 1, 1).hold_us == 10 * S

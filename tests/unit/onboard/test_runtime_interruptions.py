@@ -105,6 +105,23 @@ def test_interrupted_holds_by_the_running_step_and_else_by_the_contingency() -> 
     assert run.decisions[-1][:3] == (2, -1, 0)
 
 
+@pytest.mark.parametrize("event", [Interrupted(0), EvidenceFailed(0, "disk full")])
+def test_a_mission_that_is_on_its_way_home_is_let_home(event: Interrupted | EvidenceFailed) -> None:
+    run = Run().until_flies("return_home")
+    run.tick(event)
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "inspect_area", "return_home"]
+    assert run.ending is (Ending.INTERRUPTED if isinstance(event, Interrupted) else Ending.EVIDENCE_LOST)
+
+
+def test_a_return_that_fails_after_an_interrupt_still_falls_back() -> None:
+    run = Run().until_flies("return_home")
+    run.tick(Interrupted(0), Failed(0, run.vehicle.commands[-1].token, "no-effect"))
+    run.until_over()
+    assert run.flown[-1] == "emergency_land"
+    assert run.ending is Ending.INTERRUPTED
+
+
 def test_a_link_that_comes_back_lets_the_skill_go_on() -> None:
     run = running()
     run.tick(LinkLost(0))

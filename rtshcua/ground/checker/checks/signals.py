@@ -148,7 +148,9 @@ def _field(
         mirrored = None if enum.dialect is None else enum.dialect.text
         if field.unit or field.type in ("float", "double") or (mirrored is not None and field.enum != mirrored):
             has = f"has values of `{field.enum}`" if field.enum else "has no enumeration"
-            help = f"declare an enumeration that mirrors it: `enum ... = {field.enum} {{ ... }}`" if field.enum else None
+            help = (
+                f"declare an enumeration that mirrors it: `enum ... = {field.enum} {{ ... }}`" if field.enum else None
+            )
             context.report.add(
                 codes.FIELD_ENUM,
                 name.span,

@@ -12,7 +12,7 @@ from rtshcua.decision.authority import authority
 from rtshcua.decision.case import Case
 from rtshcua.decision.change import Changes
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.offer import Nearest, offer
+from rtshcua.decision.offer import Offer, offer
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.decision.rules import PreparedRule
 from rtshcua.decision.truth import TRUE
@@ -35,7 +35,7 @@ class Unmet(NamedTuple):
 
     span: Span
     parameters: tuple[str, ...]
-    accepted: tuple[Nearest, ...]
+    accepted: tuple[Offer, ...]
 
 
 def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
@@ -108,11 +108,10 @@ def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, ca
     span = argument_span(ground.context, step, names[0]) if names else step.span
     written = "" if span == step.span else f" = {report.text(span)}"
     subject = f"`{names[0]}{written}`" if names else f"`{flat.contract.name}`"
-    accepted = {each.subject: _words(each) for unmet in nearest for each in unmet.accepted}
+    accepted = {each.subject: "` or `".join(_words(each)) for unmet in nearest for each in unmet.accepted}
     fix = None
     if names and len(nearest) == 1 and names[0] in accepted and span != step.span:
-        first = nearest[0].accepted[0]
-        replacement = first.choices[0] if first.choices else display(first.value, Dimension(first.dimension))
+        replacement = _words(nearest[0].accepted[0])[0]
         fix = (span, replacement, f"write `{replacement}`")
     report.add(
         codes.OUT_OF_SCOPE,
@@ -126,10 +125,9 @@ def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, ca
     )
 
 
-def _words(nearest: Nearest) -> str:
-    if nearest.choices:
-        return "` or `".join(nearest.choices)
-    return display(nearest.value, Dimension(nearest.dimension))
+def _words(offer: Offer) -> list[str]:
+    """The values that would do, as a source writes them."""
+    return [name or display(value, Dimension(offer.dimension)) for value, name in offer.options]
 
 
 def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation, at: Environment) -> list[Unmet]:
@@ -149,7 +147,7 @@ def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation,
         wanted = changes.find(part, True) or ()
         offers = [offer(change, contract, policy, at) for change in wanted if change.argument]
         reads = dict.fromkeys(each.name for each in references(clause) if each.name in parameters)
-        found.append(Unmet(clause.span, tuple(reads), tuple(each for each in offers if each is not None)))
+        found.append(Unmet(clause.span, tuple(reads), tuple(each for each in offers if each.options)))
     return found
 
 

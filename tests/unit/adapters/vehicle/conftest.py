@@ -52,9 +52,13 @@ class Flyer:
             found = [event for event in new if isinstance(event, kind)]
             if found:
                 return found[0]
-        raise AssertionError(f"no {kind} in {seconds} s; {self.truth}; {[e for e in self.events if not isinstance(e, Readings)]}")
+        raise AssertionError(
+            f"no {kind} in {seconds} s; {self.truth}; {[e for e in self.events if not isinstance(e, Readings)]}"
+        )
 
-    def begin(self, kind: MotionKind, *points: tuple[int, int], altitude: int = 0, speed: int = 0, hold_us: int = 0) -> int:
+    def begin(
+        self, kind: MotionKind, *points: tuple[int, int], altitude: int = 0, speed: int = 0, hold_us: int = 0
+    ) -> int:
         """Start a command; its token."""
         self.token += 1
         path = tuple(part for point in points for part in point)

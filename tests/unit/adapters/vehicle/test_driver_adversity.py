@@ -176,7 +176,9 @@ def test_garbage_and_foreign_systems_change_nothing(flyer: Make) -> None:
     assert isinstance(one.fly(MotionKind.CLIMB, altitude=20_000), Succeeded)
     assert isinstance(one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000), Succeeded)
     assert isinstance(one.fly(MotionKind.LAND), Succeeded)
-    assert all(abs(value) < 30_000 for e in one.events if isinstance(e, Readings) for slot, value in e.values if slot == 1)
+    assert all(
+        abs(value) < 30_000 for e in one.events if isinstance(e, Readings) for slot, value in e.values if slot == 1
+    )
     assert [e.airborne for e in one.events if isinstance(e, AirState)].count(True) == 1
 
 

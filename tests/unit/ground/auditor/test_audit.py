@@ -19,21 +19,9 @@ from virtual.flight import Flight
 S, M = case.S, case.M
 
 
-def fly(
-    *faults: Fault,
-    of: Mission | None = None,
-    kind: str = "px4",
-    mode: Mode = Mode.SOFTWARE,
-    interrupt_us: int | None = None,
-) -> list[bytes]:
+def fly(*faults: Fault, of: Mission | None = None, kind: str = "px4", mode: Mode = Mode.SOFTWARE) -> list[bytes]:
     mission = of or case.mission(case.short_steps())
-    run = Flight(case.seal(mission), case.simulated(kind, faults=faults), mode=mode)
-
-    def each(flight: Flight) -> Sequence[Event]:
-        now = flight.clock.now().monotonic_us
-        return [Interrupted(now)] if interrupt_us is not None and now >= interrupt_us else []
-
-    return run.fly(each).lines
+    return Flight(case.seal(mission), case.simulated(kind, faults=faults), mode=mode).fly().lines
 
 
 def sound(lines: Sequence[bytes]) -> Audit:
@@ -73,7 +61,19 @@ def test_whatever_the_mission_does_when_a_step_is_not_admitted(behaviour: OnInad
 
 
 def test_a_flight_that_was_interrupted() -> None:
-    assert sound(fly(interrupt_us=20 * S)).report.close
+    interrupted = [False]
+
+    def each(run: Flight) -> Sequence[Event]:
+        now_us = run.clock.now().monotonic_us
+        if interrupted[0] or now_us < 20 * S:
+            return ()
+        interrupted[0] = True
+        return (Interrupted(now_us),)
+
+    flown = Flight(case.seal(case.mission(case.short_steps())), case.simulated("px4")).fly(each)
+    assert interrupted[0]
+    assert flown.effects("interrupted")
+    sound(flown.lines)
 
 
 def test_what_is_proven_and_what_is_not() -> None:

@@ -1,0 +1,58 @@
+"""Virtual time: how many times faster than life the shipped missions fly in one process.
+
+Simulation, real MAVLink both ways, driver, loop, runtime and evidence; at 50 frames a second and more from the vehicle.
+Exits with 1 when a mission is slower than the limit.
+"""
+
+import sys
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from virtual import case
+from virtual.flight import Flight
+from virtual.shipped import NAMES, shipped
+
+from rtshcua.onboard.ports import Ending
+
+LIMIT = 100
+FRAMES = 50
+ROUNDS = 3
+_MORE_US = 50_000
+
+
+def one(name: str, flavour: str) -> tuple[float, float, float]:
+    """Seconds of flight, seconds it took, frames a second of flight."""
+    flight = Flight(shipped(name), case.simulated(flavour))
+    streams = flight.vehicle.simulation._autopilot.streams
+    for number in (mavlink.MAVLINK_MSG_ID_ATTITUDE,):
+        streams.set(number, _MORE_US)
+    start = perf_counter()
+    flown = flight.fly()
+    took = perf_counter() - start
+    assert flown.ending is Ending.COMPLETED
+    seconds = flight.clock.elapsed_us / 1e6
+    return seconds, took, flight.vehicle.received / seconds
+
+
+def main() -> int:
+    """Measures, prints a line a mission, and says whether the limit held."""
+    slowest = float("inf")
+    for name in NAMES:
+        for flavour in ("px4", "ardupilot"):
+            flights = [one(name, flavour) for _ in range(ROUNDS)]
+            seconds, took, frames = min(flights, key=lambda flight: flight[1])
+            assert frames >= FRAMES, frames
+            slowest = min(slowest, seconds / took)
+            print(
+                f"virtual time: `{name}` on {flavour}: {seconds / took:.0f} times real time "
+                f"({seconds:.0f} s in {took:.2f} s, {frames:.0f} frames a second)"
+            )
+    print(f"virtual time: {slowest:.0f} times real time at the least, limit {LIMIT}")
+    return int(slowest < LIMIT)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

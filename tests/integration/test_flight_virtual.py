@@ -1,0 +1,132 @@
+"""Whole flights in virtual time: the shipped missions, and what goes wrong on them; `verify-log` accepts every log."""
+
+from typing import Any
+
+import pytest
+from virtual import case
+from virtual.flight import Flight, Flown
+from virtual.shipped import NAMES, shipped
+
+from rtshcua.evidence.report import Verdict
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import Ending, Event, Interrupted
+from rtshcua.simulation.fault_text import parse_fault
+
+STEPS = {"short": 3, "standard": 6, "extended": 12}
+FLAVOURS = ("px4", "ardupilot")
+
+
+def verified(flown: Flown) -> Flown:
+    """The flight, whose log proves itself; it ended on the ground unless somebody else took it, or nobody hears it."""
+    audit = flown.audit()
+    assert audit.report.verdict is Verdict.VERIFIED, audit.report
+    assert audit.derived == sum(record["type"] == "decision" for record in flown.records)
+    if flown.ending not in (Ending.STOOD_DOWN, Ending.LINK_LOST):
+        assert not flown.vehicle.simulation.truth().in_air
+    return flown
+
+
+def fly(name: str, flavour: str, *faults: str, **more: Any) -> Flown:
+    config = case.simulated(flavour, faults=tuple(parse_fault(fault) for fault in faults))
+    return verified(Flight(shipped(name), config, **more).fly())
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("name", NAMES)
+def test_the_shipped_missions_complete(name: str, flavour: str) -> None:
+    flown = fly(name, flavour)
+    assert flown.ending is Ending.COMPLETED
+    assert [(outcome, reason) for _, outcome, reason in flown.decisions()] == [("allow", "admitted")] * STEPS[name]
+    assert len(flown.effects("succeeded")) == STEPS[name]
+    truth = flown.vehicle.simulation.truth()
+    assert abs(truth.north_mm) + abs(truth.east_mm) < 2_000
+
+
+def test_equal_flights_leave_equal_logs() -> None:
+    assert fly("short", "px4").lines == fly("short", "px4").lines
+
+
+FALLBACKS = {
+    "battery,at=40s,level=24%": ["return_home"],
+    "wind,at=40s,speed=12m/s,from=270deg": ["hover", "return_home"],
+    "link-quality,at=40s,quality=20%": ["hover", "return_home"],
+    "obstacle,at=50s,distance=2m": ["hover", "return_home"],
+    "gps-jump,at=50s,north=300m,east=0m": ["hover", "return_home", "emergency_land"],
+    "link-silence,at=50s,for=5s": ["emergency_land"],
+}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("fault", FALLBACKS)
+def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> None:
+    flown = fly("standard", flavour, fault)
+    assert flown.ending is Ending.ABORTED
+    assert flown.effects("violated")
+    assert flown.dispatched() == ["takeoff", "goto", "inspect_area", *FALLBACKS[fault]]
+
+
+TAKEN = {
+    "pilot,at=50s": ("Position", "POSHOLD"),
+    "gps-loss,at=50s": ("Land", "LAND"),
+    "battery,at=50s,level=3%": ("Land", "LAND"),
+}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("fault", TAKEN)
+def test_whoever_takes_over_wins(fault: str, flavour: str) -> None:
+    flown = fly("standard", flavour, fault)
+    assert flown.ending is Ending.STOOD_DOWN
+    assert [record["detail"] for record in flown.effects("taken-over")] == [TAKEN[fault][FLAVOURS.index(flavour)]]
+    last = [record["event"] for record in flown.records if record["type"] == "effect"][-3:]
+    assert last == ["taken-over", "released", "stood-down"]
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_vehicle_that_stays_silent_is_lost(flavour: str) -> None:
+    flown = fly("standard", flavour, "link-silence,at=50s")
+    assert flown.ending is Ending.LINK_LOST
+    assert flown.effects("link-lost")
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_poor_and_slow_link_is_survived(flavour: str) -> None:
+    for fault in ("link-loss,at=20s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-loss,at=50s,for=3s"):
+        assert fly("standard", flavour, fault).ending is Ending.COMPLETED
+
+
+@pytest.mark.parametrize("level", ["20%", "6%"])
+def test_a_low_battery_on_the_ground_flies_nothing(level: str) -> None:
+    flown = fly("short", "px4", f"battery,at=0s,level={level}")
+    assert flown.ending is Ending.REFUSED
+    assert flown.dispatched() == []
+
+
+@pytest.mark.parametrize("at_s", [0, 1, 3, 10, 60, 200])
+def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
+    pressed = []
+
+    def press(flight: Flight) -> list[Event]:
+        if pressed or flight.clock.elapsed_us < at_s * case.S:
+            return []
+        pressed.append(True)
+        return [Interrupted(flight.clock.now().monotonic_us)]
+
+    flown = verified(Flight(shipped("standard"), case.simulated("px4")).fly(press))
+    assert flown.ending is Ending.INTERRUPTED
+
+
+def test_a_full_disk_brings_it_down_and_loses_no_record() -> None:
+    def fill(flight: Flight) -> list[Event]:
+        flight.sink.full = 30 * case.S < flight.clock.elapsed_us < 80 * case.S
+        return []
+
+    flown = verified(Flight(shipped("standard"), case.simulated("px4")).fly(fill))
+    assert flown.ending is Ending.EVIDENCE_LOST
+    assert flown.effects("gap")
+
+
+def test_mode_none_flies_what_would_be_refused() -> None:
+    flown = fly("short", "px4", "battery,at=0s,level=20%", mode=Mode.NONE)
+    assert flown.decisions()[0][1] == "fallback"
+    assert flown.dispatched()[0] == "takeoff"

@@ -1,0 +1,19 @@
+"""The missions that ship, compiled and sealed as `rtshcua compile` does it."""
+
+from functools import cache
+
+from rtshcua import library
+from rtshcua.cli.sources import compile_sources
+from virtual import case
+
+NAMES = ("short", "standard", "extended")
+
+
+@cache
+def shipped(name: str, issued_at_us: int = case.flat.ISSUED) -> bytes:
+    """The bundle of `missions/<name>.rts`, issued at a UTC time."""
+    source = library.root() / "missions" / f"{name}.rts"
+    compiled, _ = compile_sources([source], mission=None, issued_at_us=issued_at_us)
+    assert compiled.policy is not None, compiled.diagnostics
+    assert compiled.mission is not None
+    return case.seal(compiled.mission, compiled.policy)

@@ -23,7 +23,7 @@ from rtshcua.wire.bundle import mission_payload, policy_digest, policy_payload
 
 LIMIT = 4.0
 SPREAD = 1.6  # how much more a line of the largest text may cost than one of the smallest
-MEMORY_MIB = 1024
+MEMORY_MIB = 512
 SIZES = (5_000, 15_000, 50_000)
 ROUNDS = 3
 

@@ -59,7 +59,7 @@ Key = tuple[int, int]
 
 
 class Scenario:
-    """Policies of one shape, as ours and as Cedar's: each of `keys` has `candidates` permits, of which the last matches.
+    """Policies of one shape, ours and Cedar's: each of `keys` has `candidates` permits, of which the last matches.
 
     `shared` of the candidates are written once, for any skill and role.
     """

@@ -6,7 +6,7 @@ Exits with 1 when a mission is slower than the limit.
 
 import sys
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
@@ -20,18 +20,17 @@ from rtshcua.onboard.ports import Ending
 LIMIT = 100
 FRAMES = 50
 ROUNDS = 3
-_MORE_US = 50_000
+_MORE_US = 40_000
 
 
 def one(name: str, flavour: str) -> tuple[float, float, float]:
-    """Seconds of flight, seconds it took, frames a second of flight."""
+    """Seconds of flight, seconds of the processor that it took, frames a second of flight."""
     flight = Flight(shipped(name), case.simulated(flavour))
     streams = flight.vehicle.simulation._autopilot.streams
-    for number in (mavlink.MAVLINK_MSG_ID_ATTITUDE,):
-        streams.set(number, _MORE_US)
-    start = perf_counter()
+    streams.set(mavlink.MAVLINK_MSG_ID_ATTITUDE, _MORE_US)
+    start = process_time()
     flown = flight.fly()
-    took = perf_counter() - start
+    took = process_time() - start
     assert flown.ending is Ending.COMPLETED
     seconds = flight.clock.elapsed_us / 1e6
     return seconds, took, flight.vehicle.received / seconds

@@ -70,8 +70,8 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _inside_argument(cell, tables.tables[table], tables)
         case tree.PointInside(cell, zone):
             return _point_inside(cell, tables.zones[zone])
-        case tree.InWindow(start, end):
-            return _in_window(Daytime(start, end, tables.utc_offset_us))
+        case _:
+            return _in_window(Daytime(node.start, node.end, tables.utc_offset_us))
 
 
 def _both(left: Condition, right: Condition) -> Condition:

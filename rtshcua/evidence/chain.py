@@ -26,6 +26,8 @@ from rtshcua.wire.keys import Duty, key_id
 
 START = "0" * 64  # the genesis has no line before it
 
+_OUTCOMES = tuple(outcome.name.lower() for outcome in Outcome)  # by number
+
 
 def origin_of(vehicle: str, boot: str) -> str:
     """The origin of a log's checkpoints: no spaces and no plus, whatever the vehicle is called."""
@@ -155,7 +157,7 @@ class Recorder:
                 kind,
                 link,
                 self._mode,
-                outcome.name.lower(),
+                _OUTCOMES[outcome],
                 reason.value,
                 rule_step,
                 chain.seq,

@@ -23,8 +23,10 @@ LARGEST = (1 << 53) - 1
 
 Integer = Annotated[int, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
+# Looked at by a regular expression, and so only in the first and the last record; the verifier compares the others with
+# what they must be.
 Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
-Hex = Annotated[str, msgspec.Meta(pattern="^([0-9a-f]{2})*$")]
+Name = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{32}$")]
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"prev": "_prev"}, gc=False):
@@ -42,11 +44,11 @@ class Genesis(Record, frozen=True):
     prev: Hash
     at_us: Count
     before: Hash | None
-    boot: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{32}$")]
+    boot: Name
     bundle: str
     format: str
     log_key: Hash
-    log_kid: Hex
+    log_kid: Name
     mission: str
     mode: str
     root: str
@@ -86,13 +88,13 @@ class Decision(Record, frozen=True):
     `rule_step` is the number in section 4.1 of the step that decided, `valid_until_us` monotonic.
     """
 
-    prev: Hash
+    prev: str
     at_us: Count
-    binding: Hex
+    binding: str
     clause: str | None
     clause_at: tuple[Integer, Integer, Integer] | None
     context: RecordedContext
-    invocation: Hex
+    invocation: str
     kind: Integer
     link: Integer
     mode: str
@@ -117,7 +119,7 @@ class Effect(Record, frozen=True):
     (-1: none).
     """
 
-    prev: Hash
+    prev: str
     at_us: Count
     detail: str
     event: str

@@ -12,7 +12,7 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.limits import MAX_SLOTS, MAX_STALE, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, names
 from rtshcua.wire.digest import DIGEST_BYTES
@@ -22,11 +22,10 @@ STEP, FALLBACK_LINK, CONTINGENCY_LINK = 0, 1, 2
 #: the `link` that stands for the target of a degrade rule
 DEGRADE: Final = -1
 
-#: the largest request in octets, and the slots of a state with which none is larger
+#: the largest request in octets
 MAX_SIZE: Final = 1023
-MAX_SLOTS: Final = 72
-#: Ages saturate here, at about 71 minutes; no signal may have a longer time to stale.
-MAX_AGE_US: Final = (1 << 32) - 1
+#: Ages saturate here; no signal may have a longer time to stale.
+MAX_AGE_US: Final = MAX_STALE + 1
 UNKNOWN: Final = -(1 << 63)
 
 _HEAD: Final = f">Bhh{DIGEST_BYTES}s5QH"

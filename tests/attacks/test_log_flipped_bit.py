@@ -84,5 +84,5 @@ def test_what_the_flip_did_is_named() -> None:
     assert expect(with_byte(0, ord("["))) == ("record/malformed", number)
     assert expect(with_byte(line.index(b'"outcome"') + 1, 0xFF)) == ("record/malformed", number)
     assert expect(with_byte(line.index(b'"seq":') + 6, ord("9"))) == ("chain/sequence", number)
-    assert expect(with_byte(11, ord("x"))) == ("record/malformed", number)
+    assert expect(with_byte(11, ord("x"))) == ("chain/broken", number)
     assert expect(with_byte(11, ord("0") if line[11] != ord("0") else ord("1"))) == ("chain/broken", number)

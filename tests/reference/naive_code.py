@@ -26,7 +26,7 @@ class TooNear(Exception):
 
 @dataclass
 class World:
-    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is or will be (None: unknown)."""
+    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is (None: unknown)."""
 
     policy: Policy
     slots: list[int | None]
@@ -45,56 +45,64 @@ def kleene_or(a: str, b: str) -> str:
     return "T" if "T" in (a, b) else "U" if "U" in (a, b) else "F"
 
 
+Number = tuple[int, int] | None
+
+
 def truths(code: tuple[int, ...], world: World) -> Truths:
-    """Run the code on a stack of sets of truths and of numbers: `(c, k)` is c times the height, plus k; None is missing."""
+    """Run the code on a stack of sets of truths and of numbers: `(c, k)` is c times the height plus k, None is missing."""
     stack: list = []
     for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True):
-        match op:
-            case Op.CONST:
-                stack.append((0, a))
-            case Op.SIGNAL:
-                stack.append(number_of(a, world))
-            case Op.ARGUMENT:
-                stack.append((0, world.arguments[a]))
-            case Op.ADD | Op.SUB:
-                right, left = stack.pop(), stack.pop()
-                if left is None or right is None:
-                    stack.append(None)
-                elif op == Op.ADD:
-                    stack.append((left[0] + right[0], left[1] + right[1]))
-                else:
-                    stack.append((left[0] - right[0], left[1] - right[1]))
-            case Op.SCALE:
-                value = stack.pop()
-                stack.append(None if value is None else (value[0] * a, value[1] * a))
-            case Op.LT | Op.LE | Op.GT | Op.GE | Op.EQ | Op.NE:
-                right, left = stack.pop(), stack.pop()
-                stack.append(U if left is None or right is None else compared(op, left, right, world.heights or (0, 0)))
-            case Op.AND | Op.OR:
-                right, left = stack.pop(), stack.pop()
-                table = kleene_and if op == Op.AND else kleene_or
-                stack.append(frozenset(table(x, y) for x, y in product(left, right)))
-            case Op.NOT:
-                stack.append(frozenset({"T": "F", "F": "T", "U": "U"}[x] for x in stack.pop()))
-            case Op.SIGNAL_IN:
-                value = world.slots[a]
-                stack.append(U if value is None else T if value in world.policy.sets[b] else F)
-            case Op.ARGUMENT_IN:
-                stack.append(T if world.arguments[a] in world.policy.sets[b] else F)
-            case Op.POSITION_IN:
-                stack.append(inside(world, world.policy.zones[a]))
-            case Op.POSITION_IN_ARGUMENT:
-                derived = world.policy.tables[b][world.arguments[a]]
-                stack.append(inside(world, world.policy.zones[derived]))
-            case Op.ARGUMENT_POINT_IN:
-                place = (world.arguments[a], world.arguments[a + 1])
-                stack.append(T if in_shape(place, world.policy.zones[b]) else F)
-            case Op.TIME_IN:
-                stack.append(daytime(world.utc, world.error, world.policy.vehicle.utc_offset_us, a, b))
-            case _:
-                raise AssertionError(op)
+        if op in (Op.ADD, Op.SUB, *RELATIONS, Op.AND, Op.OR):
+            right, left = stack.pop(), stack.pop()
+            stack.append(joined(op, left, right, world))
+        elif op == Op.SCALE:
+            value = stack.pop()
+            stack.append(None if value is None else (value[0] * a, value[1] * a))
+        elif op == Op.NOT:
+            stack.append(frozenset({"T": "F", "F": "T", "U": "U"}[x] for x in stack.pop()))
+        else:
+            stack.append(number(op, a, world) if op in (Op.CONST, Op.SIGNAL, Op.ARGUMENT) else atom(op, a, b, world))
     (answer,) = stack
     return answer
+
+
+def joined(op: int, left: object, right: object, world: World) -> object:
+    """What an instruction makes of two numbers or two truths."""
+    if op in (Op.AND, Op.OR):
+        table = kleene_and if op == Op.AND else kleene_or
+        return frozenset(table(x, y) for x, y in product(left, right))
+    if left is None or right is None:
+        return None if op in (Op.ADD, Op.SUB) else U
+    if op in RELATIONS:
+        return compared(op, left, right, world.heights or (0, 0))
+    sign = 1 if op == Op.ADD else -1
+    return (left[0] + sign * right[0], left[1] + sign * right[1])
+
+
+def number(op: int, a: int, world: World) -> Number:
+    if op == Op.CONST:
+        return 0, a
+    return (0, world.arguments[a]) if op == Op.ARGUMENT else number_of(a, world)
+
+
+def atom(op: int, a: int, b: int, world: World) -> Truths:
+    policy = world.policy
+    match op:
+        case Op.SIGNAL_IN:
+            value = world.slots[a]
+            return U if value is None else T if value in policy.sets[b] else F
+        case Op.ARGUMENT_IN:
+            return T if world.arguments[a] in policy.sets[b] else F
+        case Op.POSITION_IN:
+            return inside(world, policy.zones[a])
+        case Op.POSITION_IN_ARGUMENT:
+            return inside(world, policy.zones[policy.tables[b][world.arguments[a]]])
+        case Op.ARGUMENT_POINT_IN:
+            return T if in_shape((world.arguments[a], world.arguments[a + 1]), policy.zones[b]) else F
+        case Op.TIME_IN:
+            return daytime(world.utc, world.error, policy.vehicle.utc_offset_us, a, b)
+        case _:
+            raise AssertionError(op)
 
 
 def number_of(slot: int, world: World) -> tuple[int, int] | None:

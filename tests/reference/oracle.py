@@ -1,4 +1,4 @@
-"""`decide` over single situations, by the text of design 4.1 and 4.4: slow, obvious, written apart from the real one."""
+"""`decide` over single situations, by the text of design 4.1 and 4.4: slow, obvious, written apart."""
 
 from itertools import pairwise
 from math import ceil, isqrt

@@ -35,7 +35,7 @@ class Streams:
         self._refused: set[str] = set()
         self._heard_us: dict[str, int] = {}
         self._asking: str | None = None
-        self._asked_us = 0
+        self._asked_us = self._looked_us = 0
         self._since_us: int | None = None
 
     def heard(self, name: str, now_us: int) -> None:
@@ -58,7 +58,8 @@ class Streams:
                 return []
             self._queue.append(self._asking)
             self._asking = None
-        if not self._queue:
+        if not self._queue and now_us - self._looked_us >= ANSWER_US:
+            self._looked_us = now_us
             self._queue = [name for name in self._wanted if self._is_quiet(name, now_us)]
         if not self._queue:
             return []

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from rtshcua.decision.checks.indexes import at, within
-from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED
+from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED, MAX_STALE
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.signal import NUMBER, POSITION
 from rtshcua.model.flat.zone import MAX_COORDINATE
@@ -18,7 +18,7 @@ def signals(policy: Policy) -> Iterator[str]:
     for signal in policy.signals:
         where = f"signal `{signal.name}`"
         yield from at(where, within("kind", signal.kind, NUMBER, POSITION))
-        yield from at(where, within("staleness", signal.stale_us, 1, MAX_DURATION))
+        yield from at(where, within("staleness", signal.stale_us, 1, MAX_STALE))
         for slot in (signal.slot, signal.slot + 1) if signal.kind == POSITION else (signal.slot,):
             if not 0 <= slot < policy.slots or slot in owned:
                 yield f"{where}: slot {slot} does not exist or is owned twice"

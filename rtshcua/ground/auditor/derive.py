@@ -90,8 +90,11 @@ class Deriver:
         if given.consumed != consumed:
             text = "whether the step's id was used before is not what the records before say"
             return Flaw("decision/consumed", text, str(given.consumed), str(consumed))
+        binding = _octets(record.binding)
+        if binding is None:
+            return Flaw("decision/inputs", "the binding is not written in hexadecimal", record.binding)
         context = Context(
-            bytes.fromhex(record.binding),
+            binding,
             given.vehicle,
             given.policy_version,
             given.consumed,
@@ -134,6 +137,14 @@ class Deriver:
             return Flaw("decision/invocation", "a link of the contingency belongs to no step", record.invocation)
         admissible = link_admissible(chain[record.link], state, basis.policy, now)
         return _of_link(record, basis.bundle.policy_digest, now, admissible=admissible)
+
+
+def _octets(text: str) -> bytes | None:
+    try:
+        data = bytes.fromhex(text)
+    except ValueError:
+        return None
+    return data if data.hex() == text else None
 
 
 def _may_ask_again(invocation: PreparedInvocation, outcome: Outcome, reason: Reason) -> bool:

@@ -12,7 +12,8 @@ MAX_DURATION = 1 << 42  # us, about 50 days
 FULL = 10_000  # 1/10000: a full charge
 DAY = 86_400_000_000  # us
 
-MAX_SLOTS = 256
+MAX_SLOTS = 72  # with which no request is larger than 1 KiB
+MAX_STALE = (1 << 32) - 2  # us, about 71 minutes: the ages of a request saturate just above
 MAX_ROLES = 64
 MAX_ZONES = 4_096  # declared and derived
 MAX_TOTAL_VERTICES = 1 << 16

@@ -12,7 +12,6 @@ import msgspec
 
 from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.commands import Commands
@@ -20,7 +19,6 @@ from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.mint import Mint
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.bundle import Bundle, open_bundle
-from rtshcua.wire.request import MAX_AGE_US, MAX_SLOTS
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
@@ -89,21 +87,11 @@ def load(
     invocations = prepare_mission(opened.mission, policy)
     if isinstance(invocations, Malformed):
         return LoadRefusal("malformed", f"the mission does not make sense: {invocations.what}")
-    if problem := _does_not_fit(opened.policy) or (not invocations and "the mission has no step"):
-        return LoadRefusal("malformed", problem)
+    if not opened.policy.contingency or not invocations:
+        what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
+        return LoadRefusal("malformed", f"the {what}")
     boundary = SoftwareBoundary(
         policy, invocations, opened.policy_digest, vehicle, Mint(session_key), enforced=mode is not Mode.NONE
     )
     executor = Executor(session_key, Commands(opened.policy, opened.mission))
     return Loaded(boundary, executor, opened, policy, invocations, vehicle, mode)
-
-
-def _does_not_fit(policy: Policy) -> str | None:
-    if policy.slots > MAX_SLOTS:
-        return f"the state has {policy.slots} slots; a request has room for {MAX_SLOTS}"
-    for signal in policy.signals:
-        if signal.stale_us >= MAX_AGE_US:
-            return f"signal `{signal.name}` grows stale later than a request can tell"
-    if not policy.contingency:
-        return "the policy has no contingency"
-    return None

@@ -3,10 +3,10 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reference import flat_case as flat
-from reference.naive_code import daytime
-from reference.flat_case import BATTERY, FIX, GOTO, HOVER, INSPECT, POSITION_X, apply, argument, const, scaled, signal
 
+from reference import flat_case as flat
+from reference.flat_case import BATTERY, FIX, GOTO, HOVER, INSPECT, POSITION_X, apply, argument, const, scaled, signal
+from reference.naive_code import daytime
 from rtshcua.decision.daytime import Daytime
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.prepare import prepare
@@ -247,9 +247,7 @@ H = flat.H
         ((8 * H, 18 * H), [(-12 * H, -12 * H)], (0, 0), T),
     ],
 )
-def test_daytime(
-    window: tuple[int, int], spans: list[tuple[int, int]], error: tuple[int, int], truth: int
-) -> None:
+def test_daytime(window: tuple[int, int], spans: list[tuple[int, int]], error: tuple[int, int], truth: int) -> None:
     assert Daytime(*window, 0).truth(tuple(spans), error) == truth
 
 
@@ -257,7 +255,13 @@ TIMES = st.integers(0, 24).map(lambda hours: hours * H)
 NEAR = st.tuples(st.integers(-30, 60), st.integers(-3, 3)).map(lambda t: t[0] * H + t[1])
 
 
-@given(TIMES.filter(lambda t: t < DAY), TIMES, st.sampled_from([-5 * H, 0, 2 * H]), NEAR, st.sampled_from([0, 1, 2, DAY // 2]))
+@given(
+    TIMES.filter(lambda t: t < DAY),
+    TIMES,
+    st.sampled_from([-5 * H, 0, 2 * H]),
+    NEAR,
+    st.sampled_from([0, 1, 2, DAY // 2]),
+)
 def test_a_moment_by_definition(start: int, end: int, offset: int, utc: int, error: int) -> None:
     (letter,) = daytime(utc, error, offset, start, end)
     assert Daytime(start, end, offset).truth(((utc, utc),), (error, error)) == {"T": T, "F": F, "U": U}[letter]

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, loaded, ready, with_rules
 from reference.flat_case import BATTERY, FIX, HEIGHT, HOME, HOVER, LAND, LINK, NOW, POSITION_X, POSITION_Y, WIND, M, S
-
 from rtshcua.decision.links import DEGRADE, START, choose_contingency, choose_fallback, fallbacks, link_admissible
 from rtshcua.decision.truth import FALSE, UNKNOWN
 from rtshcua.decision.values import MISSING, Sets, interval, maybe, point
@@ -67,14 +67,16 @@ def test_contingency(values: dict[int, int | None], after: int, choice: int | No
     ],
 )
 def test_going_home_and_breaches(values: dict[int, int | None], home: bool) -> None:
-    hover, come_home, land = (
-        link_admissible(link, flat.state(values), POLICY, NOW) for link in POLICY.contingency
-    )
+    hover, come_home, land = (link_admissible(link, flat.state(values), POLICY, NOW) for link in POLICY.contingency)
     assert (hover, come_home, land) == (True, home, True)
 
 
 def test_a_link_that_flies_elsewhere_keeps_to_the_airspace() -> None:
-    links = (flat.link(flat.TAKEOFF, 60 * M), flat.link(flat.GOTO, 0, 300 * M, 20 * M), flat.link(flat.GOTO, 0, 0, 20 * M))
+    links = (
+        flat.link(flat.TAKEOFF, 60 * M),
+        flat.link(flat.GOTO, 0, 300 * M, 20 * M),
+        flat.link(flat.GOTO, 0, 0, 20 * M),
+    )
     low = replace(flat.ZONES[0], ceiling=50 * M)
     policy = loaded(replace(flat.POLICY, contingency=links, zones=(low, *flat.ZONES[1:])))
     admissible = [link_admissible(link, flat.state(), policy, NOW) for link in policy.contingency]

@@ -1,4 +1,4 @@
-"""What is malformed is refused, with what is wrong; and nothing that a bundle may hold makes `prepare` or `decide` fail."""
+"""What is malformed is refused, with what is wrong; nothing that a bundle may hold makes deciding fail."""
 
 from random import Random
 from typing import Any
@@ -7,11 +7,11 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from msgspec.structs import replace
+
 from reference import flat_case as flat
 from reference import worlds
 from reference.asking import POLICY, STEP
 from reference.flat_case import GOTO, HOVER, INSPECT, M
-
 from rtshcua.decision.decide import decide
 from rtshcua.decision.links import choose_contingency, choose_fallback
 from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation, prepare_mission

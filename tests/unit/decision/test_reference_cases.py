@@ -1,5 +1,5 @@
-"""The reference cases of design 4.1: normal allow; no slack; low battery; degraded link; obstacle near; wind over limit;
-GPS missing; stale state; skill not permitted; argument out of scope; binding tampered; replayed; policy version
+"""The reference cases of design 4.1: normal allow; no slack; low battery; degraded link; obstacle near; wind over
+limit; GPS missing; stale state; skill not permitted; argument out of scope; binding tampered; replayed; policy version
 mismatch; validity window over. The first is allowed, the next five fall back, the next two defer, the rest is denied.
 """
 

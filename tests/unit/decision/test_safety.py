@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract
 from reference.flat_case import (
@@ -22,7 +23,6 @@ from reference.flat_case import (
     M,
     clause,
 )
-
 from rtshcua.decision.decide import decide
 from rtshcua.decision.energy import Energy
 from rtshcua.decision.places import WellKnown
@@ -310,9 +310,7 @@ def test_a_floor_of_zero_forbids_the_take_off_and_no_floor_does_not() -> None:
 
 def test_a_policy_without_a_position_defers_what_is_about_places() -> None:
     contracts = tuple(replace(c, reads=tuple(s for s in c.reads if s not in (5, 6))) for c in flat.CONTRACTS)
-    policy = loaded(
-        replace(flat.POLICY, vehicle=replace(flat.POLICY.vehicle, position=-1), contracts=contracts)
-    )
+    policy = loaded(replace(flat.POLICY, vehicle=replace(flat.POLICY.vehicle, position=-1), contracts=contracts))
     takeoff = replace(flat.INVOCATIONS[0], contract=contracts[TAKEOFF])
     assert ask(takeoff, policy=policy).reason is Reason.SAFETY_UNKNOWN
     inspect = replace(STEP, contract=contracts[INSPECT])

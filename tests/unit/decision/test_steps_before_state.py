@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract, with_rules
-from reference.flat_case import BATTERY, INSPECT, MIN, NOW, OPERATOR, S, SUPERVISOR, clause, rule
-
+from reference.flat_case import BATTERY, INSPECT, MIN, NOW, OPERATOR, SUPERVISOR, S, clause, rule
 from rtshcua.decision.decide import Possible, decide, possible
 from rtshcua.decision.prepare import Malformed, prepare_invocation
 from rtshcua.decision.values import MISSING, Sets, interval, maybe, point
@@ -223,7 +223,7 @@ def test_confirmation(approvals: Any, released: int, outcome: Outcome, reason: R
 
 def test_an_approval_moves_the_deadline() -> None:
     late = {"released_us": AT - 20 * S, "approvals": (flat.approval(1, AT - S),)}
-    assert low(ages={slot: 0 for slot in range(flat.SLOTS)}, **late).valid_until_us == AT + S // 2
+    assert low(ages=dict.fromkeys(range(flat.SLOTS), 0), **late).valid_until_us == AT + S // 2
     policy, contract = with_contract(INSPECT, deadline_us=S + 100_000)
     decision = ask(replace(LOW, contract=contract), values={flat.HEIGHT: 8_000}, policy=policy, **late)
     assert decision.valid_until_us == AT + 100_000
@@ -318,7 +318,10 @@ ADMITTED = (ALLOW, Reason.ADMITTED)
         ({"utc_us": ((flat.ISSUED, flat.ISSUED + 10 * MIN),)}, {ADMITTED}),
         ({"utc_us": ((flat.ISSUED - 1, flat.ISSUED),)}, {ADMITTED, (DENY, Reason.ISSUED_IN_FUTURE)}),
         ({"utc_us": ((flat.ISSUED - 2, flat.ISSUED - 1),)}, {(DENY, Reason.ISSUED_IN_FUTURE)}),
-        ({"utc_us": ((NOW.utc_us, NOW.utc_us), (NOW.utc_us + 2, NOW.utc_us + 11 * MIN))}, {ADMITTED, (DENY, Reason.EXPIRED)}),
+        (
+            {"utc_us": ((NOW.utc_us, NOW.utc_us), (NOW.utc_us + 2, NOW.utc_us + 11 * MIN))},
+            {ADMITTED, (DENY, Reason.EXPIRED)},
+        ),
         (
             {"utc_us": ((flat.ISSUED, flat.ISSUED + 10 * MIN),), "utc_error_us": (0, 5)},
             {ADMITTED, (DEFER, Reason.CLOCK_UNCERTAIN)},
@@ -351,7 +354,11 @@ def test_what_is_possible(fields: dict[str, Any], expected: set[tuple[Outcome, R
             {ADMITTED, (DEFER, Reason.FORBID_UNKNOWN), (DEFER, Reason.STATE_UNKNOWN)},
         ),
         ([(FORBID, MAYBE), (FORBID, MAYBE), (PERMIT, YES)], point(-1), {(DENY, Reason.FORBIDDEN)}),
-        ([(FORBID, MAYBE), (PERMIT, YES)], maybe(point(-1)), {(DENY, Reason.FORBIDDEN), (DEFER, Reason.FORBID_UNKNOWN)}),
+        (
+            [(FORBID, MAYBE), (PERMIT, YES)],
+            maybe(point(-1)),
+            {(DENY, Reason.FORBIDDEN), (DEFER, Reason.FORBID_UNKNOWN)},
+        ),
     ],
 )
 def test_what_authority_may_say(rules: list[Any], wind: Any, expected: set[tuple[Outcome, Reason]]) -> None:

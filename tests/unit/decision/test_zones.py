@@ -1,5 +1,6 @@
 """Zones against geometry in rationals, and cases by hand on the boundary."""
 
+from itertools import pairwise
 from math import cos, pi, sin
 
 import pytest
@@ -74,7 +75,7 @@ def test_a_widened_leg_and_a_circle(
 @given(OUTLINES, st.lists(POINTS, min_size=2, max_size=6), BOXES)
 def test_a_path_is_its_legs(zone: Zone, path: list[tuple[int, int]], box: tuple[int, int, int, int]) -> None:
     prepared = PreparedZone(0, zone)
-    legs = [prepared.along((*a, *b), box) for a, b in zip(path, path[1:], strict=False)]
+    legs = [prepared.along((*a, *b), box) for a, b in pairwise(path)]
     assert prepared.along(flat(path), box) == (T | F if T | F in legs else legs[0])
 
 
@@ -101,6 +102,14 @@ SQUARE = polygon(0, 0, 10, 0, 10, 10, 0, 10, floor=5, ceiling=20)
 )
 def test_by_hand(path: tuple[int, ...], answer: int) -> None:
     assert PreparedZone(0, SQUARE).along(path, (0, 0, 0, 0)) == answer
+
+
+@pytest.mark.parametrize(
+    ("point", "answer"),
+    [((2, 2), T), ((5, 5), F), ((4, 5), T), ((6, 5), F), ((0, 5), F), ((8, 1), T), ((9, 1), F)],
+)
+def test_a_slanted_edge_is_outside(point: tuple[int, int], answer: int) -> None:
+    assert PreparedZone(0, polygon(0, 0, 10, 0, 0, 10)).along(point, (0, 0, 0, 0)) == answer
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.limits import MAX_SLOTS, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, cbor, names, request
-from rtshcua.wire.request import MAX_AGE_US, MAX_SIZE, MAX_SLOTS, STEP, Malformed, Request
+from rtshcua.wire.request import MAX_AGE_US, MAX_SIZE, STEP, Malformed, Request
 
 TIME = st.integers(0, MAX_VALUE)
 

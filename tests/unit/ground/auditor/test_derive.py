@@ -1,0 +1,119 @@
+"""Decisions derived again: about steps, links of a chain, and the contingency; forged by the key's holder too."""
+
+from functools import cache
+
+import pytest
+from msgspec.structs import replace
+
+from reference.forgery import edit, expect, other_flight, prove, read, signed
+from rtshcua.simulation.faults import BatteryLevel
+from virtual import case
+from virtual.flight import Flight
+
+M, S = case.M, case.S
+
+
+@cache
+def denied_in_the_air() -> tuple[bytes, ...]:
+    """The inspection is planned higher than the policy permits: denied in the air, the contingency flies."""
+    mission = case.mission()
+    inspect = mission.invocations[2]
+    cells = (inspect.arguments[0], 35 * M, *inspect.arguments[2:])
+    changed = replace(inspect, arguments=cells, plan=replace(inspect.plan, altitude=35 * M))
+    steps = (*mission.invocations[:2], changed, *mission.invocations[3:])
+    return tuple(Flight(case.seal(replace(mission, invocations=steps)), case.simulated("px4")).fly().lines)
+
+
+@cache
+def fallen_back() -> tuple[bytes, ...]:
+    """The wind rises above the limit: the chain of the step flies."""
+    from rtshcua.simulation.faults import WindStep
+
+    config = case.simulated("px4", faults=(WindStep(15 * S, 14 * M),))
+    return tuple(Flight(case.seal(case.mission(case.short_steps())), config).fly().lines)
+
+
+def decisions(lines: tuple[bytes, ...], kind: int) -> list[int]:
+    return [n for n, each in enumerate(map(read, lines)) if each["type"] == "decision" and each["kind"] == kind]
+
+
+def forged(lines: tuple[bytes, ...], number: int, **fields: object) -> tuple[str, int]:
+    return expect(signed([*lines[:number], edit(lines[number], **fields), *lines[number + 1 :]]))
+
+
+def test_the_contingency_is_derived_again() -> None:
+    lines = denied_in_the_air()
+    assert decisions(lines, 2)
+    assert prove(lines).report.failure is None
+
+
+@pytest.mark.parametrize(
+    ("fields", "slug"),
+    [
+        ({"outcome": "fallback"}, "decision/outcome"),
+        ({"link": 9}, "decision/unknown-step"),
+        ({"link": -1}, "decision/unknown-step"),
+        ({"step": 0}, "decision/unknown-step"),
+        ({"invocation": "00" * 16}, "decision/invocation"),
+        ({"binding": "00" * 32}, "decision/outcome"),
+        ({"valid_until_us": 0}, "decision/valid-until-us"),
+    ],
+)
+def test_a_forged_link_of_the_contingency(fields: dict[str, object], slug: str) -> None:
+    lines = denied_in_the_air()
+    number = decisions(lines, 2)[0]
+    assert forged(lines, number, **fields) == (slug, number)
+
+
+@pytest.mark.parametrize(
+    ("fields", "slug"),
+    [
+        ({"outcome": "deny"}, "decision/outcome"),
+        ({"link": 9}, "decision/unknown-step"),
+        ({"link": -2}, "decision/unknown-step"),
+        ({"link": -1}, "decision/outcome"),
+        ({"binding": "00" * 32}, "decision/outcome"),
+        ({"invocation": ""}, "decision/invocation"),
+    ],
+)
+def test_a_forged_link_of_a_chain(fields: dict[str, object], slug: str) -> None:
+    lines = fallen_back()
+    number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
+    assert forged(lines, number, **fields) == (slug, number)
+
+
+def test_a_degrade_rules_target_is_derived_again() -> None:
+    lines = other_flight()
+    number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] == -1)
+    assert forged(lines, number, reason="state/violated") == ("decision/reason", number)
+
+
+def test_a_link_that_may_not_fly_is_not_allowed() -> None:
+    """Without a fix the vehicle can neither hover nor fly home; the record says it could."""
+    lines = fallen_back()
+    number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
+    state = read(lines[number])["state"]
+    state["values"][case.flat.FIX] = None
+    assert forged(lines, number, state=state) == ("decision/outcome", number)
+
+
+def test_a_link_that_is_refused_is_recorded_as_such() -> None:
+    """The same, told truly: the link is refused, and flies all the same by the step's standing permit."""
+    lines = fallen_back()
+    number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
+    record = read(lines[number])
+    record["state"]["values"][case.flat.FIX] = None
+    answer = {"outcome": "fallback", "reason": "state/violated", "rule_step": 6, "valid_until_us": record["at_us"]}
+    true = edit(lines[number], state=record["state"], **answer)
+    assert prove(signed([*lines[:number], true, *lines[number + 1 :]])).report.failure is None
+
+
+def test_a_step_that_was_not_used_up_may_be_asked_for_again() -> None:
+    """A battery that is unknown defers the take-off; it is decided again, with its id still fresh."""
+    lines = tuple(
+        Flight(
+            case.seal(case.mission(case.short_steps())), case.simulated("px4", faults=(BatteryLevel(0, 3_000),))
+        ).fly().lines
+    )  # fmt: skip
+    first = decisions(lines, 0)[0]
+    assert forged(lines, first, context=read(lines[first])["context"] | {"consumed": 1}) == ("decision/consumed", first)

@@ -11,11 +11,11 @@ from time import process_time
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.onboard.ports import Ending
 from virtual import case
 from virtual.flight import Flight
 from virtual.shipped import NAMES, shipped
-
-from rtshcua.onboard.ports import Ending
 
 LIMIT = 100
 FRAMES = 50

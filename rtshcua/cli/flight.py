@@ -94,6 +94,8 @@ class Flight:
             self._close(None)
             raise
         self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
+        if ending is Ending.REFUSED and self._vehicle.driver.unready is not None:
+            self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
         whole = self._close(ending)
         code = EXIT_CODES[ending]
         if code is ExitCode.OK and not whole:

@@ -13,10 +13,11 @@ import typer
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.faults import fail
+from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
 from rtshcua.cli.unlock import read_passphrase
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, VerificationKey
+from rtshcua.wire.keys import SEED_BYTES
 from rtshcua.wire.trust import TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -107,7 +108,7 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
     print(f"{kind}\n  folder   {store.folder}\n  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}\n")
     print(f"  {'duty':<9} {'key':<33} may speak for")
     for key in root.keys:
-        print(f"  {key.duty:<9} {key.kid.hex():<33} {_speaks(key)}")
+        print(f"  {key.duty:<9} {key.kid.hex():<33} {speaks(key)}")
     return ExitCode.OK
 
 
@@ -119,30 +120,8 @@ def _as_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
         "version": root.version,
         "issued_at_us": root.issued_at_us,
         "expires_at_us": root.expires_at_us,
-        "keys": [
-            {
-                "duty": key.duty,
-                "kid": key.kid.hex(),
-                "public": key.public.hex(),
-                "roles": key.roles,
-                "sources": key.sources,
-                "vehicles": key.vehicles,
-                "file": str(store.key_path(key.duty)),
-            }
-            for key in root.keys
-        ],
+        "keys": [{**as_object(key), "file": str(store.key_path(key.duty))} for key in root.keys],
     }
-
-
-def _speaks(key: VerificationKey) -> str:
-    if key.duty is Duty.ROOT:
-        return "names the other keys"
-    who = f"{_any(key.roles, 'role')} through {' or '.join(key.sources)}, " if key.roles else ""
-    return f"{who}on {_any(key.vehicles, 'vehicle')}"
-
-
-def _any(names: tuple[str, ...], what: str) -> str:
-    return f"any {what}" if ANY in names else f"{what} {', '.join(names)}"
 
 
 def _root(store: KeyStore) -> TrustRoot:

@@ -35,6 +35,9 @@ from rtshcua.wire.untrusted import Untrusted
 HEARTBEAT_S = 10.0
 AIR_S = 5.0
 
+#: up to this many times as fast as life, a real vehicle's time limits leave the machine enough
+_UNHURRIED = 5
+
 _LOOPBACK = "127.0.0.1"
 _POLL_S = 0.05
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
@@ -82,7 +85,8 @@ def launch(order: Launch) -> ExitCode:
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
-            vehicle = _listen(order, Driver(loaded.bundle.policy), clock, tape)
+            slack = max(1, round(order.speed / _UNHURRIED))
+            vehicle = _listen(order, Driver(loaded.bundle.policy, slack), clock, tape)
             stack.callback(vehicle.close)
             if order.link is None:
                 stack.enter_context(_simulate(order, loaded, vehicle.port))

@@ -24,7 +24,7 @@ MEANINGS = {
     "trust": "The log may be sound in itself, but it does not rest on the root that you trust.",
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
     "dispatch": "The vehicle was commanded without the permission that the log should show first.",
-    "telemetry": "The raw frames beside the log are not those of this flight.",
+    "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",
     "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",
 }
 _INCOMPLETE = "The program stopped before it closed the log, or its end was cut off. What came after is not known."
@@ -82,7 +82,7 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     title, style = _TITLES[report.verdict]
     finding = report.failure or report.shortfall
     if finding is None:
-        lines.append((style, f"{title}  {report.records} records, closed and signed; unanchored"))
+        lines.append((style, f"{title}  {_many(report.records, 'record')}, closed and signed; unanchored"))
     else:
         lines.append((style, f"{title}  at record {finding.record}, line {finding.record + 1}: {finding.slug}"))
         lines += _why(finding, failed=report.failure is not None)
@@ -117,8 +117,12 @@ def _counts(report: Report) -> Iterable[tuple[str, str]]:
     if not counts:
         return
     outcomes = ", ".join(f"{counts[name]} {name}" for name in _OUTCOMES if counts.get(name))
-    decisions = f"{counts.get('decision', 0)} decisions{f' ({outcomes})' if outcomes else ''}"
-    yield "", f"  {report.records} records read: {decisions}, {counts.get('effect', 0)} effects"
+    decisions = f"{_many(counts.get('decision', 0), 'decision')}{f' ({outcomes})' if outcomes else ''}"
+    yield "", f"  {_many(report.records, 'record')} read: {decisions}, {_many(counts.get('effect', 0), 'effect')}"
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _claims(title: str, style: str, mark: str, claims: tuple[Claim, ...]) -> list[tuple[str, str]]:

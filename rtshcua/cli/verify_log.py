@@ -18,7 +18,7 @@ from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.verdict import as_object, as_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Claim, Finding
-from rtshcua.evidence.report import Report, Verdict, claims
+from rtshcua.evidence.report import Report, Verdict
 from rtshcua.ground.auditor.audit import Audit, Auditor
 from rtshcua.wire.bundle import MAX_BUNDLE
 from rtshcua.wire.untrusted import Untrusted
@@ -133,6 +133,4 @@ def _with_telemetry(report: Report, path: Path) -> Report:
     if found == close.tlog:
         return report._replace(proven=(*report.proven, Claim("telemetry", f"`{path.name}` is the one that was signed")))
     text = f"`{path.name}` was changed: it is not the telemetry whose digest the close signs"
-    failure = Finding("telemetry/changed", close.seq, text, found, close.tlog)
-    proven, unproven = claims(report.records, report.genesis, close, failure)
-    return report._replace(failure=failure, proven=proven, unproven=unproven)
+    return report._replace(failure=Finding("telemetry/changed", close.seq, text, found, close.tlog))

@@ -2,7 +2,7 @@
 
 from rtshcua.decision.evaluate import Condition, Tables, always, build
 from rtshcua.decision.link import Guards, PreparedLink
-from rtshcua.decision.parameters import place_of
+from rtshcua.decision.parameters import first_cell
 from rtshcua.decision.places import WellKnown
 from rtshcua.decision.scope import scope_of
 from rtshcua.decision.tree import Node, parse
@@ -10,7 +10,7 @@ from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import Contract, Link, MotionKind
+from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
 from rtshcua.model.flat.policy import Policy, Rule
 
 
@@ -61,7 +61,10 @@ class Compiler:
         if require is None:
             require = self._requires[link.skill] = self.guards(contract.require, contract)
         motion = contract.motion
-        path = place_of(contract, link.arguments) if motion.kind == MotionKind.FLY else ()
+        path: tuple[int, ...] = ()
+        if motion.kind == MotionKind.FLY:
+            cell = first_cell(contract, PLACE)
+            path = link.arguments[cell : cell + 2]
         altitude = None if motion.altitude == -1 else link.arguments[motion.altitude]
         planner = Planner(motion.kind, path, altitude, policy.vehicle.position_error)
         return PreparedLink(link, tuple(map(point, link.arguments)), require, motion.kind, planner)

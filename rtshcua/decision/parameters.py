@@ -21,7 +21,6 @@ def misfit(arguments: tuple[int, ...], contract: Contract) -> Parameter | None:
     return None
 
 
-def place_of(contract: Contract, arguments: tuple[int, ...]) -> tuple[int, ...]:
-    """The two cells of the first place among the arguments of a skill that has one."""
-    cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
-    return arguments[cell : cell + 2]
+def first_cell(contract: Contract, kind: int) -> int:
+    """The cell of the first parameter of a kind, of which there is one: that is what a skill flies to, or covers."""
+    return next(parameter.cell for parameter in contract.parameters if parameter.kind == kind)

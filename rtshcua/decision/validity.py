@@ -13,7 +13,7 @@ def valid_until(case: Case, state: State) -> int:
     contract = invocation.invocation.contract
     now, utc, error = case.monotonic[0], case.utc[0], case.error[0]
     end = invocation.invocation.issued_at_us + contract.validity_us
-    until = min(case.release[0] + contract.deadline_us, now + end - utc - error)
+    until = min(min(case.release[0], now) + contract.deadline_us, now + end - utc - error)
     left = until - now
     values, ages = state.values, state.ages
     for slot, stale in invocation.reads:

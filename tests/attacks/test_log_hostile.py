@@ -7,7 +7,9 @@ import pytest
 
 from reference.forgery import ROOT_KEY, edit, expect, flight, rewritten
 from rtshcua.cli.shown import plain
-from rtshcua.evidence.records import LARGEST
+from rtshcua.evidence.chain import Chain
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import LARGEST, Effect, Genesis
 from rtshcua.ground.auditor.audit import Auditor
 
 LINES = flight()
@@ -38,18 +40,13 @@ def test_memory_does_not_grow_with_the_log() -> None:
     """A hundred thousand effects take no more than a few thousand do."""
 
     def long(count: int) -> Iterator[bytes]:
-        from rtshcua.evidence.chain import Chain
-        from rtshcua.evidence.reading import read
-        from rtshcua.evidence.records import Effect
 
-        chain = Chain()
-        genesis = read(LINES[0])
-        yield chain.add(genesis)  # type: ignore[arg-type]
+        chain, genesis = Chain(), read(LINES[0])
+        assert isinstance(genesis, Genesis)
+        yield chain.add(genesis)
         for number in range(count):
-            at_us = genesis.at_us + number  # type: ignore[union-attr]
-            yield chain.add(
-                Effect(chain.prev, at_us, "", "note", -1, -1, chain.seq, -1, -1, "effect", 0, genesis.utc_us + number)  # type: ignore[union-attr]
-            )
+            at_us, utc_us = genesis.at_us + number, genesis.utc_us + number
+            yield chain.add(Effect(chain.prev, at_us, "", "note", -1, -1, chain.seq, -1, -1, "effect", 0, utc_us))
 
     def peak(count: int) -> int:
         auditor = Auditor(ROOT_KEY)

@@ -3,14 +3,14 @@
 from typing import Any
 
 import pytest
-from virtual import case
-from virtual.flight import Flight, Flown
-from virtual.shipped import NAMES, shipped
 
 from rtshcua.evidence.report import Verdict
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.simulation.fault_text import parse_fault
+from virtual import case
+from virtual.flight import Flight, Flown
+from virtual.shipped import NAMES, shipped
 
 STEPS = {"short": 3, "standard": 6, "extended": 12}
 FLAVOURS = ("px4", "ardupilot")

@@ -36,7 +36,7 @@ def test_each_decision_is_written_before_it_is_acted_on(ground: Any) -> None:
 
 
 def test_nothing_of_the_ground_is_loaded_on_board(ground: Any) -> None:
-    words = ["run", ground.bundle(), "--speed", "50", "--json"]
+    words = ["run", ground.bundle(), "--speed", "20", "--json"]
     program = f"import sys; from rtshcua.cli.app import main; print(main({words})); print(*sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", program], cwd=ground.folder, capture_output=True, text=True, check=True, timeout=60
@@ -56,21 +56,21 @@ def test_nothing_of_the_ground_is_loaded_on_board(ground: Any) -> None:
 
 def test_a_bundle_flies_once(ground: Any) -> None:
     bundle = ground.bundle()
-    assert ground.run(bundle, speed=50).end().code == 0
+    assert ground.run(bundle).end().code == 0
     for _ in range(2):  # each is a new process: it is on the disk
-        again = ground.run(bundle, speed=50).end()
+        again = ground.run(bundle).end()
         assert again.code == 5
         assert "a bundle flies once" in again.stderr
         assert again.events == [
             {"event": "refused", "slug": "replayed", "text": again.events[0]["text"], "exit_code": 5}
         ]
     assert len(list((ground.folder / "runs").iterdir())) == 1
-    assert ground.run(bundle, "--fresh-state", speed=50).end().code == 0
+    assert ground.run(bundle, "--fresh-state").end().code == 0
 
 
 def test_without_json_a_pipe_gets_plain_lines(ground: Any) -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", "run", ground.bundle(), "--speed", "50"],
+        [sys.executable, "-m", "rtshcua.cli.app", "run", ground.bundle(), "--speed", "20"],
         cwd=ground.folder, capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
     lines = run.stdout.splitlines()

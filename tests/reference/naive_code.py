@@ -49,7 +49,7 @@ Number = tuple[int, int] | None
 
 
 def truths(code: tuple[int, ...], world: World) -> Truths:
-    """Run the code on a stack of sets of truths and of numbers: `(c, k)` is c times the height plus k, None is missing."""
+    """Run the code on a stack of truths and numbers: `(c, k)` is c times the height plus k, None is missing."""
     stack: list = []
     for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True):
         if op in (Op.ADD, Op.SUB, *RELATIONS, Op.AND, Op.OR):

@@ -199,7 +199,7 @@ class Oracle:
         return Outcome.DENY, Reason.PHASE_PASSED, 4
 
     def five(self, invocation: Invocation, context: Context) -> Answer | None:
-        elapsed = self.now.monotonic_us - self.released
+        elapsed = max(0, self.now.monotonic_us - self.released)
         late = context.remaining_us > invocation.contract.deadline_us - elapsed
         return (Outcome.FALLBACK, Reason.NO_SLACK, 5) if late else None
 

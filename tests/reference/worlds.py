@@ -171,11 +171,22 @@ def arguments(of: Random, skill: int) -> tuple[int, ...]:
     }.get(skill, ())
 
 
+def survey(of: Random, zone: Zone) -> tuple[int, ...]:
+    """A path within a zone."""
+    if zone == flat.ZONES[flat.BRIDGE]:
+        return flat.PATH
+    xs, ys = (zone.data[:1], zone.data[1:2]) if zone.shape == CIRCLE else (zone.data[::2], zone.data[1::2])
+    x, y = sum(xs) // len(xs), sum(ys) // len(ys)
+    return (x, y, x + of.randrange(5 * M), y)
+
+
 def invocation(of: Random, policy: Policy) -> Invocation:
     skill = of.choice(SKILLS)
     contract, values = policy.contracts[skill], arguments(of, skill)
     motion = contract.motion
-    path = {flat.GOTO: values[:2], flat.INSPECT: flat.PATH, flat.HOME: of.choice([(), (0, 0)])}.get(skill, ())
+    path: tuple[int, ...] = {flat.GOTO: values[:2], flat.HOME: of.choice([(), (0, 0)])}.get(skill, ())
+    if skill == flat.INSPECT:
+        path = survey(of, policy.zones[values[0]]) if values[0] < policy.declared else flat.PATH
     altitude = 0 if motion.altitude == -1 else values[motion.altitude]
     speed = of.choice([0] * 10 + [4 * M, 13 * M]) if motion.speed == -1 else values[motion.speed]
     return flat.invocation(

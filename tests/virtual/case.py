@@ -6,7 +6,7 @@ from math import cos, radians
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.model.flat.contract import Contract, MotionKind
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
@@ -110,7 +110,3 @@ def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
 def simulated(flavour: str, **fields: object) -> SimulationConfig:
     """A simulated vehicle that fits the policy."""
     return SimulationConfig(flavour=Kind(flavour), **fields)
-
-
-def contract(skill: int) -> Contract:
-    return flat.CONTRACTS[skill]

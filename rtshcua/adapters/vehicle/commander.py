@@ -29,10 +29,11 @@ class Commander:
 
     `accepted` and `refused` (the result) tell what the vehicle answered. A refusal counts only while it can belong to
     nothing but the one sending of this stage: after a retry the first one may have been obeyed, and what is refused is
-    its repetition.
+    its repetition. `slack` stretches every wait: see `Driver`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, slack: int = 1) -> None:
+        self.slack = slack
         self._stage: Stage | None = None
         self._sent_us = 0
         self._tries = 0
@@ -75,7 +76,7 @@ class Commander:
             if not stage.repeat_us or now_us - self._sent_us < stage.repeat_us:
                 return []
         else:
-            if self.accepted or self._tries >= RETRIES or now_us - self._sent_us < RETRY_US:
+            if self.accepted or self._tries >= RETRIES or now_us - self._sent_us < RETRY_US * self.slack:
                 return []
             if hasattr(stage.message, "confirmation"):
                 stage.message.confirmation = self._tries + 1

@@ -34,9 +34,13 @@ class Heard(NamedTuple):
 
 
 class Driver:
-    """One vehicle, chosen by the first heartbeat of an autopilot that we know; frames of other systems do not count."""
+    """One vehicle, chosen by the first heartbeat of an autopilot that we know; frames of other systems do not count.
 
-    def __init__(self, policy: Policy) -> None:
+    `slack` stretches every wait for an answer or an effect. It is 1, but for a simulated vehicle that lives so much
+    faster than life that the machine's own hold-ups would count as silence.
+    """
+
+    def __init__(self, policy: Policy, slack: int = 1) -> None:
         self._telemetry = Telemetry(policy)
         self._home_within = policy.vehicle.home_within
         self._streams = Streams({**self._telemetry.intervals, **ALWAYS}, self._telemetry.sources)
@@ -44,7 +48,7 @@ class Driver:
         self._flavour: Flavour | None = None
         self._seen = Observed()
         self._system = 0
-        self._commander = Commander()
+        self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
         self._spoken: set[str] = set()
         self._beat_us: int | None = None

@@ -105,7 +105,8 @@ class Manoeuvre:
             return f"refused/{RESULTS.get(commander.refused, str(commander.refused))}"
         if stage.powered and seen.down:
             return "disarmed"
-        if stage.timeout_us and now_us - max(self._entered_us, commander.busy_us or 0) > stage.timeout_us:
+        waited_us = now_us - max(self._entered_us, commander.busy_us or 0)
+        if stage.timeout_us and waited_us > stage.timeout_us * commander.slack:
             return "no-effect"
         if not (stage.travels and still(seen)):
             self._stopped_us = None

@@ -12,7 +12,9 @@ _TRACK = 2_000
 _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 
 #: what an event makes of a step
-_STATES = {"dispatched": "running", "succeeded": "done", "failed": "failed", "violated": "failed", "skipped": "skipped"}
+_STATES = {"dispatched": "running", "succeeded": "done", "skipped": "skipped"} | dict.fromkeys(
+    ("failed", "violated", "replaced", "released", "time-over", "landed"), "failed"
+)
 
 
 class Board:

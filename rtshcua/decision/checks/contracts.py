@@ -98,6 +98,8 @@ def _motion(contract: Contract) -> Iterator[str]:
         yield "motion: a skill that flies somewhere needs an altitude"
     if motion.kind == MotionKind.FLY and PLACE not in kinds.values():
         yield "motion: a skill that flies to a place needs one"
+    if motion.kind == MotionKind.COVER and ZONE not in kinds.values():
+        yield "motion: a skill that covers a zone needs one"
 
 
 def arguments(values: tuple[int, ...], contract: Contract) -> Iterator[str]:

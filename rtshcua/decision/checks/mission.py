@@ -5,9 +5,11 @@ from collections.abc import Iterator
 from rtshcua.decision.checks.contracts import contract
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.checks.tighten import tightens
-from rtshcua.decision.parameters import cells, place_of
+from rtshcua.decision.parameters import cells, first_cell
 from rtshcua.decision.scope import scope_of
-from rtshcua.model.flat.contract import Contract, MotionKind, SourceKind
+from rtshcua.decision.truth import TRUE
+from rtshcua.decision.zones import NO_BOX, PreparedZone
+from rtshcua.model.flat.contract import PLACE, ZONE, Contract, MotionKind, SourceKind
 from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PATH, MAX_PHASES, MAX_SPEED, MAX_VALUE
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy
@@ -29,8 +31,15 @@ def mission(mission: Mission, policy: Policy) -> Iterator[str]:
         if one.step != step:
             yield f"step {step} says it is step {one.step}"
         yield from at(f"step {step}", index("phase", one.phase, len(mission.phases)))
+        if one.phases & ~_phases(one.contract, mission):
+            yield f"step {step}: it is valid in a phase that its contract does not name"
     if len({one.invocation_id for one in mission.invocations}) != len(mission.invocations):
         yield "two steps have the same id"
+
+
+def _phases(contract: Contract, mission: Mission) -> int:
+    """The bit set of the mission's phases in which a contract may be used."""
+    return sum(1 << number for number, name in enumerate(mission.phases) if name in (contract.phases or (name,)))
 
 
 def invocation(invocation: Invocation, policy: Policy) -> Iterator[str]:
@@ -49,6 +58,8 @@ def invocation(invocation: Invocation, policy: Policy) -> Iterator[str]:
     for argument in invocation.arguments:
         yield from within("argument", argument, -MAX_VALUE, MAX_VALUE)
     yield from at("plan", _plan(invocation.plan, mine, invocation.arguments))
+    if not _leads_right(invocation.plan, mine, invocation.arguments, policy):
+        yield "plan: the path does not fit the arguments"
 
 
 def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterator[str]:
@@ -66,16 +77,19 @@ def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterato
     yield from within("number of points", len(plan.path) // 2, 0, MAX_PATH)
     for coordinate in plan.path:
         yield from within("coordinate", coordinate, -MAX_COORDINATE, MAX_COORDINATE)
-    if not _leads_right(plan, contract, arguments):
-        yield "the path is not the one that the skill flies"
 
 
-def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> bool:
+def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...], policy: Policy) -> bool:
+    """The path is where the arguments say: what rules and clauses are told about must be what is flown."""
     match plan.kind:
         case MotionKind.COVER:
-            return bool(plan.path)
+            zone = arguments[first_cell(contract, ZONE)]
+            if not 0 <= zone < policy.declared:
+                return bool(plan.path)  # for `decide` to refuse
+            return bool(plan.path) and PreparedZone(zone, policy.zones[zone]).along(plan.path, NO_BOX) == TRUE
         case MotionKind.FLY:
-            return plan.path == place_of(contract, arguments)
+            cell = first_cell(contract, PLACE)
+            return plan.path == arguments[cell : cell + 2]
         case MotionKind.HOME:
             return plan.path in ((), (0, 0))
         case _:

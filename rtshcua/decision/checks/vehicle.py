@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from rtshcua.decision.checks.indexes import at, within
-from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED, MAX_STALE
+from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED, MAX_STALE, MAX_VALUE
 from rtshcua.model.flat.policy import Policy, Vehicle
-from rtshcua.model.flat.signal import NUMBER, POSITION
+from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, SignalSource
 from rtshcua.model.flat.zone import MAX_COORDINATE
 
 MAX_POSITION_ERROR = 1 << 20  # mm, about 1 km
@@ -19,12 +19,21 @@ def signals(policy: Policy) -> Iterator[str]:
         where = f"signal `{signal.name}`"
         yield from at(where, within("kind", signal.kind, NUMBER, POSITION))
         yield from at(where, within("staleness", signal.stale_us, 1, MAX_STALE))
+        for source in signal.sources:
+            yield from at(where, _source(source, signal.kind))
         for slot in (signal.slot, signal.slot + 1) if signal.kind == POSITION else (signal.slot,):
             if not 0 <= slot < policy.slots or slot in owned:
                 yield f"{where}: slot {slot} does not exist or is owned twice"
             owned.add(slot)
     if len(owned) != policy.slots:
         yield "a slot has no signal"
+
+
+def _source(source: SignalSource, kind: int) -> Iterator[str]:
+    fields = {NUMBER: (1, 2), ENUMERATION: (1, 1), POSITION: (2, 2)}[kind]
+    yield from within("number of fields", len(source.fields), *fields)
+    yield from within("numerator", source.numerator, -MAX_VALUE, MAX_VALUE)
+    yield from within("denominator", source.denominator, 1, MAX_VALUE)
 
 
 def vehicle(policy: Policy) -> Iterator[str]:

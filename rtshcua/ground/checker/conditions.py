@@ -10,6 +10,7 @@ from rtshcua.ground.checker.values import (
     typed_range,
     unknown_member,
 )
+from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import (
     Arithmetic,
     Comparison,
@@ -231,6 +232,10 @@ def _margin(scope: Scope, margin: Quantity) -> None:
             margin.span,
             f"a zone grows by a length, and `{scope.report.text(margin.span)}` is none",
             help="write a length, such as `15 m`",
+        )
+    elif abs(margin.value) > MAX_COORDINATE:
+        scope.report.add(
+            codes.NUMBER_SIZE, margin.span, f"`{scope.report.text(margin.span)}` is larger than the local plane"
         )
 
 

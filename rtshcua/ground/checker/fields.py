@@ -1,6 +1,6 @@
 """Help for the fields of a declaration: quantities of one dimension, and names from a fixed list."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
@@ -8,19 +8,35 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import HEIGHT, number
 from rtshcua.ground.checker.values import typed
+from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
+from rtshcua.model.flat.zone import HIGHEST, MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates, Quantity
-from rtshcua.model.ir.node import Name
-from rtshcua.model.quantity import Dimension
+from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.quantity import Dimension, display
+
+#: the largest number of each dimension that is kept on board
+LARGEST: Mapping[Dimension, int] = {
+    Dimension.LENGTH: MAX_COORDINATE,
+    Dimension.ALTITUDE: HIGHEST - 1,
+    Dimension.SPEED: MAX_SPEED,
+    Dimension.DURATION: MAX_DURATION,
+    Dimension.ANGLE: MAX_VALUE,
+    Dimension.RATIO: MAX_VALUE,
+    Dimension.COUNT: MAX_VALUE,
+}
 
 #: the local projection has no use nearer to a pole (1e-7 degree)
 MAX_LATITUDE = 850_000_000
 MAX_LONGITUDE = 1_800_000_000
 
 
-def quantity(context: Context, node: Quantity | None, dimension: Dimension, *, positive: bool = True) -> None:
-    """Report a field that is no quantity of `dimension`, or not above zero where it must be."""
+def quantity(
+    context: Context, node: Quantity | None, dimension: Dimension, *, positive: bool = True, most: int | None = None
+) -> None:
+    """Report a field that is no quantity of `dimension`, not above zero where it must be, or larger than fits."""
     if node is None or typed(context.scope(), node, number(dimension)) is None:
         return
+    size(context, node, dimension, node.value, most)
     if node.value < 0 or (positive and node.value == 0):
         context.report.add(
             codes.NOT_POSITIVE,
@@ -33,8 +49,22 @@ def quantity(context: Context, node: Quantity | None, dimension: Dimension, *, p
 
 def height(context: Context, node: Quantity | None) -> None:
     """Report a field that is no altitude above home."""
-    if node is not None:
-        typed(context.scope(), node, HEIGHT)
+    if node is not None and typed(context.scope(), node, HEIGHT) is not None:
+        size(context, node, Dimension.ALTITUDE, node.value)
+
+
+def size(context: Context, node: Node, dimension: Dimension, value: int, most: int | None = None) -> bool:
+    """Whether a number of a dimension fits on board; reports it where it does not."""
+    limit = LARGEST[dimension] if most is None else most
+    if abs(value) <= limit:
+        return True
+    context.report.add(
+        codes.NUMBER_SIZE,
+        node.span,
+        f"`{context.report.text(node.span)}` is larger than what fits on board",
+        help=f"at most {display(limit, dimension)}",
+    )
+    return False
 
 
 def one_of(context: Context, code: Code, name: Name, known: Collection[str], what: str) -> bool:

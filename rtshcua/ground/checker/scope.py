@@ -93,6 +93,16 @@ class Scope:
                 labels=[(zone.name.span, "declared here")],
             )
             return
+        for enum in self.symbols.enums.values():
+            if any(member.name.text == name for member in enum.members):
+                self.report.add(
+                    codes.WRONG_KIND,
+                    span,
+                    f"`{name}` is a value of `{enum.name.text}`, and nothing here has that type",
+                    help=f"compare it with a signal of the type `{enum.name.text}`",
+                    labels=[(enum.name.span, "declared here")],
+                )
+                return
         known = [*self.arguments, *self.symbols.signals, *self.symbols.zones, LOCAL_TIME]
         self.report.add(codes.UNKNOWN_NAME, span, f"nothing declares `{name}`", help=suggestion(name, known))
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
@@ -80,8 +79,3 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
     """`did you mean ...?` for a word that is not among the known ones."""
     near = nearest(word, known)
     return None if near is None else f"did you mean `{near}`?"
-
-
-def declared_at(declaration: Declaration) -> tuple[Span, str]:
-    """A label that points at a declaration's name."""
-    return declaration.name.span, "declared here"

@@ -7,7 +7,6 @@ signed on its own, and is the same for every mission under it.
 import posixpath
 from collections.abc import Iterator, Mapping, Sequence
 
-from rtshcua.ground.checker.symbols import Declaration
 from rtshcua.ground.language.paths import LIBRARY, imported, shown
 from rtshcua.model.ir.program import Unit
 
@@ -41,11 +40,6 @@ class Imports:
                 name = None if path is None else shown(path)
             if name in self._units:
                 yield name
-
-
-def declared_in(declaration: Declaration, files: frozenset[str]) -> bool:
-    """Whether a declaration stands in one of some files."""
-    return declaration.span.file in files
 
 
 def beside(name: str, other: str) -> str:

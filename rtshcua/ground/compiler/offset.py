@@ -20,7 +20,7 @@ SNAP_MM = 2
 
 
 class Unshapely(Exception):
-    """The result is no simple polygon: `reason` is `nothing`, `parts`, `holes`, or `unproved`."""
+    """The result is no simple polygon: `reason` is `nothing`, `parts`, `holes`, `unproved`, or `far`."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)

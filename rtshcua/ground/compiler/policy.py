@@ -16,6 +16,7 @@ from rtshcua.ground.compiler.belonging import belongs
 from rtshcua.ground.compiler.conditions import Conditions
 from rtshcua.ground.compiler.contracts import Contracts
 from rtshcua.ground.compiler.files import Files
+from rtshcua.ground.compiler.limits import fits
 from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.ground.compiler.rules import Rules
 from rtshcua.ground.compiler.slots import Slots
@@ -58,10 +59,11 @@ def lower_policy(
     if not _well_known(context, policy, files) or not belongs(context, policy, skills, vehicle, files):
         return None
     table = Files(context.report, names)
-    table.index(policy.span.file)
     slots = Slots(context)
     position, height, battery = (slots.of(name) for name in WELL_KNOWN)
     declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
+    for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in WELL_KNOWN), *skills):
+        table.index(part.span.file)  # all that the policy rests on is named, quoted or not
     zones = ZoneTable(projection_at(vehicle.home.latitude, vehicle.home.longitude), declared, context.report)
     conditions = Conditions(context, slots, zones, table)
     flat_vehicle = _vehicle(vehicle, position, height, battery)
@@ -93,6 +95,8 @@ def lower_policy(
         sources=table.names,
         source_digests=table.digests,
     )
+    if not fits(context, policy, flat):
+        return None
     by_name = {role: number for number, role in enumerate(roles)}
     return LoweredPolicy(flat, policy, vehicle, numbers, by_name, zones, contracts, table)
 

@@ -12,7 +12,7 @@ from rtshcua.ground.checker.polygons import counter_clockwise, crossing
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.compiler.offset import Unshapely, inner, outer
 from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.compiler.shapes import Disc, Outline, Point, Region
+from rtshcua.ground.compiler.shapes import Disc, Outline, Point, Region, bounds
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Projection, Zone, project
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, ZoneDecl
@@ -148,9 +148,12 @@ class ZoneTable:
                 codes.ZONE_VANISHES, span, f"nothing is left of `{zone.name.text}` when it is {done}", labels=labels
             )
             return
-        words = {"parts": "it falls into parts", "holes": "it encloses a hole"}.get(
-            unshapely.reason, "its outline cannot be proved in whole millimetres"
-        )
+        words = {
+            "parts": "it falls into parts",
+            "holes": "it encloses a hole",
+            "far": "it reaches further than 500 km from home",
+            "unproved": "its outline cannot be proved in whole millimetres",
+        }[unshapely.reason]
         self._report.add(
             codes.ZONE_SHAPE,
             span,
@@ -166,6 +169,8 @@ def derived_name(name: str, margin: int) -> str:
 
 
 def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
-    """A region grown by `margin` on the safe side; beyond what fits into coordinates it is no polygon any more."""
+    """A region grown by `margin` on the safe side, as long as it stays within the local plane."""
     shape = inner(region.shape, margin) if smaller else outer(region.shape, margin)
+    if max(map(abs, bounds(shape))) > MAX_COORDINATE:
+        raise Unshapely("far")
     return Region(shape, region.floor, region.ceiling)

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, GOTO, HOVER, INSPECT, POSITION_X, apply, argument, const, scaled, signal
@@ -210,8 +211,6 @@ def test_what_code_reads() -> None:
     vehicle = flat.POLICY.vehicle
     assert slots_read([flat.clause("", code)], vehicle) == (BATTERY, FIX)
     assert slots_read([flat.clause("", asks)], vehicle) == (flat.HEIGHT, POSITION_X, POSITION_X + 1)
-    from msgspec.structs import replace
-
     assert slots_read([flat.clause("", asks)], replace(vehicle, position=-1)) == (flat.HEIGHT,)
     assert slots_read([flat.clause("", asks)], replace(vehicle, height=-1)) == (POSITION_X, POSITION_X + 1)
 

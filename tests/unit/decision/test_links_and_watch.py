@@ -90,7 +90,8 @@ def test_a_zone_argument_that_is_none_is_unknown() -> None:
     rules = (flat.rule(RuleKind.DEGRADE, flat.INSPECT, when=near, target=flat.link(HOME)),)
     policy = loaded(replace(flat.POLICY, rules=rules))
     for area, index in ((flat.BRIDGE, DEGRADE), (flat.SCHOOL, 0), (-1, 0), (9, 0)):
-        invocation = ready(replace(STEP, arguments=(area, 20 * M, 0, 4 * M)), policy)
+        plan = replace(STEP.plan, path=(0, 300 * M)) if area == flat.SCHOOL else STEP.plan
+        invocation = ready(replace(STEP, arguments=(area, 20 * M, 0, 4 * M), plan=plan), policy)
         choice = choose_fallback(invocation, flat.state(), policy, NOW)
         assert choice is not None
         assert choice.index == index

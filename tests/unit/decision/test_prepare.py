@@ -18,7 +18,7 @@ from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation, pre
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.watch import watch
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
-from rtshcua.model.flat.limits import MAX_RULES, MAX_ZONES
+from rtshcua.model.flat.limits import MAX_RULES, MAX_SLOTS, MAX_STALE, MAX_ZONES
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Policy, RuleKind
 from rtshcua.model.flat.zone import CIRCLE, MAX_COORDINATE, MAX_VERTICES, POLYGON, Zone
@@ -33,6 +33,10 @@ def vehicle(**fields: Any) -> Policy:
 def signal(number: int, **fields: Any) -> Policy:
     changed = tuple(replace(s, **fields) if n == number else s for n, s in enumerate(P.signals))
     return replace(P, signals=changed)
+
+
+def source(**fields: Any) -> Policy:
+    return signal(0, sources=(replace(P.signals[0].sources[0], **fields),))
 
 
 def zone(**fields: Any) -> Policy:
@@ -58,14 +62,19 @@ BAD = flat.clause("bad", (0, 0, 0))
 DEEP = "instruction 0: no instruction has the number 0"
 
 POLICIES: list[tuple[Policy, str]] = [
-    (replace(P, slots=257), "number of slots 257 is not in 0..256"),
+    (replace(P, slots=MAX_SLOTS + 1), f"number of slots {MAX_SLOTS + 1} is not in 0..{MAX_SLOTS}"),
     (replace(P, slots=9), "a slot has no signal"),
     (replace(P, slots=7), "signal `obstacle.distance`: slot 7 does not exist or is owned twice"),
     (signal(1, slot=0), "signal `height`: slot 0 does not exist or is owned twice"),
     (signal(0, slot=-1), "signal `battery`: slot -1 does not exist or is owned twice"),
     (signal(6, kind=2), "signal `obstacle.distance`: slot 8 does not exist or is owned twice"),
     (signal(0, kind=3), "signal `battery`: kind 3 is not in 0..2"),
-    (signal(0, stale_us=0), f"signal `battery`: staleness 0 is not in 1..{1 << 42}"),
+    (signal(0, stale_us=0), f"signal `battery`: staleness 0 is not in 1..{MAX_STALE}"),
+    (source(denominator=0), "signal `battery`: denominator 0 is not in 1.."),
+    (source(numerator=1 << 53), "signal `battery`: numerator 9007199254740992 is not in"),
+    (source(fields=()), "signal `battery`: number of fields 0 is not in 1..2"),
+    (source(fields=("x",) * 3), "signal `battery`: number of fields 3 is not in 1..2"),
+    (signal(4, sources=P.signals[0].sources * 2, kind=2), "signal `gps.fix`: number of fields 1 is not in 2..2"),
     (vehicle(home_within=-1), f"vehicle: home distance -1 is not in 0..{MAX_COORDINATE}"),
     (vehicle(speed=0), f"vehicle: speed 0 is not in 1..{1 << 20}"),
     (vehicle(climb=0), f"vehicle: climb 0 is not in 1..{1 << 20}"),
@@ -124,6 +133,10 @@ POLICIES: list[tuple[Policy, str]] = [
     (
         contract(INSPECT, motion=Motion(2, 1, 3)),
         "skill `inspect_area`: motion: a skill that flies to a place needs one",
+    ),
+    (
+        contract(GOTO, motion=Motion(3, 2, -1)),
+        "skill `goto`: motion: a skill that covers a zone needs one",
     ),
     (contract(HOVER, timing_class=3), "skill `hover`: timing class 3 is not in 0..2"),
     (contract(HOVER, deadline_us=-1), "skill `hover`: deadline -1 is not in 0.."),
@@ -250,18 +263,20 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (plan(path=(1, 2, 3)), "plan: a coordinate is missing"),
     (plan(path=(0, 0) * 8193), "plan: number of points 8193 is not in 0..8192"),
     (plan(path=(0, MAX_COORDINATE + 1)), f"plan: coordinate {MAX_COORDINATE + 1} is not in"),
-    (plan(path=()), "plan: the path is not the one that the skill flies"),
+    (plan(path=(0, 0)), "plan: the path does not fit the arguments"),  # not in the area
+    (plan(path=(*flat.PATH[:2], 100 * M, 0)), "plan: the path does not fit the arguments"),
+    (plan(path=()), "plan: the path does not fit the arguments"),
     (
         replace(flat.INVOCATIONS[1], plan=replace(flat.INVOCATIONS[1].plan, path=(0, 0))),
-        "plan: the path is not the one that the skill flies",
+        "plan: the path does not fit the arguments",
     ),
     (
         replace(flat.INVOCATIONS[0], plan=replace(flat.INVOCATIONS[0].plan, path=(0, 0))),
-        "plan: the path is not the one that the skill flies",
+        "plan: the path does not fit the arguments",
     ),
     (
         replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=(0, 1))),
-        "plan: the path is not the one that the skill flies",
+        "plan: the path does not fit the arguments",
     ),
 ]
 
@@ -299,6 +314,16 @@ def test_a_mission_may_choose_among_phases_where_the_policy_names_none() -> None
 MISSION = flat.MISSION
 
 
+def phases(step: int, bits: int) -> Mission:
+    changed = (replace(one, phases=bits) if one.step == step else one for one in MISSION.invocations)
+    return replace(MISSION, invocations=tuple(changed))
+
+
+@pytest.mark.parametrize(("step", "bits"), [(0, 0b111), (0, 0), (2, 0b010), (2, 0)])
+def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: int, bits: int) -> None:
+    assert isinstance(prepare_mission(phases(step, bits), POLICY), tuple)
+
+
 @pytest.mark.parametrize(
     ("mission", "what"),
     [
@@ -314,6 +339,8 @@ MISSION = flat.MISSION
             "two steps have the same id",
         ),
         (replace(MISSION, invocations=(replace(MISSION.invocations[0], role=9),)), "step 0: there is no role 9"),
+        (phases(2, 0b011), "step 2: it is valid in a phase that its contract does not name"),
+        (phases(0, 0b1001), "step 0: it is valid in a phase that its contract does not name"),
     ],
 )
 def test_a_malformed_mission(mission: Mission, what: str) -> None:

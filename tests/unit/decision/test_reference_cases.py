@@ -75,6 +75,7 @@ def test_an_admission_is_bounded_by_the_first_thing_to_go_stale() -> None:
     ("context", "now", "until"),
     [
         ({"released_us": NOW.monotonic_us - 1_900_000}, NOW, NOW.monotonic_us + 100_000),
+        ({"released_us": NOW.monotonic_us + 3_600 * S}, NOW, NOW.monotonic_us + 490_000),
         ({}, replace(NOW, utc_us=flat.ISSUED + 10 * MIN - 50_000), NOW.monotonic_us + 30_000),
         ({"released_us": NOW.monotonic_us - 1_995_000}, NOW, NOW.monotonic_us + 5_000),
     ],

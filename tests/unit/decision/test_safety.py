@@ -31,7 +31,7 @@ from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
-from rtshcua.model.flat.policy import Airspace
+from rtshcua.model.flat.policy import Airspace, RuleKind
 from rtshcua.model.flat.zone import LOWEST
 from rtshcua.model.outcome import Outcome, Reason
 
@@ -137,8 +137,13 @@ def test_maintain_over_the_planned_volume(values: dict[int, int | None], reason:
 
 
 def test_maintain_along_the_whole_path() -> None:
-    outside = (*flat.PATH[:2], 300 * M, 0)
-    assert ask(replace(STEP, plan=replace(STEP.plan, path=outside))).reason is Reason.INVARIANT
+    near = clause("position inside grow(bridge_a, 15 m)", (Op.POSITION_IN, flat.BRIDGE_GROWN, 0))
+    policy, contract = with_contract(INSPECT, maintain=(*flat.CONTRACTS[INSPECT].maintain, near))
+    over_city = replace(STEP, contract=contract, arguments=(flat.CITY, *STEP.arguments[1:]))
+    policy = loaded(replace(policy.policy, rules=(flat.rule(RuleKind.PERMIT),)))
+    for east, reason in ((200, Reason.ADMITTED), (300, Reason.INVARIANT)):
+        path = (*flat.PATH[:2], east * M, 0)
+        assert ask(replace(over_city, plan=replace(STEP.plan, path=path)), policy=policy).reason is reason
 
 
 def test_a_negated_place_must_hold_everywhere_as_well() -> None:

@@ -44,7 +44,7 @@ def test_a_place_out_of_all_coordinates() -> None:
     far = 1 << 29
     step = flat.INVOCATIONS[1]
     there = replace(step, arguments=(far + 1, 0, 20_000))
-    assert prepare_invocation(there, POLICY) == Malformed("plan: the path is not the one that the skill flies")
+    assert prepare_invocation(there, POLICY) == Malformed("plan: the path does not fit the arguments")
     edge = replace(step, arguments=(far, 0, 20_000), plan=replace(step.plan, path=(far, 0)))
     assert ask(edge).reason is Reason.AIRSPACE
 
@@ -279,7 +279,8 @@ def test_phase(phases: int, current: int, outcome: Outcome, reason: Reason) -> N
         (S, S, ALLOW),
         (S, S + 1, FALLBACK),
         (2 * S, 0, ALLOW),
-        (-S, 3 * S, ALLOW),
+        (-S, 2 * S, ALLOW),
+        (-S, 2 * S + 1, FALLBACK),  # a release that is still to come gains nothing
     ],
 )
 def test_timing(elapsed: int, remaining: int, outcome: Outcome) -> None:

@@ -3,6 +3,7 @@
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.fields import size
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
 from rtshcua.ground.checker.values import typed_range
@@ -39,6 +40,9 @@ def check(context: Context) -> None:
                         "both ends of a parameter's range are written out",
                         help="write numbers with their units",
                     )
+                elif ends is not None and argument.type.dimension is not None:
+                    for end, (_, constant) in zip((parameter.range.low, parameter.range.high), ends, strict=True):
+                        size(context, end, argument.type.dimension, constant or 0)
             if parameter.default is not None:
                 bind_value(scope, argument, parameter.default)
 

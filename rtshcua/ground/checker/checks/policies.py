@@ -8,6 +8,7 @@ from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_skill, find_zone
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.ir.policies import PolicyDecl, Rule
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension
@@ -18,6 +19,13 @@ SOURCES = tuple(each.name.lower() for each in SourceKind)
 def check(context: Context) -> None:
     """Report every rule that could not be decided, and every policy that leaves the vehicle in the air."""
     for policy in context.symbols.policies.values():
+        if policy.version > MAX_VALUE:
+            context.report.add(
+                codes.NUMBER_SIZE,
+                policy.name.span,
+                f"the version of `{policy.name.text}` is larger than what fits on board",
+                help=f"at most {MAX_VALUE}",
+            )
         for rule in policy.rules:
             _rule(context, rule)
         if policy.airspace is not None:

@@ -5,17 +5,19 @@ from collections.abc import Mapping
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.dialect import DATUM, UNITS, Field
-from rtshcua.ground.checker.fields import quantity
+from rtshcua.ground.checker.fields import quantity, size
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.model.flat.limits import MAX_STALE
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SignalSource
 from rtshcua.model.quantity import Dimension
 
-#: what an integer field can hold
+MAX_INTEGER = (1 << 63) - 1
+#: what an integer field can hold, as far as it is kept on board
 INTEGERS: Mapping[str, tuple[int, int]] = {
-    f"{sign}int{bits}_t": (0, (1 << bits) - 1) if sign else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    f"{sign}int{bits}_t": (0, min((1 << bits) - 1, MAX_INTEGER)) if sign else (-(1 << bits - 1), (1 << bits - 1) - 1)
     for sign in ("", "u")
     for bits in (8, 16, 32, 64)
 }
@@ -34,6 +36,7 @@ def _enum(context: Context, enum: EnumDecl) -> None:
     report = context.report
     values: dict[int, Name] = {}
     for member in enum.members:
+        size(context, member, Dimension.COUNT, member.value)
         first = values.setdefault(member.value, member.name)
         if first is not member.name:
             report.add(
@@ -66,7 +69,7 @@ def _enum(context: Context, enum: EnumDecl) -> None:
 
 
 def _signal(context: Context, signal: SignalDecl) -> None:
-    quantity(context, signal.stale_after, Dimension.DURATION)
+    quantity(context, signal.stale_after, Dimension.DURATION, most=MAX_STALE)
     name = signal.type.text
     known = NAMED.get(name)
     if known == ZONE or (known is None and name not in context.symbols.enums):

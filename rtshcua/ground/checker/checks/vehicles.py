@@ -1,5 +1,6 @@
-"""E0310, E0319, E0502: what a vehicle declares of itself."""
+"""E0310, E0319, E0502, E1003: what a vehicle declares of itself."""
 
+from rtshcua.decision.checks.vehicle import MAX_POSITION_ERROR
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import on_globe, quantity
@@ -16,7 +17,7 @@ def check(context: Context) -> None:
         quantity(context, vehicle.within, Dimension.LENGTH)
         quantity(context, vehicle.speed, Dimension.SPEED)
         quantity(context, vehicle.climb, Dimension.SPEED)
-        quantity(context, vehicle.position_error, Dimension.LENGTH, positive=False)
+        quantity(context, vehicle.position_error, Dimension.LENGTH, positive=False, most=MAX_POSITION_ERROR)
         quantity(context, vehicle.endurance, Dimension.DURATION)
         quantity(context, vehicle.reserve, Dimension.RATIO, positive=False)
         if vehicle.reserve.dimension is Dimension.RATIO and vehicle.reserve.value >= FULL:

@@ -138,6 +138,19 @@ def test_no_answer_at_all_is_a_failure_and_not_a_success(flyer: Make) -> None:
     assert (type(end), end.reason) == (Failed, "no-effect")
 
 
+def test_a_hurried_vehicle_is_given_more_time(flyer: Make) -> None:
+    waits = []
+    for slack in (1, 4):
+        one = flyer()
+        one.vehicle.driver._commander.slack = slack
+        one.until(Ready)
+        begun = one.now_us
+        one.vehicle.lose = lambda frame: True
+        assert one.fly(MotionKind.CLIMB, altitude=20_000).reason == "no-effect"
+        waits.append(one.now_us - begun)
+    assert 3.5 < waits[1] / waits[0] < 4.5
+
+
 def test_stopping_short_is_a_failure(flyer: Make) -> None:
     """As on PX4, which acknowledges a target outside of its fence, sets off, and stops at the edge."""
     one = flyer().up()

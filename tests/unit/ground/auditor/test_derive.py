@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.forgery import edit, expect, other_flight, prove, read, signed
-from rtshcua.simulation.faults import BatteryLevel
+from rtshcua.simulation.faults import BatteryLevel, WindStep
 from virtual import case
 from virtual.flight import Flight
 
@@ -27,8 +27,6 @@ def denied_in_the_air() -> tuple[bytes, ...]:
 @cache
 def fallen_back() -> tuple[bytes, ...]:
     """The wind rises above the limit: the chain of the step flies."""
-    from rtshcua.simulation.faults import WindStep
-
     config = case.simulated("px4", faults=(WindStep(15 * S, 14 * M),))
     return tuple(Flight(case.seal(case.mission(case.short_steps())), config).fly().lines)
 

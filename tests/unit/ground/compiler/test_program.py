@@ -1,4 +1,4 @@
-"""Whole programs: what ships compiles without a finding, to the same bytes; whatever a source says, nothing is raised."""
+"""Whole programs: what ships compiles without a finding, to the same bytes; whatever a source says, nothing raises."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -274,3 +274,55 @@ def test_every_diagnostic_of_one_place_is_told_once() -> None:
     text = SHIPPED["lib:missions/standard.rts"].replace("altitude = 20 m", "altitude = 20 s")
     found = compiled("missions/standard.rts", {"lib:missions/standard.rts": text}).diagnostics
     assert len(found) == len(set(found)) == 3
+
+
+def long_policy(rules: str) -> str:
+    return SHIPPED["lib:policies/bridge_inspection.rts"].replace("contingency hover", f"{rules}\n  contingency hover")
+
+
+TOO_LARGE = [
+    ("lib:policies/bridge_inspection.rts", long_policy("permit hover by role operator\n" * 17_000), "E1001"),
+    (
+        "lib:policies/bridge_inspection.rts",
+        long_policy("".join(f"permit hover by role r{n}\n" for n in range(70))),
+        "E1001",
+    ),
+    ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("12 m/s", "2000 m/s"), "E1003"),
+    ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("ceiling 120 m", "ceiling 2000 km"), "E1003"),
+    ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("error 3 m", "error 2 km"), "E1003"),
+    ("lib:skills/hover.rts", SHIPPED["lib:skills/hover.rts"].replace("40 min", "1500 h"), "E1003"),
+    ("lib:skills/hover.rts", SHIPPED["lib:skills/hover.rts"].replace("30 s =", "1500 h ="), "E1003"),
+    (
+        "lib:skills/signals.rts",
+        SHIPPED["lib:skills/signals.rts"].replace("stale after 10 s", "stale after 2 h"),
+        "E1003",
+    ),
+    (
+        "lib:skills/inspect_area.rts",
+        SHIPPED["lib:skills/inspect_area.rts"].replace("area, 15 m", "area, 900 km"),
+        "E1003",
+    ),
+    (
+        "lib:skills/inspect_area.rts",
+        SHIPPED["lib:skills/inspect_area.rts"].replace("height <= altitude", f"height * {1 << 52} <= altitude * 9000"),
+        "E1003",
+    ),
+    (
+        "lib:skills/hover.rts",
+        SHIPPED["lib:skills/hover.rts"].replace("require  ", "require " + "battery > 3 % and " * 70),
+        "E1001",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "code"), TOO_LARGE)
+def test_what_does_not_fit_on_board_says_so(name: str, text: str, code: str) -> None:
+    assert text != SHIPPED[name]
+    found = compiled("missions/standard.rts", {name: text})
+    assert set(ids(found.diagnostics)) == {code}, [d.message for d in found.diagnostics]
+
+
+def test_a_version_that_no_log_could_hold_is_refused() -> None:
+    text = long_policy("").replace("version 7", f"version {1 << 60}")
+    found = compiled("missions/standard.rts", {"lib:policies/bridge_inspection.rts": text})
+    assert set(ids(found.diagnostics)) == {"E0701", "E1003"}

@@ -1,0 +1,64 @@
+"""`rtshcua show`: print a bundle, a key, a trust root or a log for a person."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.files.runs import LOG
+from rtshcua.cli.faults import fail
+from rtshcua.cli.showing.bundle import show_bundle
+from rtshcua.cli.showing.keys import KEY_FILE, show_key, show_root
+from rtshcua.cli.showing.log import show_log
+from rtshcua.cli.showing.page import Page, for_terminal
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire import cbor, cose, names
+from rtshcua.wire.bundle import MAX_BUNDLE
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_SNIFF = 1 << 12
+_LOG = b'{"_prev":"'
+_BUNDLE = cbor.encode(names.BUNDLE.name)
+_ENVELOPE = b"\xd2"  # COSE_Sign1
+
+
+@app.command()
+def show(
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="a bundle, key, trust root or log, or a run's folder")],
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Print what a file says, whatever kind it is, with nothing left unsaid. Showing is not verifying."""
+    page = for_terminal()
+    file = path / LOG if path.is_dir() else path
+    try:
+        shown = _show(page, file)
+    except Untrusted as error:
+        return fail(ExitCode.INPUT if error.slug == "malformed" else ExitCode.UNTRUSTED, f"`{path}`: {error}")
+    if shown is None:
+        help = "sources are shown by any editor; `rtshcua check` reports on them"
+        return fail(ExitCode.INPUT, f"`{path}` is no bundle, key, trust root or log of this program", help)
+    print(json.dumps(shown, ensure_ascii=False) if as_json else page)
+    return ExitCode.OK
+
+
+def _show(page: Page, path: Path) -> dict[str, object] | None:
+    """Adds what the file holds to the page; None for what nobody here knows. Raises `Untrusted`."""
+    now_us = time.time_ns() // 1000
+    with path.open("rb") as file:
+        head = file.read(_SNIFF)
+        file.seek(0)
+        if head.startswith(_LOG):
+            return show_log(page, lines(file))
+        data = file.read(MAX_BUNDLE + 1)
+    if head[1:].startswith(_BUNDLE):
+        return show_bundle(page, data, now_us)
+    if head.startswith(KEY_FILE):
+        return show_key(page, data)
+    if head.startswith(_ENVELOPE) and cose.unverified(data, limit=MAX_BUNDLE).content_type == names.ROOT.content_type:
+        return show_root(page, data, now_us)
+    return None

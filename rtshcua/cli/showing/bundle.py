@@ -1,0 +1,75 @@
+"""A bundle: who signed it, and all that it says."""
+
+from typing import NamedTuple
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.showing.mission import show_mission
+from rtshcua.cli.showing.named import named
+from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.policy import show_policy
+from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire import cose, names
+from rtshcua.wire.bundle import envelopes, open_bundle, parse, policy_digest
+from rtshcua.wire.digest import BUNDLE, digest
+from rtshcua.wire.trust import open_root
+from rtshcua.wire.untrusted import Untrusted
+
+
+class Claimed(NamedTuple):
+    """What a bundle says, and which keys it says signed it: read for showing, and not to be trusted."""
+
+    policy: Policy
+    mission: Mission
+    digest: bytes
+    policy_digest: bytes
+    policy_kid: bytes
+    mission_kid: bytes
+
+
+def claimed(data: bytes) -> Claimed:
+    """Takes a bundle apart without trusting it. Raises `Untrusted`."""
+    first, second = (cose.unverified(envelope) for envelope in envelopes(data))
+    policy, mission = parse(names.POLICY, first.payload, Policy), parse(names.MISSION, second.payload, Mission)
+    prepared = prepare(policy)
+    checked = prepared if isinstance(prepared, Malformed) else prepare_mission(mission, prepared)
+    if isinstance(checked, Malformed):
+        raise Untrusted("malformed", f"the bundle makes no sense: {checked.what}")
+    return Claimed(policy, mission, digest(BUNDLE, data), policy_digest(first.payload), first.kid, second.kid)
+
+
+def show_bundle(page: Page, data: bytes, now_us: int) -> dict[str, object]:
+    """Adds a bundle to the page, and gives it for a program. Raises `Untrusted`."""
+    what = claimed(data)
+    trusted, verdict = _verdict(data, now_us)
+    page.head(f"Bundle of {len(data)} bytes")
+    page.row("digest", what.digest.hex())
+    page.row("policy", f"digest {what.policy_digest.hex()}, key {what.policy_kid.hex()}")
+    page.row("mission", f"key {what.mission_kid.hex()}")
+    page.row("signatures", verdict)
+    show_mission(page, what.mission, what.policy)
+    show_policy(page, what.policy)
+    return {
+        "kind": "bundle",
+        "digest": what.digest.hex(),
+        "policy_digest": what.policy_digest.hex(),
+        "policy_key": what.policy_kid.hex(),
+        "mission_key": what.mission_kid.hex(),
+        "trusted": trusted,
+        "verdict": verdict,
+        "mission": named(what.mission),
+        "policy": named(what.policy),
+    }
+
+
+def _verdict(data: bytes, now_us: int) -> tuple[bool, str]:
+    """Whether the key store's root trusts the bundle now, and in words."""
+    store = KeyStore(data_folder())
+    try:
+        root = open_root(store.root(), pinned=store.pin(), now_us=now_us)
+        open_bundle(data, root=root, vehicle=None, now_us=now_us)
+    except Untrusted as error:
+        return False, f"not trusted here: {error}"
+    return True, f"verified under the {'development' if root.development else 'trust'} root of your key store"

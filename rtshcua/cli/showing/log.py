@@ -1,0 +1,103 @@
+"""A log as a timeline. Nothing is verified here; a line that is no record ends it."""
+
+from base64 import b64decode
+from collections.abc import Iterable, Iterator
+
+import msgspec
+
+from rtshcua.cli.showing.bundle import Claimed, claimed
+from rtshcua.cli.showing.page import Page
+from rtshcua.cli.shown import utc
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.untrusted import Untrusted
+
+_KINDS = {STEP: "step", FALLBACK_LINK: "fallback", CONTINGENCY_LINK: "contingency"}
+
+
+def show_log(page: Page, lines: Iterable[bytes]) -> dict[str, object]:
+    """Adds a log to the page, and gives it for a program."""
+    start_us, names, entries, stopped = 0, _Names(None), [], None
+    for number, record in enumerate(_records(lines)):
+        if isinstance(record, Flaw):
+            stopped = f"line {number + 1} is no record: {record.text}"
+            break
+        if isinstance(record, Genesis):
+            start_us, names = record.at_us, _Names(_bundle(record))
+            _head(page, record)
+            page.head("Timeline (not verified: `rtshcua verify-log` does that)")
+        what = names.tell(record)
+        entries.append(_entry(record, what))
+        page.text(f"{record.seq:>5} {(record.at_us - start_us) / 1_000_000:>10.3f} s  {what}")
+    if stopped is not None:
+        page.head("The rest is not shown")
+        page.row("because", stopped)
+    return {"kind": "log", "verified": False, "records": entries, "stopped": stopped}
+
+
+def _records(lines: Iterable[bytes]) -> Iterator[AnyRecord | Flaw]:
+    return (read(line) for line in lines)
+
+
+def _head(page: Page, genesis: Genesis) -> None:
+    page.head(f"Log of mission {genesis.mission} on {genesis.vehicle}")
+    page.row("begun", f"{utc(genesis.utc_us)}, true to {genesis.utc_error_us / 1_000_000:g} s")
+    page.row("mode", genesis.mode)
+    page.row("log key", genesis.log_kid)
+    page.row("boot", genesis.boot)
+    if genesis.before is not None:
+        page.row("follows", f"the log whose last line has the hash {genesis.before}")
+
+
+def _entry(record: AnyRecord, what: str) -> dict[str, object]:
+    """A record for a program, without the genesis' bulk."""
+    fields: dict[str, object] = msgspec.to_builtins(record)
+    return {"what": what, **{name: value for name, value in fields.items() if name not in ("bundle", "root")}}
+
+
+def _bundle(genesis: Genesis) -> Claimed | None:
+    try:
+        return claimed(b64decode(genesis.bundle))
+    except (Untrusted, ValueError):
+        return None
+
+
+class _Names:
+    """The words of a bundle for steps and links; numbers where it has none."""
+
+    def __init__(self, bundle: Claimed | None) -> None:
+        self._bundle = bundle
+
+    def tell(self, record: AnyRecord) -> str:
+        """A record in one line."""
+        if isinstance(record, Decision):
+            subject = self._subject(record.kind, record.step, record.link)
+            clause = f" because `{record.clause}`" if record.clause is not None else ""
+            target = f", to {record.target}" if record.target is not None else ""
+            return f"{record.outcome:<9} {subject}: {record.reason}{clause}{target}"
+        if isinstance(record, Effect):
+            subject = self._subject(record.kind, record.step, record.link)
+            return "  ".join(word for word in (f"· {record.event:<15}", subject, record.detail) if word).rstrip()
+        if isinstance(record, Close):
+            return f"closed after {record.count} records: {record.ending}"
+        return f"begun in mode {record.mode}"
+
+    def _subject(self, kind: int, step: int, link: int) -> str:
+        if kind not in _KINDS:
+            return ""
+        text = self._text(kind, step, link)
+        number = link if kind == CONTINGENCY_LINK else step
+        return f"{_KINDS[kind]} {number}{f' `{text}`' if text else ''}"
+
+    def _text(self, kind: int, step: int, link: int) -> str:
+        if self._bundle is None:
+            return ""
+        chain = self._bundle.policy.contingency
+        if kind == FALLBACK_LINK and 0 <= step < len(self._bundle.mission.invocations):
+            chain = self._bundle.mission.invocations[step].contract.fallback
+        if kind != STEP:
+            return chain[link].text if 0 <= link < len(chain) else ""
+        steps = self._bundle.mission.invocations
+        return steps[step].text if 0 <= step < len(steps) else ""

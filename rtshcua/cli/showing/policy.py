@@ -1,0 +1,56 @@
+"""A policy, in full: what is permitted, to whom, where, and what every skill then means."""
+
+from rtshcua.cli.showing import words
+from rtshcua.cli.showing.contract import show_contract
+from rtshcua.cli.showing.page import Page
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import Signal
+
+_HOUR_US = 3_600_000_000
+
+
+def show_policy(page: Page, policy: Policy) -> None:
+    """Adds a policy to the page."""
+    vehicle, projection = policy.vehicle, policy.projection
+    page.head(f"Policy {policy.name} version {policy.version}")
+    page.row("vehicle", f"`{vehicle.identity}`, declared as {vehicle.name}")
+    home = words.geographic(projection.latitude, projection.longitude)
+    page.row("home", f"{home}, within {words.length(vehicle.home_within)}")
+    page.row("moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}")
+    page.row("position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this")
+    hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
+    page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
+    page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
+    page.row("roles", ", ".join(policy.roles))
+    page.rows("sources", policy.sources)
+
+    page.head("Rules: a forbid wins, and without a permit nothing is allowed")
+    for number, rule in enumerate(policy.rules):
+        page.row(str(number), rule.text, width=2)
+        if rule.target is not None:
+            page.row("", f"flies {words.link(policy, rule.target)}", width=2)
+    page.row("airspace", "anywhere" if policy.airspace is None else policy.airspace.text.removeprefix("airspace "))
+    page.rows("contingency", [f"{n} {words.link(policy, link)}" for n, link in enumerate(policy.contingency)])
+
+    page.head("Zones")
+    width = max((len(zone.name) for zone in policy.zones), default=0)
+    for zone in policy.zones:
+        page.row(zone.name, words.zone(policy, zone), width=width)
+
+    page.head("Signals")
+    width = max((len(signal.name) for signal in policy.signals), default=0)
+    for signal in policy.signals:
+        page.row(signal.name, _signal(signal), width=width)
+
+    page.head("Skills: the contracts, with every default that the compiler filled in")
+    for contract in policy.contracts:
+        show_contract(page, policy, contract)
+
+
+def _signal(signal: Signal) -> str:
+    sources = [f"{source.message}.{', .'.join(source.fields)}" for source in signal.sources]
+    unknown = sorted({value for source in signal.sources for value in source.unknown})
+    parts = [f"{signal.dimension} from {' or '.join(sources)}", f"stale after {words.duration(signal.stale_us)}"]
+    if unknown:
+        parts.append(f"unknown where it is {', '.join(map(str, unknown))}")
+    return "; ".join(parts)

@@ -1,0 +1,133 @@
+"""Canonical integers in the words of the language."""
+
+from collections.abc import Sequence
+
+from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
+from rtshcua.model.flat.mission import Plan
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, unproject
+from rtshcua.model.quantity import Dimension, display
+
+_DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
+_MOTIONS = {
+    MotionKind.HOLD: "hold",
+    MotionKind.CLIMB: "climb straight up",
+    MotionKind.FLY: "fly to a point",
+    MotionKind.COVER: "cover a zone",
+    MotionKind.HOME: "return home and land",
+    MotionKind.LAND: "land",
+}
+
+
+def length(mm: int) -> str:
+    """A length."""
+    return display(mm, Dimension.LENGTH)
+
+
+def duration(us: int) -> str:
+    """A duration."""
+    return display(us, Dimension.DURATION)
+
+
+def speed(mm_s: int) -> str:
+    """A speed."""
+    return display(mm_s, Dimension.SPEED)
+
+
+def ratio(parts: int) -> str:
+    """A ratio."""
+    return display(parts, Dimension.RATIO)
+
+
+def quantity(value: int, dimension: str) -> str:
+    """A value of a named dimension; a number alone where the name is of an enumeration."""
+    known = _DIMENSIONS.get(dimension)
+    return str(value) if known is None else display(value, known)
+
+
+def geographic(latitude: int, longitude: int) -> str:
+    """A place in 1e-7 degree."""
+    return f"{_degrees(latitude, 'N', 'S')}, {_degrees(longitude, 'E', 'W')}"
+
+
+def _degrees(value: int, positive: str, negative: str) -> str:
+    whole, part = divmod(abs(value), 10_000_000)
+    return f"{whole}.{f'{part:07d}'.rstrip('0') or '0'} {negative if value < 0 else positive}"
+
+
+def place(policy: Policy, x: int, y: int) -> str:
+    """A place in local mm."""
+    return geographic(*unproject(policy.projection, x, y))
+
+
+def arguments(policy: Policy, parameters: Sequence[Parameter], cells: Sequence[int]) -> str:
+    """Every argument by name, those that the compiler filled in too."""
+    return ", ".join(f"{parameter.name} = {_argument(policy, parameter, cells)}" for parameter in parameters)
+
+
+def _argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
+    value = cells[parameter.cell]
+    if parameter.kind in (CHOICE, ZONE) and not parameter.low <= value <= parameter.high:
+        return f"{value}, out of range"
+    if parameter.kind == CHOICE:
+        return parameter.labels[value]
+    if parameter.kind == ZONE:
+        return policy.zones[value].name
+    if parameter.kind == PLACE:
+        return place(policy, value, cells[parameter.cell + 1])
+    return quantity(value, parameter.dimension)
+
+
+def parameter(policy: Policy, one: Parameter) -> str:
+    """A parameter with its range."""
+    if one.kind == CHOICE:
+        return f"{one.name}: one of {', '.join(one.labels[one.low : one.high + 1])}"
+    if one.kind == ZONE:
+        return f"{one.name}: zone, one of {', '.join(zone.name for zone in policy.zones[one.low : one.high + 1])}"
+    if one.kind == PLACE:
+        return f"{one.name}: position"
+    return f"{one.name}: {one.dimension} in {quantity(one.low, one.dimension)} .. {quantity(one.high, one.dimension)}"
+
+
+def link(policy: Policy, one: Link) -> str:
+    """A link with its arguments and its time."""
+    contract = policy.contracts[one.skill]
+    limit = f" for at most {duration(one.limit_us)}" if one.limit_us else ""
+    return f"{contract.name}({arguments(policy, contract.parameters, one.arguments)}){limit}"
+
+
+def motion(contract: Contract) -> str:
+    """Where a skill takes the vehicle."""
+    return _MOTIONS[MotionKind(contract.motion.kind)]
+
+
+def plan(policy: Policy, one: Plan) -> str:
+    """Where a step takes the vehicle."""
+    points = list(zip(one.path[::2], one.path[1::2], strict=True))
+    parts = [_MOTIONS[MotionKind(one.kind)]]
+    if len(points) == 1:
+        parts.append(f"at {place(policy, *points[0])}")
+    elif points:
+        parts.append(f"along {len(points)} points from {place(policy, *points[0])} to {place(policy, *points[-1])}")
+    if one.altitude:
+        parts.append(f"{length(one.altitude)} above home")
+    if one.kind in (MotionKind.FLY, MotionKind.COVER):
+        parts.append(f"at {speed(one.speed)}" if one.speed else "at the vehicle's own speed")
+    return ", ".join(parts)
+
+
+def zone(policy: Policy, one: Zone) -> str:
+    """A zone's shape and height."""
+    if one.shape == CIRCLE:
+        x, y, squared = one.data
+        shape = f"circle of {length(round(squared**0.5))} around {place(policy, x, y)}"
+    else:
+        shape = f"polygon of {len(one.data) // 2} corners, the first at {place(policy, one.data[0], one.data[1])}"
+    floor = "no floor" if one.floor == LOWEST else f"floor {length(one.floor)}"
+    ceiling = "no ceiling" if one.ceiling == HIGHEST else f"ceiling {length(one.ceiling)} above home"
+    return f"{shape}; {floor}, {ceiling}"
+
+
+def source(kind: int) -> str:
+    """A source of decisions."""
+    return SourceKind(kind).name.lower()

@@ -1,0 +1,109 @@
+"""The UDP link: one peer, the first that proves to be a vehicle; nothing that comes raises."""
+
+import socket
+from collections.abc import Iterator
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Command, Event, Readings, Sent
+from virtual.policy import POLICY
+
+HERE = "127.0.0.1"
+
+
+class Peer:
+    """Somebody who sends."""
+
+    def __init__(self, to: int, system: int = 1) -> None:
+        self.codec = Codec(system, 1)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect((HERE, to))
+        self.socket.settimeout(5)
+
+    def beat(self) -> None:
+        self.send(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+
+    def send(self, message: object) -> None:
+        self.socket.send(self.codec.pack(message))
+
+    def hears(self) -> str:
+        (frame,) = self.codec.parse(self.socket.recv(65_535))
+        return frame.name
+
+
+@pytest.fixture
+def link() -> Iterator[UdpVehicle]:
+    kept: list[tuple[int, bytes]] = []
+    made = UdpVehicle((HERE, 0), Driver(POLICY), SystemClock(), lambda utc_us, frame: kept.append((utc_us, frame)))
+    made.kept = kept  # type: ignore[attr-defined]
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def vehicle(link: UdpVehicle) -> Iterator[Peer]:
+    peer = Peer(link.port)
+    yield peer
+    peer.socket.close()
+
+
+@pytest.fixture
+def stranger(link: UdpVehicle) -> Iterator[Peer]:
+    peer = Peer(link.port, system=1)
+    yield peer
+    peer.socket.close()
+
+
+def poll(link: UdpVehicle) -> list[Event]:
+    now_us = SystemClock().now().monotonic_us
+    return list(link.poll(now_us, 1_000_000))
+
+
+def test_nothing_is_sent_before_a_vehicle_was_heard(link: UdpVehicle, stranger: Peer) -> None:
+    stranger.socket.send(b"\xfd garbage")
+    assert poll(link) == []
+    stranger.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))  # a ground station
+    assert poll(link) == []
+    stranger.socket.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        stranger.socket.recv(100)
+    assert link.kept == []  # type: ignore[attr-defined]
+    with pytest.raises(RuntimeError, match="no vehicle"):
+        link.begin(Command(1, "hover", MotionKind.HOLD, (), (), 0, 0), 0)
+
+
+def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
+    link: UdpVehicle, vehicle: Peer, stranger: Peer
+) -> None:
+    vehicle.beat()
+    poll(link)
+    poll(link)
+    assert vehicle.hears() == "HEARTBEAT"
+    stranger.beat()
+    stranger.send(mavlink.MAVLink_global_position_int_message(0, 1, 1, 1, 1, 0, 0, 0, 0))
+    assert poll(link) == []
+    vehicle.send(mavlink.MAVLink_global_position_int_message(0, 1, 1, 1, 1_234, 0, 0, 0, 0))
+    (readings,) = [event for event in poll(link) if isinstance(event, Readings)]
+    assert (1, 1_234) in readings.values
+
+
+def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
+    vehicle.beat()
+    poll(link)
+    link.begin(Command(9, "hover", MotionKind.HOLD, (), (), 0, 0), SystemClock().now().monotonic_us)
+    vehicle.beat()
+    assert [event.token for event in poll(link) if isinstance(event, Sent)] == [9]
+    kept = [Codec(1, 1).parse(frame)[0].name for _, frame in link.kept]  # type: ignore[attr-defined]
+    assert kept[0] == "HEARTBEAT"
+    assert "COMMAND_LONG" in kept
+
+
+def test_a_busy_port_is_an_os_error(link: UdpVehicle) -> None:
+    with pytest.raises(OSError, match="in use"):
+        UdpVehicle((HERE, link.port), Driver(POLICY), SystemClock(), lambda *_: None)

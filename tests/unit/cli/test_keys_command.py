@@ -1,0 +1,136 @@
+"""`rtshcua keys`: made once, private, never shown."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli import app, keys, unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.untrusted import Untrusted
+
+PASSPHRASE = "correct horse battery"
+
+
+def test_init_makes_a_development_root(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["keys", "init"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "development root" in out
+    for duty in Duty:
+        assert KeyStore(data_folder()).signing_key(duty).kid.hex() in out
+    assert all(line.isprintable() for line in out.splitlines())
+
+
+def test_secrets_are_never_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["init"], ["list"], ["list", "--json"], ["show"], ["show", "--json"]):
+        assert app.main(["keys", *words]) == ExitCode.OK
+    out = capsys.readouterr().out
+    store = KeyStore(data_folder())
+    for duty in Duty:
+        assert store.signing_key(duty).private.private_bytes_raw().hex() not in out
+        assert store.key_path(duty).read_text().splitlines()[3] not in out
+
+
+def test_init_twice_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["keys", "init"]) == ExitCode.OK
+    before = KeyStore(data_folder()).root()
+    assert app.main(["keys", "init"]) == ExitCode.REFUSED
+    assert "keys already" in capsys.readouterr().err
+    assert app.main(["keys", "init", "--if-missing"]) == ExitCode.OK
+    assert KeyStore(data_folder()).root() == before
+
+
+def test_listing_says_what_each_key_is_trusted_for(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init", "--days", "2"])
+    capsys.readouterr()
+    assert app.main(["keys", "list", "--json"]) == ExitCode.OK
+    listed = json.loads(capsys.readouterr().out)
+    assert listed["expires_at_us"] - listed["issued_at_us"] == 2 * 86_400_000_000
+    assert listed["development"] is True
+    assert {key["duty"]: key["roles"] for key in listed["keys"]} == {
+        "root": [], "policy": [], "mission": ["*"], "approval": ["*"], "log": [],
+    }  # fmt: skip
+    assert all(Path(key["file"]).is_file() for key in listed["keys"])
+
+
+def test_show_gives_the_pin(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    capsys.readouterr()
+    assert app.main(["keys", "show"]) == ExitCode.OK
+    assert capsys.readouterr().out.strip() == KeyStore(data_folder()).signing_key(Duty.ROOT).public.hex()
+
+
+@pytest.mark.parametrize("words", [["list"], ["show"]])
+def test_without_keys(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["keys", *words]) == ExitCode.INPUT
+    err = capsys.readouterr().err
+    assert "there are no keys" in err
+    assert " help: `rtshcua keys init` makes a development root" in err
+
+
+def test_a_damaged_root_is_not_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    root = KeyStore(data_folder()).root_path
+    root.write_bytes(root.read_bytes()[:-1] + b"\x00")
+    assert app.main(["keys", "list"]) == ExitCode.UNTRUSTED
+    assert "error: " in capsys.readouterr().err
+
+
+def test_encrypted_keys_from_a_passphrase_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "passphrase"
+    file.write_text(PASSPHRASE + "\n")
+    assert app.main(["keys", "init", "--encrypted", "--passphrase-file", str(file)]) == ExitCode.OK
+    assert "development" not in capsys.readouterr().out
+    store = KeyStore(data_folder())
+    assert unlock.unlock(store, Duty.LOG, passphrase_file=file).duty is Duty.LOG
+    assert unlock.unlock(store, Duty.LOG, path=store.key_path(Duty.LOG), passphrase_file=file).duty is Duty.LOG
+
+
+def test_a_short_passphrase_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "short").write_text("12345678901\n")
+    words = ["keys", "init", "--encrypted", "--passphrase-file", str(tmp_path / "short")]
+    assert app.main(words) == ExitCode.USAGE
+    assert not KeyStore(data_folder()).exists()
+    assert "12 characters" in capsys.readouterr().err
+
+
+def test_without_a_terminal_nobody_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(unlock, "getpass", lambda prompt: pytest.fail("asked"))
+    monkeypatch.setattr(keys, "getpass", lambda prompt: pytest.fail("asked"))
+    assert app.main(["keys", "init", "--encrypted"]) == ExitCode.USAGE
+    (tmp_path / "passphrase").write_text(PASSPHRASE)
+    app.main(["keys", "init", "--encrypted", "--passphrase-file", str(tmp_path / "passphrase")])
+    with pytest.raises(Untrusted) as refused:
+        unlock.unlock(KeyStore(data_folder()), Duty.LOG)
+    assert refused.value.slug == "passphrase-needed"
+
+
+class Terminal:
+    """A standard input that someone sits at."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_at_a_terminal_the_passphrase_is_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", Terminal())
+    typed = iter([PASSPHRASE, "another one, mistyped", PASSPHRASE, PASSPHRASE, PASSPHRASE])
+    for module in (keys, unlock):
+        monkeypatch.setattr(module, "getpass", lambda prompt: next(typed))
+    assert app.main(["keys", "init", "--encrypted"]) == ExitCode.USAGE
+    assert app.main(["keys", "init", "--encrypted"]) == ExitCode.OK
+    assert unlock.unlock(KeyStore(data_folder()), Duty.LOG).duty is Duty.LOG
+
+
+def test_keys_stay_where_only_their_owner_reads(capsys: pytest.CaptureFixture[str]) -> None:
+    before = os.umask(0)
+    try:
+        app.main(["keys", "init"])
+    finally:
+        os.umask(before)
+    folder = KeyStore(data_folder()).folder
+    assert {path.stat().st_mode & 0o077 for path in (folder, *folder.iterdir())} == {0}

@@ -1,0 +1,236 @@
+"""`rtshcua show`: everything that a file says, for a person and for a program."""
+
+import json
+import time
+from base64 import b64encode
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from reference.forgery import edit, flight, other_flight
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli import app
+from rtshcua.cli.showing import words
+from rtshcua.cli.showing.page import Page
+from rtshcua.cli.shown import plain, shorten, utc
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.contract import CHOICE, Parameter
+from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.flat.zone import CIRCLE, Zone
+from rtshcua.wire.bundle import envelopes
+from rtshcua.wire.keys import Duty
+from virtual import case
+
+
+@pytest.fixture
+def bundle(tmp_path: Path) -> Path:
+    path = tmp_path / "x.bundle"
+    path.write_bytes(case.seal(case.mission()))
+    return path
+
+
+def shown(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    assert app.main(["show", str(path)]) == ExitCode.OK
+    return capsys.readouterr().out
+
+
+def test_a_bundle(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = shown(bundle, capsys)
+    policy, mission = case.policy(), case.mission()
+    for rule in policy.rules:
+        assert rule.text in out
+    for zone in policy.zones:
+        assert zone.name in out
+    for signal in policy.signals:
+        assert signal.name in out
+    for phase in mission.phases:
+        assert f"Phase {phase}" in out
+    for contract in policy.contracts:
+        for clause in (*contract.require, *contract.assume, *contract.maintain):
+            assert clause.text in out
+    assert case.KEYS[Duty.POLICY].kid.hex() in out
+    assert case.KEYS[Duty.MISSION].kid.hex() in out
+    assert "not trusted here: there are no keys in " in out
+    assert "inspect_area(area = bridge_a, altitude = 20 m, pattern = grid, speed = 4 m/s)" in out
+    assert max(map(len, out.splitlines())) <= 120
+
+
+def test_every_field_of_a_contract_is_visible_where_nobody_wrote_it(
+    bundle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = shown(bundle, capsys)
+    hover = out[out.index("  hover(") :]
+    for line in (
+        "motion     hold",
+        "class      tactical",
+        "deadline   2 s after release",
+        "valid      for 30 min after issue, in any phase",
+        "lasts      at most 5 min",
+        "grace      500 ms: how long a signal may be unknown while it runs",
+        "assume     nothing",
+        "maintain   nothing",
+        "energy     at most 1 %",
+        "record     decision",
+    ):
+        assert line in hover
+
+
+def test_a_bundle_that_the_key_store_trusts(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = KeyStore(data_folder())
+    store.folder.mkdir(parents=True)
+    store.root_path.write_bytes(case.root(issued_at_us=time.time_ns() // 1000)[1])
+    assert "verified under the development root of your key store" in shown(bundle, capsys)
+
+
+def test_a_step_that_is_held_to_more(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, *others = case.short_steps()
+    tight = replace(first, contract=replace(first.contract, deadline_us=1_000_000), on_inadmissible=OnInadmissible.SKIP)
+    (tmp_path / "x").write_bytes(case.seal(case.mission((tight, *others))))
+    out = shown(tmp_path / "x", capsys)
+    assert "contract   tighter than the skill's in:" in out
+    assert "deadline   1 s after release" in out
+    assert "otherwise  skip" in out
+
+
+def test_a_bundle_as_json(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["show", str(bundle), "--json"]) == ExitCode.OK
+    whole = json.loads(capsys.readouterr().out)
+    assert whole["kind"] == "bundle"
+    assert whole["trusted"] is False
+    assert whole["mission"]["invocations"][0]["contract"]["deadline_us"] == 2_000_000
+    assert whole["policy"]["vehicle"]["identity"] == "quad-07"
+    assert len(whole["mission"]["invocations"][0]["binding"]) == 64
+
+
+def test_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "log.jsonl").write_bytes(b"".join(other_flight()))
+    out = shown(tmp_path, capsys)
+    assert "not verified" in out
+    assert "allow     step 0 `step 0`: admitted" in out
+    assert "· violated" in out
+    assert "closed after 11 records: aborted" in out
+    assert sum("  · dispatched" in line for line in out.splitlines()) == 3
+
+
+def test_a_log_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x").write_bytes(b"".join(flight()))
+    assert app.main(["show", str(tmp_path / "x"), "--json"]) == ExitCode.OK
+    whole = json.loads(capsys.readouterr().out)
+    assert (whole["kind"], whole["verified"], whole["stopped"]) == ("log", False, None)
+    assert [record["seq"] for record in whole["records"]] == list(range(12))
+    assert "bundle" not in whole["records"][0]
+
+
+def test_a_damaged_log_is_shown_as_far_as_it_goes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = list(flight())
+    lines[0] = edit(lines[0], bundle=b64encode(b"no bundle").decode(), before="ab" * 32)
+    lines[3] = lines[3].replace(b'"seq"', b'"\\u0073eq"')
+    (tmp_path / "x").write_bytes(b"".join(lines))
+    out = shown(tmp_path / "x", capsys)
+    assert "allow     step 0: admitted" in out
+    assert "follows" in out
+    assert "The rest is not shown" in out
+    assert "line 4 is no record" in out
+
+
+@pytest.mark.parametrize("link", [-2, 0, 99])
+@pytest.mark.parametrize("kind", [0, 1, 2, 3])
+def test_a_log_may_name_what_its_bundle_has_not(
+    kind: int, link: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = [flight()[0], *(edit(line, kind=kind, step=99, link=link) for line in flight()[2:4])]
+    (tmp_path / "x").write_bytes(b"".join(lines))
+    shown(tmp_path / "x", capsys)
+
+
+def test_a_root_and_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    capsys.readouterr()
+    store = KeyStore(data_folder())
+    root = shown(store.root_path, capsys)
+    for duty in Duty:
+        assert store.signing_key(duty).kid.hex() in root
+    assert "expired" not in root
+    (tmp_path / "old").write_bytes(case.root()[1])
+    assert "(expired)" in shown(tmp_path / "old", capsys)
+    key = shown(store.key_path(Duty.LOG), capsys)
+    assert "Signing key of duty log" in key
+    assert store.signing_key(Duty.LOG).public.hex() in key
+    assert store.signing_key(Duty.LOG).private.private_bytes_raw().hex() not in key
+
+
+def test_an_encrypted_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "passphrase").write_text("correct horse battery")
+    app.main(["keys", "init", "--encrypted", "--passphrase-file", str(tmp_path / "passphrase")])
+    capsys.readouterr()
+    assert "Signing key of duty log, encrypted" in shown(KeyStore(data_folder()).key_path(Duty.LOG), capsys)
+
+
+@pytest.mark.parametrize(
+    ("data", "code"),
+    [
+        (b"", ExitCode.INPUT),
+        (b"mission short {}", ExitCode.INPUT),
+        (b"\x00" * 5000, ExitCode.INPUT),
+        (b"\xd2", ExitCode.INPUT),
+        (b"duty: log\nnonsense", ExitCode.INPUT),
+        (b"duty: cook\n", ExitCode.INPUT),
+        (b"duty: \xff\n", ExitCode.INPUT),
+        (b"\x83nrtshcua/bundle\x01\x80", ExitCode.INPUT),
+        (b"\x83nrtshcua/bundle\x02\x80", ExitCode.UNTRUSTED),
+    ],
+)
+def test_what_cannot_be_shown(data: bytes, code: ExitCode, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x").write_bytes(data)
+    assert app.main(["show", str(tmp_path / "x")]) == code
+    err = capsys.readouterr().err
+    assert err.startswith("error: ")
+    assert "internal fault" not in err
+
+
+def test_a_bundle_that_makes_no_sense(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    policy = case.policy()
+    broken = replace(policy, contingency=tuple(replace(link, skill=99) for link in policy.contingency))
+    (tmp_path / "x").write_bytes(case.seal(case.mission(), broken))
+    assert app.main(["show", str(tmp_path / "x")]) == ExitCode.INPUT
+    assert "makes no sense" in capsys.readouterr().err
+
+
+def test_envelopes_of_other_kinds_are_not_shown_as_roots(bundle: Path, tmp_path: Path) -> None:
+    (tmp_path / "policy").write_bytes(envelopes(bundle.read_bytes())[0])
+    assert app.main(["show", str(tmp_path / "policy")]) == ExitCode.INPUT
+
+
+def test_words_of_what_is_out_of_range() -> None:
+    choice = Parameter("pattern", CHOICE, "", 0, 0, 1, ("grid", "orbit"))
+    assert words.arguments(case.policy(), (choice,), (7,)) == "pattern = 7, out of range"
+
+
+def test_words_of_places_and_zones() -> None:
+    assert words.geographic(-473_977_400, 5) == "47.39774 S, 0.0000005 E"
+    assert words.geographic(0, -1_800_000_000) == "0.0 N, 180.0 W"
+    round_zone = Zone("z", CIRCLE, 0, 60_000, (0, 0, 80_000**2))
+    assert words.zone(case.policy(), round_zone).startswith("circle of 80 m around ")
+    assert words.zone(case.policy(), round_zone).endswith("; floor 0 m, ceiling 60 m above home")
+
+
+def test_pages_wrap_beneath_themselves() -> None:
+    page = Page(bold=True)
+    page.head("title")
+    page.rows("name", ["word " * 40, "second"])
+    page.rows("nothing", [])
+    lines = str(page).splitlines()
+    assert lines[0] == "\033[1mtitle\033[0m"
+    assert lines[1].startswith("  name")
+    assert all(line.startswith(" " * 16) for line in lines[2:])
+
+
+def test_text_from_elsewhere() -> None:
+    assert plain("a\tb\x00é°") == "a\\tb\\x00é°"
+    assert shorten("abcdef", 4) == "abc…"
+    assert shorten("abcd", 4) == "abcd"
+    assert utc(0) == "1970-01-01 00:00:00Z"
+    assert utc(-1) == "-1 us"
+    assert utc(1 << 60) == f"{1 << 60} us"

@@ -1,0 +1,78 @@
+"""What compiles can fly: in good conditions each step is allowed where its predecessor ended."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.ground.compiler.program import compile_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.outcome import Outcome
+from rtshcua.wire.binding import bind
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+MISSIONS = sorted(path.stem for path in (CHECKOUT / "missions").glob("*.rts"))
+AT = 1_700_000_000_000_000
+GOOD = {"battery": 9_500, "wind.speed": 1_000, "link.quality": 9_000, "obstacle.distance": 50_000, "gps.fix": 3}
+
+
+def flat(name: str) -> tuple[Policy, Mission]:
+    program = load([str(CHECKOUT / "missions" / f"{name}.rts")], lambda path: Path(path).read_bytes(), str(CHECKOUT))
+    compiled = compile_program(program, dialect.load(), mission=None, issued_at_us=AT)
+    assert compiled.policy is not None
+    assert compiled.mission is not None
+    return compiled.policy, bind(compiled.mission, bytes(32))
+
+
+def flown(policy: Policy, mission: Mission, conditions: dict[str, int]) -> list[Decision]:
+    """The decision on each step, the vehicle being where the step before it was planned to end."""
+    prepared = prepare(policy)
+    assert isinstance(prepared, PreparedPolicy), prepared
+    steps = prepare_mission(mission, prepared)
+    approvals = tuple(Approval(n, rule.approver, 1, 0) for n, rule in enumerate(policy.rules) if rule.approver >= 0)
+    x, y, height = 0, 0, 0
+    decisions: list[Decision] = []
+    for step in steps:
+        invocation = step.invocation
+        values: list[int | None] = [None] * policy.slots
+        for signal in policy.signals:
+            values[signal.slot] = conditions.get(signal.name)
+            if signal.name == "landed":
+                values[signal.slot] = 2 if height else 1
+        values[policy.vehicle.position : policy.vehicle.position + 2] = [x, y]
+        values[policy.vehicle.height] = height
+        state = State(tuple(values), (0,) * policy.slots)
+        context = Context(
+            invocation.binding, policy.vehicle.identity, policy.version, 0, 0, invocation.phase, 1_000, approvals
+        )
+        decisions.append(decide(step, state, prepared, context, Now(0, AT + 1, 0)))
+        plan = invocation.plan
+        if plan.path:
+            x, y = plan.path[-2:]
+        if plan.kind != MotionKind.HOLD:
+            height = plan.altitude
+    return decisions
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_in_good_conditions_every_step_is_allowed(name: str) -> None:
+    policy, mission = flat(name)
+    decisions = flown(policy, mission, GOOD)
+    assert [(each.outcome, each.reason) for each in decisions if each.outcome is not Outcome.ALLOW] == []
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_a_low_battery_ends_every_step_in_a_link_that_the_proofs_know(name: str) -> None:
+    policy, mission = flat(name)
+    for decision in flown(policy, mission, {**GOOD, "battery": 2_000}):
+        assert decision.outcome in (Outcome.FALLBACK, Outcome.ALLOW)
+        if decision.outcome is Outcome.FALLBACK:
+            assert decision.target is not None
+            assert policy.contracts[decision.target.skill].name == "return_home"

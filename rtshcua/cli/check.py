@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.cli.findings import Findings
+from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.sources import check_sources
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -22,7 +22,7 @@ def check(
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
     found, sources = check_sources(paths)
     if findings.report(found, sources):
-        return findings.finish(ExitCode.DIAGNOSTICS)
+        return findings.finish(exit_code(found))
     if not as_json:
         print(f"no errors in {len(sources)} file{'s' * (len(sources) > 1)}")
     return findings.finish(ExitCode.OK)

@@ -12,7 +12,7 @@ import typer
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.faults import fail
-from rtshcua.cli.findings import Findings
+from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -42,13 +42,20 @@ def compile(
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
     """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors."""
+    sources_given = [source, *(with_ or [])]
     issued_at = _moment(at)
     if issued_at is None:
         return fail(ExitCode.USAGE, f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
-    compiled, sources = compile_sources([source, *(with_ or [])], mission=mission, issued_at_us=issued_at)
+    target = output or source.with_suffix(".bundle")
+    if not target.parent.is_dir():
+        return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
+    if target.exists() and (not target.is_file() or any(_same(target, each) for each in sources_given)):
+        what = "one of the sources" if target.is_file() else "no regular file"
+        return findings.refuse(ExitCode.USAGE, "output", f"`{target}` is {what}, and is not replaced by a bundle")
+    compiled, sources = compile_sources(sources_given, mission=mission, issued_at_us=issued_at)
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
-        return findings.finish(ExitCode.DIAGNOSTICS)
+        return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
     try:
         signers = (
@@ -59,7 +66,6 @@ def compile(
     except Untrusted as error:
         help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
         return findings.refuse(ExitCode.UNTRUSTED, error.slug, str(error), help)
-    target = output or source.with_suffix(".bundle")
     _replace(target, data)
     if not as_json:
         print(_told(compiled.policy, compiled.mission, target))
@@ -80,9 +86,12 @@ def _moment(text: str | None) -> int | None:
     return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
 
 
+def _same(one: Path, other: Path) -> bool:
+    return other.exists() and one.samefile(other)
+
+
 def _replace(target: Path, data: bytes) -> None:
     """Write the whole bundle or nothing: a full disk leaves no half of one under its name."""
-    target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as file:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rtshcua.cli.faults import fail, say
-from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.render import render
@@ -15,6 +15,9 @@ from rtshcua.diagnostics.serialise import as_json
 from rtshcua.diagnostics.span import Source
 
 _BOLD, _RED, _YELLOW, _BLUE, _CYAN, _END = "\033[1m", "\033[1;31m", "\033[1;33m", "\033[1;34m", "\033[36m", "\033[0m"
+
+#: findings on a file as a whole; where it was asked for itself, they have no span
+_UNREADABLE = (NO_SUCH_FILE, TOO_LARGE)
 
 
 class Findings:
@@ -47,6 +50,12 @@ class Findings:
         if self._json:
             print(json.dumps(self._object | {"exit": code.slug} | result, indent=2, ensure_ascii=False))
         return code
+
+
+def exit_code(found: Iterable[Diagnostic]) -> ExitCode:
+    """How a command ends that cannot go on: INPUT where a file that was asked for is none that can be read."""
+    unreadable = any(each.code in _UNREADABLE and each.span is None for each in found)
+    return ExitCode.INPUT if unreadable else ExitCode.DIAGNOSTICS
 
 
 def _count(found: tuple[Diagnostic, ...]) -> str:

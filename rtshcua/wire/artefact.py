@@ -23,7 +23,7 @@ def unwrap(artefact: Artefact, data: bytes) -> Value:
     try:
         value = cbor.decode(data)
     except CborError as error:
-        raise ArtefactError("malformed", f"not canonical CBOR: {error}") from None
+        raise ArtefactError("malformed", f"this is no `{artefact.name}`: not canonical CBOR: {error}") from None
     match value:
         case (str(name), int(version), body) if type(version) is int:
             if name != artefact.name:
@@ -34,4 +34,4 @@ def unwrap(artefact: Artefact, data: bytes) -> Value:
                     f"`{name}` version {version} is unknown here; only version {artefact.version} is read",
                 )
             return body
-    raise ArtefactError("malformed", "not an array of format name, version and body")
+    raise ArtefactError("malformed", f"this is no `{artefact.name}`: not an array of format name, version and body")

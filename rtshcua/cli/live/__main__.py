@@ -31,7 +31,7 @@ def main() -> int:
         else:
             _print(as_json if sys.argv[1] == "json" else plain)
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError:  # the reader left, or the disk that the output goes to is full
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or exiting would fail on it again
         return EXIT_GONE
     return EXIT_OK

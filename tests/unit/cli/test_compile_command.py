@@ -118,21 +118,23 @@ def test_the_schema_is_valid_and_takes_what_ships(checkout: Path, capsys: pytest
 
 
 @pytest.mark.parametrize(
-    ("content", "name"),
+    ("content", "name", "code"),
     [
-        (b"", "empty.rts"),
-        (b"\0\1\2\xff" * 100, "binary.rts"),
-        (b"mission {" * 50, "nonsense.rts"),
-        (b"(" * 100_000, "deep.rts"),
-        (b"[" * 100_000, "deep.json"),
-        (b"{", "cut.json"),
-        (b"\xff\xfe", "utf16.json"),
-        (b"//" + b"x" * (9 << 20), "huge.rts"),
+        (b"", "empty.rts", ExitCode.DIAGNOSTICS),
+        (b"\0\1\2\xff" * 100, "binary.rts", ExitCode.DIAGNOSTICS),
+        (b"mission {" * 50, "nonsense.rts", ExitCode.DIAGNOSTICS),
+        (b"(" * 100_000, "deep.rts", ExitCode.DIAGNOSTICS),
+        (b"[" * 100_000, "deep.json", ExitCode.DIAGNOSTICS),
+        (b"{", "cut.json", ExitCode.DIAGNOSTICS),
+        (b"\xff\xfe", "utf16.json", ExitCode.DIAGNOSTICS),
+        (b"//" + b"x" * (9 << 20), "huge.rts", ExitCode.INPUT),
     ],
 )
-def test_sources_that_are_none(here: Path, capsys: pytest.CaptureFixture[str], content: bytes, name: str) -> None:
+def test_sources_that_are_none(
+    here: Path, capsys: pytest.CaptureFixture[str], content: bytes, name: str, code: ExitCode
+) -> None:
     (here / name).write_bytes(content)
-    assert main(["compile", name]) == ExitCode.DIAGNOSTICS
+    assert main(["compile", name]) == code
     said = capsys.readouterr()
     assert "error[E" in said.err
     assert "Traceback" not in said.err
@@ -140,8 +142,19 @@ def test_sources_that_are_none(here: Path, capsys: pytest.CaptureFixture[str], c
 
 
 def test_a_missing_source(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compile", "nowhere.rts"]) == ExitCode.DIAGNOSTICS
+    assert main(["compile", "nowhere.rts"]) == ExitCode.INPUT
+    assert main(["check", "nowhere.rts"]) == ExitCode.INPUT
     assert "nowhere.rts" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("target", ["source.rts", ".", "/dev/null", "nowhere/x.bundle"])
+def test_what_a_bundle_must_not_replace(checkout: Path, here: Path, target: str) -> None:
+    source = (checkout / "missions" / "short.rts").read_bytes()
+    (here / "source.rts").write_bytes(source)
+    assert main(["compile", "source.rts", "-o", target]) in {ExitCode.USAGE, ExitCode.INPUT}
+    assert (here / "source.rts").read_bytes() == source
+    assert names(here) == ["source.rts"]
+    assert Path("/dev/null").is_char_device()
 
 
 def test_a_key_of_the_wrong_duty_signs_nothing(checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:

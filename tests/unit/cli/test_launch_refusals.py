@@ -1,0 +1,39 @@
+"""What `run` refuses between loading a bundle and flying it."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from msgspec.structs import replace
+
+TESTS = str(Path(__file__).resolve().parents[2])
+if TESTS not in sys.path:
+    sys.path.insert(0, TESTS)
+
+from reference.flat_case import MISSION, POLICY  # noqa: E402  needs the path above
+from reference.world import VEHICLE, loaded  # noqa: E402
+from rtshcua.adapters.clock import SystemClock  # noqa: E402
+from rtshcua.adapters.files.replay import FileReplayStore  # noqa: E402
+from rtshcua.cli import launch  # noqa: E402
+from rtshcua.diagnostics.exits import ExitCode  # noqa: E402
+from rtshcua.model.flat.signal import SignalSource  # noqa: E402
+
+LATER = 1 << 52  # us
+
+
+def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
+    FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
+    order: Any = SimpleNamespace(state=tmp_path)
+    with pytest.raises(launch.Refused, match="a later version of `bridge_inspection` than 7") as refused:
+        launch._opened_before(order, loaded(), cast("Any", None), SystemClock(), [])
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "old-policy")
+
+
+def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
+    (first, *others) = POLICY.signals
+    signals = (replace(first, sources=(SignalSource("BATTERY_STATUS", ("nope",), 1, 1, ()),)), *others)
+    with pytest.raises(launch.Refused, match=r"`BATTERY_STATUS\.nope`") as refused:
+        launch._driver(loaded(replace(POLICY, signals=signals), MISSION), 1)
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "unknown-source")

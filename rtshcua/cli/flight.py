@@ -46,7 +46,9 @@ _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
 
 _LANDING = "interrupted: it falls back and lands first, and the log is closed then"
-_KNOWING = "it is on its way down; Ctrl-C once more within 3 s stops watching, and closes the log at once"
+_KNOWING = (
+    "it is brought down; Ctrl-C once more within 3 s tells it to land where it is, stops watching, and closes the log"
+)
 
 
 class Flight:
@@ -117,7 +119,8 @@ class Flight:
                 case Wish.KNOW:
                     self._feed.post(Note(_KNOWING))
                 case Wish.LEAVE:
-                    return self._leave()
+                    self._runtime.leave()
+                    return loop.turn(also) or self._leave()
                 case None:
                     pass
             ending = loop.turn(also)
@@ -134,13 +137,14 @@ class Flight:
         return events
 
     def _leave(self) -> Ending:
-        """Stop watching: send nothing more, and say so in the log."""
+        """Stop watching, after the vehicle was told to come down, if it could be told; say so in the log."""
         now = self._clock.now()
+        told = "it was told to come down" if self._runtime.homeward else "it could not be told to come down"
         self._vehicle.release()
-        line = self._recorder.effect(now, "left", detail="the operator stopped watching; nothing more is sent")
+        line = self._recorder.effect(now, "left", detail=f"the operator stopped watching; {told}; nothing more is sent")
         with suppress(OSError):
             self._sink.append(line, True)
-        self._feed.post(Note("left: the vehicle lands by itself"))
+        self._feed.post(Note(f"left: {told}; nothing more is sent"))
         return Ending.INTERRUPTED
 
     def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:

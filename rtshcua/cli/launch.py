@@ -15,6 +15,7 @@ from rtshcua.adapters.files.runs import RunFolder
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated
 from rtshcua.cli.flight import Flight
@@ -24,7 +25,7 @@ from rtshcua.cli.tape import Tape
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
-from rtshcua.onboard.ports import Event
+from rtshcua.onboard.ports import Event, Opening
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
 from rtshcua.wire.keys import Duty, SigningKey
@@ -86,7 +87,7 @@ def launch(order: Launch) -> ExitCode:
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
             slack = max(1, round(order.speed / _UNHURRIED))
-            vehicle = _listen(order, Driver(loaded.bundle.policy, slack), clock, tape)
+            vehicle = _listen(order, _driver(loaded, slack), clock, tape)
             stack.callback(vehicle.close)
             if order.link is None:
                 stack.enter_context(_simulate(order, loaded, vehicle.port))
@@ -142,6 +143,13 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     return loaded
 
 
+def _driver(loaded: Loaded, slack: int) -> Driver:
+    try:
+        return Driver(loaded.bundle.policy, slack)
+    except UnknownSource as error:
+        raise Refused(ExitCode.REFUSED, "unknown-source", str(error)) from None
+
+
 def _listen(order: Launch, driver: Driver, clock: LinkClock, tape: Tape) -> UdpVehicle:
     host, port = (_LOOPBACK, 0) if order.link is None else (order.link.host, order.link.port)
     try:
@@ -185,8 +193,16 @@ def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: Li
     Then a run of it broke off up there: nothing of the mission is flown again, but the contingency brings it down.
     """
     store = FileReplayStore(order.state, loaded.vehicle)
-    if store.open_once(loaded.bundle.digest, loaded.expires_us, clock.now().utc_us):
+    policy = loaded.bundle.policy
+    opening = store.open_once(
+        loaded.bundle.mission_digest, loaded.expires_us, clock.now().utc_us, policy.name, policy.version
+    )
+    if opening is Opening.OPENED:
         return False
+    if opening is Opening.OLD_POLICY:
+        text = f"a later version of `{policy.name}` than {policy.version} was in force on `{loaded.vehicle}`"
+        help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
+        raise Refused(ExitCode.REFUSED, opening, text, help)
     seen = vehicle.driver.seen
     until_s = time.monotonic() + AIR_S
     while not seen.landed_state and time.monotonic() < until_s:
@@ -194,4 +210,4 @@ def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: Li
     if seen.airborne:
         return True
     text = f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
-    raise Refused(ExitCode.REFUSED, "replayed", text, "compile the mission again, which issues it anew")
+    raise Refused(ExitCode.REFUSED, opening, text, "compile the mission again, which issues it anew")

@@ -56,6 +56,8 @@ def run(
     own = connect is None
     if not own and words:
         return fail(ExitCode.USAGE, "options of the simulated vehicle do not go with `--connect`", _SIM_HELP)
+    if not own and vehicle is None:
+        return fail(ExitCode.USAGE, "`--connect` needs `--vehicle`: which vehicle is it?", _VEHICLE_HELP)
     if fresh_state and (state_dir is not None or not own):
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     try:
@@ -91,6 +93,7 @@ def run(
             return _say(refused, as_json=as_json)
 
 
+_VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
 
 

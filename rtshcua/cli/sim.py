@@ -58,7 +58,7 @@ def sim(
             print(json.dumps(ready), flush=True)
         else:
             print(f"a simulated {ready['flavour']} vehicle, system {ready['system']}, sends to udp port {port}")
-            print(f"  fly it   rtshcua run BUNDLE --connect udpin:127.0.0.1:{port}")
+            print(f"  fly it   rtshcua run BUNDLE --connect udpin:127.0.0.1:{port} --vehicle IDENTITY")
             print("  end it   Ctrl-C", flush=True)
         try:
             code = vehicle.wait()

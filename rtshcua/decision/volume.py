@@ -80,9 +80,11 @@ class Planner:
             return self._leg[1], self._leg[2]
         left, bottom, right, top = self._error
         leg = Sweep((west, south, *self._path[:2]), (left, bottom, right + east - west, top + north - south))
-        nearest = _distance(_clamp(0, west, east), _clamp(0, south, north))
-        farthest = _distance(max(abs(west), abs(east)), max(abs(south), abs(north)))
-        span = (max(nearest, self._distance), max(farthest, self._distance))
+        farthest = max(_distance(max(abs(west), abs(east)), max(abs(south), abs(north))), self._distance)
+        nearest = farthest
+        if west != east or south != north:
+            nearest = max(_distance(_clamp(0, west, east), _clamp(0, south, north)), self._distance)
+        span = (nearest, farthest)
         self._leg = (key, leg, span)
         return leg, span
 

@@ -9,7 +9,6 @@ Bounds for 64-bit arithmetic: coordinates and box sides within 2**29 mm (`MAX_CO
 2**30, cross products within 2**61 and their sums with the box's within 2**62.
 """
 
-from collections.abc import Iterator
 from math import isqrt
 from typing import TypeAlias
 
@@ -20,6 +19,8 @@ from rtshcua.model.flat.zone import CIRCLE, Zone
 Box: TypeAlias = tuple[int, int, int, int]
 #: x0, y0, x1, y1 and the bounding box west, east, south, north
 Edge: TypeAlias = tuple[int, int, int, int, int, int, int, int]
+#: x0, y0, x1, y1
+Leg: TypeAlias = tuple[int, int, int, int]
 
 NO_BOX: Box = (0, 0, 0, 0)
 FEW_EDGES = 16
@@ -42,12 +43,18 @@ class Circle:
     def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
         """Whether the widened leg is wholly inside, or wholly outside by a margin of at most 3 mm."""
         west, south, east, north = box
-        corners = [(x + dx, y + dy) for x, y in ((x0, y0), (x1, y1)) for dx in (west, east) for dy in (south, north)]
-        if all(self.contains(x, y) for x, y in corners):
-            return True  # a disc is convex
         reach_x, reach_y = max(-west, east), max(-south, north)
-        radius = self._radius + isqrt(reach_x * reach_x + reach_y * reach_y) + 1
-        return self._outside(x0, y0, x1, y1, radius)
+        reach = self._radius + isqrt(reach_x * reach_x + reach_y * reach_y) + 1
+        if self._outside(x0, y0, x1, y1, reach):
+            return True
+        return self._holds(x0, y0, box) and self._holds(x1, y1, box)  # a disc is convex
+
+    def _holds(self, x: int, y: int, box: Box) -> bool:
+        """Whether a widened place is inside: its corner farthest from the centre is."""
+        west, south, east, north = box
+        dx = max(abs(x + west - self._x), abs(x + east - self._x))
+        dy = max(abs(y + south - self._y), abs(y + north - self._y))
+        return dx * dx + dy * dy < self._square
 
     def _outside(self, x0: int, y0: int, x1: int, y1: int, radius: int) -> bool:
         """Whether the leg keeps further than `radius` from the centre; its length is rounded up, for safety."""
@@ -97,41 +104,31 @@ class Polygon:
 
     def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
         """Whether no edge meets the widened leg: each is parted from it by a line (separating axes)."""
-        ux, uy = x1 - x0, y1 - y0
-        west, east = min(x0, x1) + box[0], max(x0, x1) + box[2]
-        south, north = min(y0, y1) + box[1], max(y0, y1) + box[3]
-        least, most = _across(ux, uy, box)
-        for ax, ay, bx, by, edge_west, edge_east, edge_south, edge_north in self._near(south, north):
-            if edge_east < west or edge_west > east or edge_north < south or edge_south > north:
-                continue
-            a, b = ux * (ay - y0) - uy * (ax - x0), ux * (by - y0) - uy * (bx - x0)
-            if (a > most and b > most) or (a < least and b < least):
-                continue
-            vx, vy = bx - ax, by - ay
-            a, b = vx * (y0 - ay) - vy * (x0 - ax), vx * (y1 - ay) - vy * (x1 - ax)
-            low, high = _across(vx, vy, box)
-            if (a + low > 0 and b + low > 0) or (a + high < 0 and b + high < 0):
-                continue
-            return False
-        return True
-
-    def _near(self, south: int, north: int) -> Iterator[Edge]:
-        """The edges of every band that reaches into `south`..`north`; one that spans bands comes once for each."""
+        west, east = (x0, x1) if x0 < x1 else (x1, x0)
+        south, north = (y0, y1) if y0 < y1 else (y1, y0)
+        west, south, east, north = west + box[0], south + box[1], east + box[2], north + box[3]
         first, last = max(self._band(south), 0), min(self._band(north), len(self._bands) - 1)
-        for band in self._bands[first : last + 1]:
-            yield from band
+        for band in self._bands[first : last + 1]:  # an edge that spans bands comes once for each
+            for ax, ay, bx, by, edge_west, edge_east, edge_south, edge_north in band:
+                if edge_east < west or edge_west > east or edge_north < south or edge_south > north:
+                    continue
+                edge, leg = (ax, ay, bx, by), (x0, y0, x1, y1)
+                if not _parted(x1 - x0, y1 - y0, edge, leg, box) and not _parted(bx - ax, by - ay, edge, leg, box):
+                    return False
+        return True
 
 
 def _edge(x0: int, y0: int, x1: int, y1: int) -> Edge:
     return (x0, y0, x1, y1, min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1))
 
 
-def _across(x: int, y: int, box: Box) -> tuple[int, int]:
-    """The least and the most of the cross product of (x, y) with a place of the box."""
+def _parted(x: int, y: int, edge: Leg, leg: Leg, box: Box) -> bool:
+    """Whether a line in the direction (x, y) parts an edge from a widened leg: their cross products do not overlap."""
     west, south, east, north = box
+    a, b, c, d = x * edge[1] - y * edge[0], x * edge[3] - y * edge[2], x * leg[1] - y * leg[0], x * leg[3] - y * leg[2]
     least = (x * south if x > 0 else x * north) - (y * east if y > 0 else y * west)
     most = (x * north if x > 0 else x * south) - (y * west if y > 0 else y * east)
-    return least, most
+    return max(a, b) < min(c, d) + least or min(a, b) > max(c, d) + most
 
 
 class PreparedZone:

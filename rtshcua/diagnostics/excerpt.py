@@ -21,7 +21,7 @@ def excerpt(source: Source, number: int, marks: Sequence[tuple[Span, str, str]])
     text = source.line(number)
     cells = [_cell(character) for character in text]
     starts = [0]
-    for shown, width in cells:
+    for _, width in cells:
         starts.append(starts[-1] + (width if width >= 0 else TAB_WIDTH - starts[-1] % TAB_WIDTH))
     offset = marks[0][0].start - (source.position(marks[0][0].start).column - 1)
     columns = [(min(max(span.start - offset, 0), len(text)), min(span.end - offset, len(text))) for span, _, _ in marks]

@@ -236,9 +236,17 @@ class EvidenceSink(Protocol):
         ...
 
 
-class ReplayStore(Protocol):
-    """Which bundles were opened on this vehicle, synced to disk before anything of them flies."""
+class Opening(StrEnum):
+    """What became of opening a mission on a vehicle."""
 
-    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int) -> bool:
-        """False when the bundle was opened before (also by a run that crashed)."""
+    OPENED = "opened"
+    REPLAYED = "replayed"  # opened before, also by a run that crashed; or it might have been
+    OLD_POLICY = "old-policy"  # a higher version of its policy was in force there
+
+
+class ReplayStore(Protocol):
+    """Which missions were opened on this vehicle, and the versions of their policies: on disk before any flies."""
+
+    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
+        """Open the mission of this digest, under a version of a policy."""
         ...

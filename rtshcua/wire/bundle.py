@@ -36,11 +36,15 @@ class BundleError(Untrusted):
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """A verified bundle: its parts, the digests that name them, and the keys that signed them."""
+    """A verified bundle: its parts, the digests that name them, and the keys that signed them.
+
+    `mission_digest` names what flies once: another envelope around the same signed mission is not another mission.
+    """
 
     policy: Policy
     mission: Mission
     policy_digest: bytes
+    mission_digest: bytes
     digest: bytes
     policy_key: VerificationKey
     mission_key: VerificationKey
@@ -82,8 +86,15 @@ def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: in
     signed_mission = _open(second, root, Duty.MISSION, names.MISSION)
     policy = parse(names.POLICY, signed_policy.payload, Policy)
     mission = parse(names.MISSION, signed_mission.payload, Mission)
-    named = policy_digest(signed_policy.payload)
-    bundle = Bundle(policy, mission, named, digest.digest(digest.BUNDLE, data), signed_policy.key, signed_mission.key)
+    bundle = Bundle(
+        policy,
+        mission,
+        policy_digest=policy_digest(signed_policy.payload),
+        mission_digest=digest.digest(digest.MISSION, signed_mission.payload),
+        digest=digest.digest(digest.BUNDLE, data),
+        policy_key=signed_policy.key,
+        mission_key=signed_mission.key,
+    )
     _check_belonging(bundle)
     _check_entitled(bundle, policy.vehicle.identity if vehicle is None else vehicle, now_us)
     return bundle

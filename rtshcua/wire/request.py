@@ -12,7 +12,7 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.model.flat.limits import MAX_SLOTS, MAX_STALE, MAX_VALUE
+from rtshcua.model.flat.limits import MAX_STALE, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, names
 from rtshcua.wire.digest import DIGEST_BYTES

@@ -20,7 +20,7 @@ def test_an_admitted_step_is_denied_the_second_time() -> None:
 
 def test_a_step_that_was_flown_does_not_come_back_later() -> None:
     run = Run().until_flies("inspect_area")
-    answer = answer_to(run.loaded, request_for(run.loaded, step=1))
+    answer = answer_to(run.loaded, request_for(run.loaded, step=1, now=run.clock.now()))
     assert isinstance(answer, Answer)
     assert answer.reason is Reason.REPLAYED
 

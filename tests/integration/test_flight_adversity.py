@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+IDENTITY = ("--vehicle", "quad-07")
+
 
 def closed(run: Any, ending: str) -> None:
     """The log is whole, and was closed with this ending."""
@@ -49,6 +51,7 @@ def test_three_stops_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
     assert run.end().code == 130
     closed(run, "interrupted")
     assert run.effects()[-1] == "left"
+    assert run.dispatched()[-1] in ("return_home", "emergency_land"), "it is told to come down before it is left"
 
 
 def test_a_pilot_takes_over(ground: Any) -> None:
@@ -154,7 +157,7 @@ def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
     relay = Relay(port)
     relay.start()
     ground.start("sim", "--port", str(relay.port), "--speed", "20", "--json").until("ready")
-    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}").end()
+    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY).end()
     assert run.code == 0, run.stderr
     closed(run, "completed")
     assert relay.added > 1_000
@@ -163,7 +166,7 @@ def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
 def test_a_run_that_was_killed_in_the_air_comes_down_and_does_not_resume(ground: Any, port: int) -> None:
     ground.start("sim", "--port", str(port), "--speed", "20", "--json").until("ready")
     bundle = ground.bundle()
-    words = ("--connect", f"udpin:127.0.0.1:{port}")
+    words = ("--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     first = ground.run(bundle, *words)
     first.until("dispatched", step=1)
     first.process.kill()
@@ -182,7 +185,7 @@ def test_sim_serves_a_run_and_ends_cleanly(ground: Any, port: int, flavour: str)
     )
     ready = vehicle.until("ready")
     assert (ready["flavour"], ready["peer"]) == (flavour, port)
-    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", speed=50).end()
+    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY, speed=50).end()
     assert run.code == 0, run.stderr
     vehicle.signal(signal.SIGINT)
     assert vehicle.end().code == 0

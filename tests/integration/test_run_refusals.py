@@ -11,6 +11,8 @@ import pytest
 from rtshcua.cli import launch
 from rtshcua.cli.app import main
 
+IDENTITY = ("--vehicle", "quad-07")
+
 
 @pytest.fixture(autouse=True)
 def here(ground: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -31,7 +33,7 @@ def refused(capfd: Any, *words: str) -> tuple[int, str]:
 
 
 def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:
-    code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}")
+    code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert code == 8
     assert "no heartbeat of a vehicle" in err
     assert "rtshcua sim" in err
@@ -40,7 +42,7 @@ def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:
 
 def test_no_vehicle_leaves_the_bundle_unopened(ground: Any, capfd: Any, port: int) -> None:
     bundle = ground.bundle()
-    refused(capfd, bundle, "--connect", f"udpin:127.0.0.1:{port}")
+    refused(capfd, bundle, "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert not (ground.store.folder.parent / "state").exists()
 
 
@@ -48,18 +50,18 @@ def test_a_busy_port(ground: Any, capfd: Any) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         busy = other.getsockname()[1]
-        code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{busy}")
+        code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{busy}", *IDENTITY)
     assert code == 8
     assert f"cannot listen at udp 127.0.0.1:{busy}: address already in use" in err
 
 
 def test_an_address_that_is_not_ours(ground: Any, capfd: Any) -> None:
-    assert refused(capfd, ground.bundle(), "--connect", "udpin:203.0.113.7:14550")[0] == 8
+    assert refused(capfd, ground.bundle(), "--connect", "udpin:203.0.113.7:14550", *IDENTITY)[0] == 8
 
 
 @pytest.mark.parametrize("text", ["udpin:127.0.0.1", "14550", "udpin:host:99999", "udpout:127.0.0.1:14550", "tcp:a:1"])
 def test_an_address_that_is_none(ground: Any, capfd: Any, text: str) -> None:
-    assert refused(capfd, ground.bundle(), "--connect", text)[0] == 2
+    assert refused(capfd, ground.bundle(), "--connect", text, *IDENTITY)[0] == 2
 
 
 def test_any_changed_byte_is_untrusted(ground: Any, capfd: Any) -> None:
@@ -99,16 +101,16 @@ def test_another_vehicle(ground: Any, capfd: Any) -> None:
 
 
 def test_mode_none_with_another_vehicle(ground: Any, capfd: Any, port: int) -> None:
-    code, err = refused(capfd, ground.bundle(), "--mode", "none", "--connect", f"udpin:127.0.0.1:{port}")
+    code, err = refused(capfd, ground.bundle(), "--mode", "none", "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert code == 5
     assert "mode `none`" in err
 
 
 def test_options_that_do_not_go_together(ground: Any, capfd: Any) -> None:
     for words in (
-        ["--connect", "udpin:127.0.0.1:14550", "--battery", "50"],
-        ["--connect", "udpin:127.0.0.1:14550", "--fresh-state"],
-        ["--connect", "udpin:0.0.0.0:14550", "--speed", "2"],
+        ["--connect", "udpin:127.0.0.1:14550", *IDENTITY, "--battery", "50"],
+        ["--connect", "udpin:127.0.0.1:14550", *IDENTITY, "--fresh-state"],
+        ["--connect", "udpin:0.0.0.0:14550", *IDENTITY, "--speed", "2"],
         ["--state-dir", "state", "--fresh-state"],
         ["--battery", "101"],
         ["--fault", "meteor,at=3s"],
@@ -132,3 +134,14 @@ def test_a_simulated_vehicle_that_cannot_start(ground: Any, capfd: Any, monkeypa
     code, err = refused(capfd, ground.bundle())
     assert code == 8
     assert "the simulated vehicle did not start: " in err
+
+
+def test_another_vehicle_is_to_be_named(ground: Any, capfd: Any, port: int) -> None:
+    code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}")
+    assert code == 2
+    assert "`--connect` needs `--vehicle`" in err
+
+
+def test_a_bundle_for_another_vehicle_than_the_one_connected(ground: Any, capfd: Any, port: int) -> None:
+    code, _ = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-08")
+    assert code == 5

@@ -65,7 +65,15 @@ def clause(text: str, code: Code) -> Clause:
 
 BATTERY, HEIGHT, WIND, LINK, FIX, POSITION_X, POSITION_Y, OBSTACLE, SLOTS = range(9)
 SIGNALS = (
-    Signal("battery", BATTERY, NUMBER, "ratio", 5 * S, (), (SignalSource("BATTERY_STATUS", ("x",), 100, 1, (-1,)),)),
+    Signal(
+        "battery",
+        BATTERY,
+        NUMBER,
+        "ratio",
+        5 * S,
+        (),
+        (SignalSource("BATTERY_STATUS", ("battery_remaining",), 100, 1, (-1,)),),
+    ),
     Signal("height", HEIGHT, NUMBER, "altitude", S // 2, (), ()),
     Signal("wind.speed", WIND, NUMBER, "speed", 10 * S, (), ()),
     Signal("link.quality", LINK, NUMBER, "ratio", 5 * S, (), ()),

@@ -1,13 +1,15 @@
-"""Which bundles were opened on a vehicle: `ReplayStore` of `rtshcua.onboard.ports`, as files that survive a crash.
+"""Which missions were opened on a vehicle: `ReplayStore` of `rtshcua.onboard.ports`, as files that survive a crash.
 
-    <state folder>/replay/vehicle-<identity>/<digest>   one marker a bundle: its expiry in us, UTC
-    <state folder>/replay/vehicle-<identity>/floor      the latest expiry among markers that were pruned
+    <state folder>/replay/vehicle-<identity>/<digest>         one marker a mission: its expiry in us, UTC
+    <state folder>/replay/vehicle-<identity>/floor            the latest expiry among markers that were pruned
+    <state folder>/replay/vehicle-<identity>/floor-policies   JSON: the highest version of each policy, by name
 
-One process at a time looks and writes. Markers of expired bundles are pruned; a bundle that expires no later than one
-that was pruned is refused, so setting the clock back opens nothing again.
+One process at a time looks and writes. Markers of expired missions are pruned; a mission that expires no later than one
+that was pruned is refused, so setting the clock back opens nothing again. Policy versions only rise.
 """
 
 import fcntl
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,36 +17,50 @@ from pathlib import Path
 from urllib.parse import quote
 
 from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, sync_folder, write_new
+from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
+_POLICIES = "floor-policies"
 
 
 class FileReplayStore:
-    """The bundles that were opened on the vehicle called `vehicle` (its identity)."""
+    """The missions that were opened on the vehicle called `vehicle` (its identity)."""
 
     def __init__(self, state: Path, vehicle: str) -> None:
         self.folder = state / "replay" / f"vehicle-{quote(vehicle, safe='')}"
         make_folder(self.folder, mode=PRIVATE_FOLDER)
 
-    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int) -> bool:
-        """True once for a bundle, after that is on the disk; False when it was opened before, or might have been.
+    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
+        """`OPENED` once for a mission, after that and its policy's version are on the disk.
 
-        `expires_us` is when nothing of the bundle is valid any more. Raises OSError when the disk cannot take it: the
-        bundle must not fly then.
+        `expires_us` is when nothing of the mission is valid any more. Raises OSError when the disk cannot take it: the
+        mission must not fly then.
         """
         marker = self.folder / digest.hex()
         with _alone(self.folder):
             if marker.exists() or expires_us <= self._floor():
-                return False
+                return Opening.REPLAYED
+            versions = self._versions()
+            if version < versions.get(policy, version):
+                return Opening.OLD_POLICY
             self._prune(now_utc_us)
+            if versions.get(policy) != version:
+                raised = json.dumps(versions | {policy: version}, sort_keys=True).encode()
+                replace(self.folder / _POLICIES, raised, mode=PRIVATE_FILE)
             write_new(marker, b"%d\n" % expires_us, mode=PRIVATE_FILE)
-        return True
+        return Opening.OPENED
 
     def _floor(self) -> int:
         try:
             return int((self.folder / _FLOOR).read_bytes())
         except FileNotFoundError:
             return -1
+
+    def _versions(self) -> dict[str, int]:
+        try:
+            return dict(json.loads((self.folder / _POLICIES).read_bytes()))
+        except FileNotFoundError:
+            return {}
 
     def _prune(self, now_utc_us: int) -> None:
         expired = {}

@@ -138,7 +138,7 @@ class Driver:
             self._acknowledge(frame, now_us)
             return
         self._streams.heard(name, now_us)
-        values = self._telemetry.read(name, message)
+        values = self._telemetry.read(name, message, frame.component)
         if values:
             events.append(Readings(now_us, values))
         if frame.component != _AUTOPILOT:

@@ -91,7 +91,9 @@ class Manoeuvre:
 
     def _taken_over(self, seen: Observed) -> bool:
         """A mode that belongs neither to this stage nor, until its own mode showed, to those before."""
-        if self._taken or seen.mode is None or seen.down:  # on the ground there is no flight to take over
+        if self._taken or seen.mode is None:
+            return False
+        if seen.down and self._command.kind in (MotionKind.HOME, MotionKind.LAND):  # it is done: no flight is left
             return False
         if seen.mode in self._modes:
             self._before = frozenset()

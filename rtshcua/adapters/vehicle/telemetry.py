@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rtshcua.decision.reads import where
+from rtshcua.mavlink import dialect
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.policy import Policy
@@ -14,10 +16,26 @@ MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
 _WITHIN_STALE = 4
 
 
+_AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
+
+
+class UnknownSource(ValueError):
+    """A policy reads a signal from what the dialect does not have, or from what is not one number."""
+
+
 class Telemetry:
-    """Knows which messages carry which signals."""
+    """Knows which messages carry which signals, and of whom each is taken.
+
+    What the autopilot reports is never replaced by another component's word, and where the vehicle is and what charge
+    it has is taken from the autopilot alone. Of a sensor that there are several of, the first instance counts.
+    Raises UnknownSource.
+    """
 
     def __init__(self, policy: Policy) -> None:
+        _check(policy)
+        vehicle = policy.vehicle
+        self._own = {*where(vehicle), vehicle.battery}
+        self._first: dict[tuple[int, str], Any] = {}
         self._projection = policy.projection
         self._sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
         self._by_message: dict[str, list[tuple[Signal, SignalSource]]] = {}
@@ -41,10 +59,10 @@ class Telemetry:
         """Distance in mm of a place (1e-7 degree) from the declared home."""
         return hypot_mm(*project(self._projection, latitude, longitude))
 
-    def read(self, name: str, message: Any) -> tuple[tuple[int, int | None], ...]:
+    def read(self, name: str, message: Any, component: int = _AUTOPILOT) -> tuple[tuple[int, int | None], ...]:
         """(slot, canonical integer) of every signal that this message carries; None is "reported as not known"."""
         carried = self._by_message.get(name)
-        if carried is None:
+        if carried is None or not self._is_first(name, message, component):
             return ()
         values: list[tuple[int, int | None]] = []
         for signal, source in carried:
@@ -53,7 +71,32 @@ class Telemetry:
                 values += [(signal.slot, x), (signal.slot + 1, y)]
             else:
                 values.append((signal.slot, _number(source, message)))
-        return tuple(values)
+        if component == _AUTOPILOT:
+            self._own.update(slot for slot, _ in values)
+            return tuple(values)
+        return tuple((slot, value) for slot, value in values if slot not in self._own)
+
+    def _is_first(self, name: str, message: Any, component: int) -> bool:
+        """Whether this comes from the lowest instance of its sensor that the component was heard to have."""
+        if message.instance_field is None:
+            return True
+        instance = getattr(message, message.instance_field)
+        first = self._first[component, name] = min(instance, self._first.get((component, name), instance))
+        return bool(instance == first)
+
+
+def _check(policy: Policy) -> None:
+    known = dialect.load().messages
+    for signal in policy.signals:
+        for source in signal.sources:
+            fields = known[source.message].fields if source.message in known else {}
+            for name in source.fields:
+                field = fields.get(name)
+                if field is None or field.length or field.type == "char":
+                    raise UnknownSource(
+                        f"the policy reads `{signal.name}` from `{source.message}.{name}`, which is no number that a "
+                        "vehicle reports"
+                    )
 
 
 def _often(stale_us: int) -> int:
@@ -78,5 +121,8 @@ def _place(source: SignalSource, message: Any, projection: Projection) -> tuple[
 
 
 def _field(source: SignalSource, message: Any, field: str) -> int | None:
-    value = quantise(getattr(message, field), source.numerator, source.denominator, source.unknown)
+    raw = getattr(message, field)
+    if not isinstance(raw, int | float):
+        return None
+    value = quantise(raw, source.numerator, source.denominator, source.unknown)
     return None if value is None or abs(value) > MAX_VALUE else value

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 from rtshcua.decision.checks.indexes import at, index, within
-from rtshcua.decision.parameters import cells, misfit
+from rtshcua.decision.checks.zones import place
+from rtshcua.decision.parameters import cells, first_cell, misfit
 from rtshcua.decision.reads import slots_read
 from rtshcua.decision.scope import Scope
 from rtshcua.decision.tree import parse
@@ -29,6 +30,7 @@ from rtshcua.model.flat.limits import (
     MAX_VALUE,
 )
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import HIGHEST, LOWEST
 
 
 def clause(clause: Clause, scope: Scope) -> Iterator[str]:
@@ -98,8 +100,8 @@ def _motion(contract: Contract) -> Iterator[str]:
         yield "motion: a skill that flies somewhere needs an altitude"
     if motion.kind == MotionKind.FLY and PLACE not in kinds.values():
         yield "motion: a skill that flies to a place needs one"
-    if motion.kind == MotionKind.COVER and ZONE not in kinds.values():
-        yield "motion: a skill that covers a zone needs one"
+    if motion.kind == MotionKind.COVER and list(kinds.values()).count(ZONE) != 1:
+        yield "motion: a skill that covers a zone needs one, and no other"
 
 
 def arguments(values: tuple[int, ...], contract: Contract) -> Iterator[str]:
@@ -126,3 +128,13 @@ def link(link: Link, policy: Policy) -> Iterator[str]:
         yield "a link has no path to cover a zone along"
     yield from arguments(link.arguments, called)
     yield from within("limit", link.limit_us, 0, MAX_DURATION)
+    motion = called.motion
+    for name, cell, low, high in (
+        ("altitude", motion.altitude, LOWEST, HIGHEST),
+        ("speed", motion.speed, 0, policy.vehicle.speed),
+    ):
+        if cell != -1:
+            yield from within(name, link.arguments[cell], low, high)
+    if motion.kind == MotionKind.FLY:
+        cell = first_cell(called, PLACE)
+        yield from place(policy.projection, link.arguments[cell], link.arguments[cell + 1])

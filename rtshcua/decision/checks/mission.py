@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from rtshcua.decision.checks.contracts import contract
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.checks.tighten import tightens
+from rtshcua.decision.checks.zones import place
 from rtshcua.decision.parameters import cells, first_cell
 from rtshcua.decision.scope import scope_of
 from rtshcua.decision.truth import TRUE
@@ -27,6 +28,8 @@ def mission(mission: Mission, policy: Policy) -> Iterator[str]:
             yield f"{name} `{mine}` is not the policy's, `{policys}`"
     yield from within("number of invocations", len(mission.invocations), 0, MAX_INVOCATIONS)
     yield from within("number of phases", len(mission.phases), 0, MAX_PHASES)
+    if len(set(mission.phases)) != len(mission.phases):
+        yield "two phases have the same name"
     for step, one in enumerate(mission.invocations):
         if one.step != step:
             yield f"step {step} says it is step {one.step}"
@@ -60,6 +63,8 @@ def invocation(invocation: Invocation, policy: Policy) -> Iterator[str]:
     yield from at("plan", _plan(invocation.plan, mine, invocation.arguments))
     if not _leads_right(invocation.plan, mine, invocation.arguments, policy):
         yield "plan: the path does not fit the arguments"
+    for x, y in zip(invocation.plan.path[::2], invocation.plan.path[1::2], strict=True):
+        yield from at("plan", place(policy.projection, x, y))
 
 
 def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterator[str]:

@@ -32,7 +32,7 @@ def signals(policy: Policy) -> Iterator[str]:
 def _source(source: SignalSource, kind: int) -> Iterator[str]:
     fields = {NUMBER: (1, 2), ENUMERATION: (1, 1), POSITION: (2, 2)}[kind]
     yield from within("number of fields", len(source.fields), *fields)
-    yield from within("numerator", source.numerator, -MAX_VALUE, MAX_VALUE)
+    yield from within("numerator", source.numerator, 1, MAX_VALUE)
     yield from within("denominator", source.denominator, 1, MAX_VALUE)
 
 

@@ -15,6 +15,7 @@ from rtshcua.model.flat.zone import (
     SHIFT,
     Projection,
     Zone,
+    unproject,
 )
 
 #: 1e-7 degree is about 11 mm at the equator
@@ -38,10 +39,19 @@ def zones(policy: Policy) -> Iterator[str]:
 
 
 def _projection(projection: Projection) -> Iterator[str]:
-    yield from within("latitude", projection.latitude, -900_000_000, 900_000_000)
-    yield from within("longitude", projection.longitude, -1_800_000_000, 1_800_000_000)
+    yield from _on_earth(projection.latitude, projection.longitude)
     yield from within("east", projection.east, 1, MAX_FACTOR)
     yield from within("north", projection.north, 1, MAX_FACTOR)
+
+
+def place(projection: Projection, x: int, y: int) -> Iterator[str]:
+    """What is wrong with a local place that may be flown to: it must have a latitude and a longitude."""
+    yield from at(f"place {x}, {y}", _on_earth(*unproject(projection, x, y)))
+
+
+def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
+    yield from within("latitude", latitude, -900_000_000, 900_000_000)  # 1e-7 degree
+    yield from within("longitude", longitude, -1_800_000_000, 1_800_000_000)
 
 
 def _zone(zone: Zone) -> Iterator[str]:

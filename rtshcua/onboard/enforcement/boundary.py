@@ -62,6 +62,7 @@ class SoftwareBoundary:
         self._slots = policy.policy.slots
         self._clauses = _ClauseNumbers(policy.policy, invocations)
         self._consumed: set[int] = set()
+        self._now_us = 0  # of the last request: time does not go back
         self._latest = -1  # the last step that was asked for and not denied
 
     def enforce(self, request: bytes) -> bytes:
@@ -69,6 +70,10 @@ class SoftwareBoundary:
         asked = decode(request, self._slots)
         if isinstance(asked, Malformed):
             return encode_refusal(Status.MALFORMED)
+        now_us = asked.now.monotonic_us
+        if not max(self._now_us, asked.released_us) <= now_us:  # a release to come would move the deadline
+            return encode_refusal(Status.MALFORMED)
+        self._now_us = now_us
         answer = self._step(asked) if asked.kind == STEP else self._link(asked)
         return encode_refusal(answer) if isinstance(answer, Status) else encode(answer)
 

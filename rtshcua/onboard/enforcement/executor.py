@@ -2,13 +2,15 @@
 
 It checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
 still the one that flies; that a step waits for its turn, and never follows a return or a landing that a fallback began;
-and that chains go forward only.
+and that chains go forward only. A standing permit is good for each of its links once, and for the contingency's last
+`AGAIN` times more.
 """
 
 from enum import StrEnum
 
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.mint import AGAIN
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.permit import Permit, open_permit
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
@@ -66,6 +68,9 @@ class Executor:
             return PermitRefusal.LAPSED
         step = permit.step if fallback else -1
         serial = permit.serial + 1 + link + (0 if fallback else permit.fallbacks)
+        if not fallback and link == permit.contingencies - 1:
+            again = range(serial, serial + AGAIN)
+            serial = next((each for each in again if each not in self._used), serial + AGAIN)
         return self._dispatch(Permit(kind, step, link, serial, 0, 0, _ALWAYS), now_us)
 
     def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | PermitRefusal:

@@ -1,7 +1,13 @@
 """The mint: makes permits under the session key, each with a serial of its own."""
 
+from typing import Final
+
 from rtshcua.wire.permit import Permit, seal
 from rtshcua.wire.request import STEP
+
+#: how often a standing permit lets the last link of the contingency be sent again: landing twice harms nothing, and
+#: nothing else is left to a vehicle whose boundary does not answer any more
+AGAIN: Final = 16
 
 
 class Mint:
@@ -14,7 +20,7 @@ class Mint:
     def step(self, step: int, not_after_us: int, fallbacks: int, contingencies: int) -> bytes:
         """A step's permit, which stands for so many links of its chain and of the contingency too."""
         serial = self._serial
-        self._serial += 1 + fallbacks + contingencies
+        self._serial += 1 + fallbacks + contingencies + AGAIN
         return seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us), self._key)
 
     def link(self, kind: int, step: int, link: int, not_after_us: int) -> bytes:

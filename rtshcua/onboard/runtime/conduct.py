@@ -6,9 +6,10 @@ counts: `skip` goes on with the next step, `hold` waits like a deferral, `abort`
 that is used up, the contingency. On the ground nothing is sent, and the run ends.
 """
 
+from rtshcua.decision.holding import holding
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
-from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import End, Ending
@@ -21,7 +22,7 @@ from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.queue import InvocationQueue
 from rtshcua.onboard.runtime.remaining import RemainingLatency
-from rtshcua.onboard.runtime.supervisor import Supervisor
+from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from rtshcua.wire.response import Answer
 
@@ -48,6 +49,7 @@ class Conduct:
         self._resumed = resumed
         self._fallback = Fallback(loaded, self.admission, self.dispatcher, limits)
         self._supervisor: Supervisor | None = None
+        self._patience = Grace()
         self._cause: Ending | None = None
         self._began_us: int | None = None
         self._asked_us = 0
@@ -55,10 +57,15 @@ class Conduct:
 
     @property
     def aloft(self) -> bool:
-        """Whether a motion command may be needed: in the air, as far as is known, or with a command under way."""
-        if self.dispatcher.active is not None or self.craft.airborne:
+        """Whether a motion command may be needed: a command is under way, or a flight of this bundle is not at rest.
+
+        A flight that somebody else began is none of ours, whatever happens.
+        """
+        if self.dispatcher.active is not None:
             return True
-        return self.craft.airborne is None and self.dispatcher.dispatched
+        if self.dispatcher.dispatched:
+            return not self.craft.at_rest
+        return self._resumed and self.craft.airborne is True
 
     def turn(self, now: Now) -> bool:
         """Do one thing that can be done now; False when there is none left."""
@@ -97,11 +104,26 @@ class Conduct:
             self.fall_back(CONTINGENCY_LINK, cause)
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED) -> None:
-        """Fly the current step's chain, or the contingency, down to the ground."""
+        """Fly the current step's chain, or the contingency, down to the ground.
+
+        A vehicle that has not left the ground is told to land and nothing else: a return or a hold makes no sense
+        there, and a take-off that is under way, not yet seen to have armed it, must not go on by itself.
+        """
         self._blame(cause)
         current = self.queue.current
-        self._fallback.begin(kind, current.step if current is not None and kind == FALLBACK_LINK else -1)
+        if self.craft.airborne is False:
+            self._fallback.land()
+        else:
+            self._fallback.begin(kind, current.step if current is not None and kind == FALLBACK_LINK else -1)
         self.stage = Stage.FALLING
+
+    def leave(self) -> None:
+        """Nobody will watch any more: unless it is on its way home or down already, the last link flies."""
+        active = self.dispatcher.active
+        if self.stage is not Stage.ENDED and self.aloft and not (active is not None and active.homeward):
+            self._blame(Ending.INTERRUPTED)
+            self._fallback.land()
+            self.stage = Stage.FALLING
 
     def stand_down(self, now: Now, ending: Ending) -> None:
         """Send nothing more, whatever flies, and end."""
@@ -119,7 +141,7 @@ class Conduct:
     def down(self, now: Now) -> None:
         """The vehicle is on the ground again: the flight is over, and with it a fallback."""
         self.dispatcher.landed()
-        self.craft.airborne = False
+        self.craft.armed = self.craft.airborne = False
         if self.stage is Stage.FALLING:
             self.end(now, self._cause or Ending.ABORTED)
 
@@ -127,6 +149,7 @@ class Conduct:
         """The current step is done, or skipped."""
         self.queue.advance(now.monotonic_us)
         self._supervisor = None
+        self._patience = Grace()
         self._held = False
         self.fresh = True
         self.stage = Stage.DECIDING
@@ -182,8 +205,13 @@ class Conduct:
         if answer.permit:
             return self._start(now, invocation, answer)
         if self._may_wait(now, invocation, answer):
-            self._hold(now)
-            return False
+            unkept = self._unkept(now, invocation, state) if self.aloft else None
+            if unkept is None:
+                self._hold(now)
+                return False
+            self.dispatcher.end(now, "violated", unkept)
+            self.fall_back(FALLBACK_LINK)
+            return True
         return self._inadmissible(now, invocation)
 
     def _finish(self, now: Now) -> bool:
@@ -210,6 +238,11 @@ class Conduct:
         released_us = self.queue.released_us or 0
         in_time = now.monotonic_us < released_us + invocation.contract.deadline_us
         return in_time and (answer.outcome is Outcome.DEFER or holds)
+
+    def _unkept(self, now: Now, invocation: Invocation, state: State) -> str | None:
+        """What forbids waiting on in the air; UNKNOWN has the step's grace."""
+        unkept = holding(self.loaded.invocations[invocation.step], state, self.loaded.policy, now)
+        return self._patience.over(unkept, now.monotonic_us, invocation.contract.grace_us)
 
     def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
         if invocation.on_inadmissible == OnInadmissible.SKIP:

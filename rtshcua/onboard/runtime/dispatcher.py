@@ -17,7 +17,7 @@ class Dispatcher:
         self._journal = journal
         self._remaining = remaining
         self.active: Active | None = None
-        self.dispatched = False
+        self.dispatched = False  # something was sent in this flight
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
 
     def fly(self, now: Now, permit: bytes, key: Key, lasting_us: int | None) -> bool:
@@ -80,6 +80,7 @@ class Dispatcher:
 
     def landed(self) -> None:
         """The flight is over: standing permits lapse."""
+        self.dispatched = False
         self._executor.landed()
 
     def release(self, now: Now) -> None:

@@ -36,6 +36,10 @@ class Fallback:
         """Start a step's chain, or the contingency (`step` is -1)."""
         self._chain = Chain(kind, step, START)
 
+    def land(self) -> None:
+        """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
+        self._chain = Chain(CONTINGENCY_LINK, -1, len(self._loaded.bundle.policy.contingency) - 2)
+
     def turn(self, now: Now, state: State) -> Progress:
         """Fly the next link, unless one flies whose time is not over."""
         active, chain = self._dispatcher.active, self._chain

@@ -63,17 +63,33 @@ class Happenings:
         was_airborne = craft.airborne
         craft.armed, craft.airborne = event.armed, event.airborne
         craft.flown = craft.flown or (event.airborne and conduct.dispatcher.dispatched)
-        if not (was_airborne and craft.at_rest):
-            return
         active = conduct.dispatcher.active
-        if conduct.stage is Stage.FALLING:
+        if conduct.stage is Stage.DECIDING:
+            self._between_steps(now)
+        elif not (was_airborne and craft.at_rest):
+            return
+        elif conduct.stage is Stage.FALLING:
             conduct.dispatcher.end(now, "landed")
             conduct.down(now)
         elif conduct.stage is Stage.RUNNING and active is not None and not active.homeward:
             # It came down without being told to: whatever ran is over, and nothing is sent to a vehicle on the ground.
-            conduct.dispatcher.end(now, "landed")
-            conduct.dispatcher.landed()
-            conduct.end(now, Ending.ABORTED)
+            self._came_down(now)
+
+    def _between_steps(self, now: Now) -> None:
+        """While a step waits: a flight that this run did not begin is the pilot's, and one that came down is over."""
+        conduct, craft = self._conduct, self._conduct.craft
+        if conduct.dispatcher.dispatched:
+            if craft.at_rest:
+                self._came_down(now)
+        elif craft.airborne:
+            self._journal.effect(now, "taken-over", detail="took off")
+            conduct.stand_down(now, Ending.STOOD_DOWN)
+
+    def _came_down(self, now: Now) -> None:
+        conduct = self._conduct
+        conduct.dispatcher.end(now, "landed")
+        conduct.dispatcher.landed()
+        conduct.end(now, Ending.ABORTED)
 
     def _succeeded(self, now: Now, token: int) -> None:
         conduct = self._conduct

@@ -48,6 +48,16 @@ class Runtime:
             pass
         return self._journal.take()
 
+    def leave(self) -> None:
+        """Nobody will watch any more: the next step sends the last link, unless a return or a landing flies."""
+        self._conduct.leave()
+
+    @property
+    def homeward(self) -> bool:
+        """Whether the command that flies brings the vehicle home or down, and its link is not lost."""
+        active = self._conduct.dispatcher.active
+        return active is not None and active.homeward and self._conduct.craft.lost_since_us is None
+
     def view(self, now: Now) -> View:
         """What a display may show."""
         return view_of(self._conduct, now.monotonic_us)

@@ -1,13 +1,30 @@
 """The supervisor: what must hold all the while a skill runs, `assume`, `maintain`, airspace and degrade rules."""
 
+from collections.abc import Iterable
+
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.truth import FALSE
+from rtshcua.decision.truth import FALSE, Truth
 from rtshcua.decision.watch import watch
-from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Now, State
 
 _DURATION = "lasts longer than it may"
+
+
+class Grace:
+    """Bears with UNKNOWN for a while: then it counts as FALSE (design 4.2)."""
+
+    def __init__(self) -> None:
+        self._since: dict[str, int] = {}
+
+    def over(self, broken: Iterable[tuple[str, Truth]], at_us: int, grace_us: int) -> str | None:
+        """The first text that is FALSE, or was UNKNOWN at each call for longer than `grace_us`; else None."""
+        since: dict[str, int] = {}
+        for text, truth in broken:
+            since[text] = self._since.get(text, at_us)
+            if truth & FALSE or at_us - since[text] > grace_us:
+                return text
+        self._since = since
+        return None
 
 
 class Supervisor:
@@ -17,7 +34,7 @@ class Supervisor:
         self._prepared = prepared
         self._policy = policy
         self._started_us = started_us
-        self._unknown_since: dict[Clause | Rule | Airspace, int] = {}
+        self._grace = Grace()
 
     def violated(self, state: State, now: Now) -> str | None:
         """The text of what does not hold any more, or None while all does."""
@@ -25,11 +42,5 @@ class Supervisor:
         at_us = now.monotonic_us
         if 0 < contract.duration_us < at_us - self._started_us:
             return _DURATION
-        unknown: dict[Clause | Rule | Airspace, int] = {}
-        for broken in watch(self._prepared, state, self._policy, now):
-            since_us = self._unknown_since.get(broken.clause, at_us)
-            if broken.truth & FALSE or at_us - since_us > contract.grace_us:
-                return broken.clause.text
-            unknown[broken.clause] = since_us
-        self._unknown_since = unknown
-        return None
+        broken = [(each.clause.text, each.truth) for each in watch(self._prepared, state, self._policy, now)]
+        return self._grace.over(broken, at_us, contract.grace_us)

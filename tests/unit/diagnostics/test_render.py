@@ -114,7 +114,7 @@ def test_json_has_every_key_and_the_format_of_the_registry() -> None:
     found = Diagnostic(codes.SYNTAX, "bad", Span("a.rts", 3, 5), pointer="/a", fixes=(fix,))
     value = as_json([found, Diagnostic(codes.NO_MISSION, "none")], {"a.rts": source})
     assert (value["format"], value["version"]) == (names.DIAGNOSTICS.name, names.DIAGNOSTICS.version)
-    assert (FORMAT, VERSION) == (names.DIAGNOSTICS.name, names.DIAGNOSTICS.version)
+    assert (names.DIAGNOSTICS.name, names.DIAGNOSTICS.version) == (FORMAT, VERSION)
     first, second = value["diagnostics"]
     assert first["at"] == {
         "file": "a.rts",

@@ -9,7 +9,7 @@ from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.executor import PermitRefusal
 from rtshcua.wire.permit import LINK_VALID_US
-from rtshcua.wire.response import Answer, own_clauses, shared_clauses
+from rtshcua.wire.response import Answer, Status, own_clauses, shared_clauses
 
 
 def state(**values: int | None) -> State:
@@ -76,3 +76,17 @@ def test_a_contingency_without_a_hold_leaves_a_deferred_vehicle_where_it_is() ->
     run.vehicle.values[OBSTACLE] = 20 * M
     run.until_over()
     assert run.flown == ["takeoff", "goto", "inspect_area", "return_home"]
+
+
+def test_a_release_that_is_still_to_come_is_refused() -> None:
+    of = loaded()
+    assert answer_to(of, request_for(of, released_us=START.monotonic_us + 1)) is Status.MALFORMED
+    allowed(of)
+
+
+def test_time_that_goes_back_is_refused() -> None:
+    of = loaded()
+    allowed(of)
+    earlier = replace(START, monotonic_us=START.monotonic_us - 1)
+    assert answer_to(of, request_for(of, 1, 0, 0, now=earlier, released_us=0)) is Status.MALFORMED
+    assert allowed(of, 1, 0, 0)

@@ -5,11 +5,12 @@ from msgspec.structs import replace
 
 from reference.flat_case import BATTERY, INVOCATIONS, ISSUED, MISSION, POLICY, SIGNALS, H
 from reference.world import MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, loaded, sealed, try_load
+from rtshcua.model.flat.limits import MAX_SLOTS
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import Duty, SigningKey
-from rtshcua.wire.request import MAX_AGE_US, MAX_SLOTS
+from rtshcua.wire.request import MAX_AGE_US
 
 
 def refusal(data: bytes, **changed: object) -> LoadRefusal:

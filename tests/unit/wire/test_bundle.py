@@ -171,3 +171,18 @@ def test_bytes_that_are_no_bundle(data: bytes) -> None:
 
 def test_a_bundle_that_is_too_large_is_not_read() -> None:
     assert slug(bytes(bundle.MAX_BUNDLE + 1)) == "too-large"
+
+
+def test_the_same_mission_in_another_envelope_is_the_same_mission() -> None:
+    """Else a second signature of the policy would let a mission fly twice."""
+    other = SigningKey.from_seed(b"q" * 32, duty=Duty.POLICY)
+    plain = root()
+    trust = msgspec.structs.replace(plain, keys=(*plain.keys, other.verification(vehicles=("quad-07",))))
+    first = sealed()
+    again = cose.sign1(
+        bundle.policy_payload(THE_POLICY), key=other, duty=Duty.POLICY, content_type=names.POLICY.content_type
+    )
+    second = artefact.wrap(names.BUNDLE, (again, bundle.envelopes(first)[1]))
+    one, two = (bundle.open_bundle(data, root=trust, vehicle="quad-07", now_us=NOW) for data in (first, second))
+    assert one.digest != two.digest
+    assert one.mission_digest == two.mission_digest

@@ -242,3 +242,25 @@ def test_a_battery_too_low_to_arm_is_not_ready(flyer: Make) -> None:
     assert not any(isinstance(event, Ready) for event in one.wait(10))
     assert one.vehicle.driver.unready is not None
     assert one.vehicle.driver.unready.startswith("its own checks before arming fail")
+
+
+def test_a_pilot_who_changes_the_mode_before_it_is_armed_has_taken_over(flyer: Make, flavour: str) -> None:
+    one = flyer()
+    one.until(Ready)
+    armings: list[int] = []
+
+    def lose(frame: bytes) -> bool:
+        if of_command(frame, mavlink.MAV_CMD_COMPONENT_ARM_DISARM):
+            armings.append(one.now_us)
+            return True
+        return False
+
+    one.vehicle.lose = lose
+    one.begin(MotionKind.CLIMB, altitude=20_000)
+    one.wait(1)
+    assert armings
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.until(TakenOver, 2)
+    armings.clear()
+    one.wait(10)
+    assert armings == [], "nothing is sent again into the pilot's mode"

@@ -4,9 +4,11 @@ from math import inf, nan
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.vehicle.telemetry import Telemetry
+from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
+from rtshcua.model.flat.signal import SignalSource
 from virtual.policy import BATTERY, FIX, HEIGHT, LINK, POLICY, POSITION_X, PROJECTION, WIND
 
 HOME = (PROJECTION.latitude, PROJECTION.longitude)
@@ -59,3 +61,54 @@ def test_the_distance_from_home() -> None:
     telemetry = Telemetry(POLICY)
     assert telemetry.distance_from_home(*HOME) == 0
     assert abs(telemetry.distance_from_home(HOME[0] + 8_983, HOME[1]) - 100_000) < 20
+
+
+AUTOPILOT, COMPANION = 1, 191
+
+
+def radio(rssi: int) -> Any:
+    return mavlink.MAVLink_radio_status_message(1, 1, rssi, 1, 1, 0, 0)
+
+
+def test_another_component_does_not_say_where_it_is_or_what_charge_it_has() -> None:
+    telemetry = Telemetry(POLICY)
+    assert telemetry.read("BATTERY_STATUS", battery(99), COMPANION) == ()
+    assert telemetry.read("GLOBAL_POSITION_INT", position(*HOME), COMPANION) == ()
+
+
+def test_another_component_does_not_replace_what_the_autopilot_reports() -> None:
+    telemetry = Telemetry(POLICY)
+    assert telemetry.read("WIND_COV", wind(3.0, 4.0), COMPANION) == ((WIND, 5_000),)
+    own = mavlink.MAVLink_wind_message(10.0, 12.0, 0.0)
+    assert telemetry.read("WIND", own) == ((WIND, 12_000),)
+    assert telemetry.read("WIND_COV", wind(3.0, 4.0), COMPANION) == ()
+
+
+def test_the_radio_speaks_where_the_autopilot_does_not() -> None:
+    assert Telemetry(POLICY).read("RADIO_STATUS", radio(80), 68) == ((LINK, 8_000),)
+
+
+def test_of_two_batteries_the_first_counts() -> None:
+    def of(instance: int, percent: int) -> Any:
+        return mavlink.MAVLink_battery_status_message(instance, 0, 0, 0, [0] * 10, 0, 0, 0, percent)
+
+    telemetry = Telemetry(POLICY)
+    assert telemetry.read("BATTERY_STATUS", of(1, 95)) == ((BATTERY, 9_500),)
+    assert telemetry.read("BATTERY_STATUS", of(0, 8)) == ((BATTERY, 800),)
+    assert telemetry.read("BATTERY_STATUS", of(1, 95)) == ()
+    assert telemetry.read("BATTERY_STATUS", of(0, 7)) == ((BATTERY, 700),)
+
+
+@pytest.mark.parametrize("source", ["BATTERY_STATUS.nope", "NO_SUCH.x", "BATTERY_STATUS.voltages", "STATUSTEXT.text"])
+def test_a_source_that_is_no_number_is_refused_before_anything_flies(source: str) -> None:
+    message, field = source.split(".")
+    (first, *others) = POLICY.signals
+    read = replace(first, sources=(SignalSource(message, (field,), 1, 1, ()),))
+    with pytest.raises(UnknownSource, match=f"`{source}`"):
+        Telemetry(replace(POLICY, signals=(read, *others)))
+
+
+def test_what_is_no_number_is_not_known() -> None:
+    message = battery(50)
+    message.battery_remaining = "50"
+    assert Telemetry(POLICY).read("BATTERY_STATUS", message) == ((BATTERY, None),)

@@ -4,7 +4,7 @@ from base64 import b64encode
 
 from msgspec.structs import replace
 
-from reference.forgery import LOG_KEY, edit, expect, flight, signed
+from reference.forgery import LOG_KEY, edit, expect, flight, prove, signed
 from rtshcua.wire.keys import Duty, VerificationKey
 from virtual import case
 
@@ -55,3 +55,13 @@ def test_a_mission_that_loosens_its_contract() -> None:
     first, *others = case.short_steps()
     loose = replace(first, contract=replace(first.contract, require=()))
     assert expect(begun_with(case.seal(case.mission((loose, *others))))) == ("trust/bundle-malformed", 0)
+
+
+def test_a_root_that_is_not_for_development() -> None:
+    root, _ = case.root()
+    keys = tuple(replace(key, development=False) for key in root.keys)
+    data = replace(root, development=False, keys=keys).sign(case.KEYS[Duty.ROOT])
+    report = prove(signed([edit(LINES[0], root=b64encode(data).decode()), *LINES[1:]])).report
+    assert report.failure is None
+    assert report.proven[0].text.startswith("the trust root is signed by the pinned key")
+    assert "development" not in [claim.slug for claim in report.unproven]

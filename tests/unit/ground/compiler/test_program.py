@@ -252,7 +252,7 @@ def mutations(draw: st.DrawFn) -> tuple[str, str]:
     return name, " ".join(words)
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(mutations())
 @example(("lib:policies/site.rts", ""))
 def test_a_mutated_source_is_compiled_or_explained(mutation: tuple[str, str]) -> None:

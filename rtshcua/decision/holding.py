@@ -1,0 +1,47 @@
+"""What must hold while a vehicle waits in the air for its next step (design 4.4: holding is bounded by energy)."""
+
+from typing import NamedTuple
+
+from rtshcua.decision.airspace import keeps
+from rtshcua.decision.case import situation
+from rtshcua.decision.energy import SECOND
+from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.places import here
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.truth import FALSE, NOT, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import MISSING, PRESENT
+from rtshcua.model.flat.limits import FULL
+from rtshcua.model.flat.situation import Now, State
+
+WAY_HOME = "the reserve and the way home"
+
+
+class Unkept(NamedTuple):
+    """The text of something that should hold, and is FALSE or UNKNOWN."""
+
+    text: str
+    truth: Truth
+
+
+def holding(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> tuple[Unkept, ...]:
+    """What stands against waiting for `invocation` here: the airspace, its `degrade` rules, the charge to come home."""
+    sets = situation(state, policy, now)
+    at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
+    checks = [Unkept(rule.rule.text, NOT[rule.condition(at)]) for rule in invocation.candidates.degrades]
+    if policy.airspace is not None:
+        checks.append(
+            Unkept(policy.airspace.airspace.text, keeps(here(at.slots, policy.tables.known), policy.airspace))
+        )
+    checks.append(Unkept(WAY_HOME, _way_home(at, policy)))
+    return tuple(check for check in checks if check.truth != TRUE)
+
+
+def _way_home(at: Environment, policy: PreparedPolicy) -> Truth:
+    """Whether the battery holds the reserve and the way home from here, position error aside, rounded up."""
+    known, vehicle = policy.tables.known, policy.policy.vehicle
+    charge, _, gap, _ = at.slots[known.battery]
+    volume = policy.still.volume(at.slots, known)
+    if gap != PRESENT or volume.height[2] != PRESENT:
+        return UNKNOWN
+    home = -(-volume.farthest[1] * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
+    return TRUE if charge >= vehicle.reserve + home else FALSE

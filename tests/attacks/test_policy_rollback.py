@@ -1,0 +1,24 @@
+"""Threat: an older policy, rightly signed and laxer than the one in force, is brought back to the vehicle."""
+
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from reference.flat_case import MISSION, POLICY
+from reference.world import START, VEHICLE, loaded
+from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.onboard.ports import Opening
+
+
+def opens(store: FileReplayStore, version: int) -> Opening:
+    of = loaded(replace(POLICY, version=version), replace(MISSION, policy_version=version))
+    policy = of.bundle.policy
+    return store.open_once(of.bundle.mission_digest, of.expires_us, START.utc_us, policy.name, policy.version)
+
+
+def test_an_older_policy_does_not_come_back(tmp_path: Path) -> None:
+    store = FileReplayStore(tmp_path, VEHICLE)
+    assert opens(store, 7) is Opening.OPENED
+    assert opens(store, 6) is Opening.OLD_POLICY
+    assert opens(store, 8) is Opening.OPENED
+    assert opens(store, 7) is Opening.REPLAYED

@@ -106,6 +106,8 @@ def test_refused(code: tuple[int, ...], problem: str) -> None:
         apply(Op.GE, argument(2), const(1)),
         (Op.ARGUMENT_IN, 2, 0),
         (Op.TIME_IN, 0, DAY),
+        apply(Op.LE, const(-MAX_VALUE), scaled(const(1), -MAX_VALUE)),
+        apply(Op.LE, const(MAX_VALUE), scaled(const(1), MAX_VALUE)),
     ],
 )
 def test_accepted(code: tuple[int, ...]) -> None:

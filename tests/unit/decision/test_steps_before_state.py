@@ -327,6 +327,14 @@ ADMITTED = (ALLOW, Reason.ADMITTED)
             {"utc_us": ((flat.ISSUED, flat.ISSUED + 10 * MIN),), "utc_error_us": (0, 5)},
             {ADMITTED, (DEFER, Reason.CLOCK_UNCERTAIN)},
         ),
+        (
+            {"utc_us": ((flat.ISSUED - 10, flat.ISSUED - 10),), "utc_error_us": (0, 20)},
+            {(DENY, Reason.ISSUED_IN_FUTURE), (DEFER, Reason.CLOCK_UNCERTAIN)},
+        ),
+        (
+            {"utc_us": ((flat.ISSUED + 10 * MIN + 10,) * 2,), "utc_error_us": (0, 20)},
+            {(DENY, Reason.EXPIRED), (DEFER, Reason.CLOCK_UNCERTAIN)},
+        ),
         ({"values": {BATTERY: interval(3_000, 9_000)}}, {ADMITTED, (FALLBACK, Reason.STATE_VIOLATED)}),
         (  # sound, not exact: that the charge is known once step 6 has passed is forgotten in step 7
             {"values": {BATTERY: maybe(point(9_000))}},

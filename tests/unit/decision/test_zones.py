@@ -40,6 +40,12 @@ STARS = st.lists(st.integers(3, 30), min_size=17, max_size=40).map(
     )
 )
 CIRCLES = st.builds(lambda c, r: Zone("c", CIRCLE, LOWEST, HIGHEST, (*c, r)), POINTS, st.integers(1, 200))
+#: so large that a few mm of rounding hide nothing
+WIDE = st.integers(-9_000, 9_000)
+WIDE_POINTS = st.tuples(WIDE, WIDE)
+WIDE_CIRCLES = st.builds(
+    lambda c, r: Zone("c", CIRCLE, LOWEST, HIGHEST, (*c, r * r)), WIDE_POINTS, st.integers(1_000, 6_000)
+)
 
 
 @given(OUTLINES | STARS | CIRCLES, POINTS)
@@ -56,9 +62,39 @@ def test_a_widened_leg_and_a_polygon(
 
 
 @given(CIRCLES, POINTS, POINTS, BOXES)
+def test_a_widened_leg_and_a_small_circle(
+    zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]
+) -> None:
+    check_circle(zone, a, b, box)
+
+
+@given(WIDE_CIRCLES, WIDE_POINTS, WIDE_POINTS, BOXES)
 def test_a_widened_leg_and_a_circle(
     zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]
 ) -> None:
+    check_circle(zone, a, b, box)
+
+
+@pytest.mark.parametrize(
+    ("leg", "answer"),
+    [
+        ((-2_000, 1_100, 2_000, 1_100), F),  # passes at 1.1 m
+        ((-2_000, 900, 2_000, 900), T | F),
+        ((-2_000, -900, 2_000, -900), T | F),
+        ((-900, -2_000, -900, 2_000), T | F),
+        ((-2_000, 500, 200, 2_700), F),
+        ((-2_000, 900, -1_100, 900), F),  # ends before
+        ((-2_000, 900, -900, 100), T | F),  # ends within
+        ((-500, -500, 500, 500), T),
+    ],
+)
+def test_legs_past_a_circle_of_one_metre(leg: tuple[int, int, int, int], answer: int) -> None:
+    zone = Zone("c", CIRCLE, LOWEST, HIGHEST, (7_000, -3_000, 1_000 * 1_000))
+    there = (leg[0] + 7_000, leg[1] - 3_000, leg[2] + 7_000, leg[3] - 3_000)
+    assert PreparedZone(0, zone).along(there, (0, 0, 0, 0)) == answer
+
+
+def check_circle(zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]) -> None:
     """Exact inside; outside it may say both when the leg comes nearer than 3 mm and the difference of box and disc."""
     answer = PreparedZone(0, zone).along((*a, *b), box)
     outline = widened(a, b, box)

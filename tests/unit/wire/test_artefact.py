@@ -15,10 +15,18 @@ def test_bytes_begin_with_name_and_version():
 @pytest.mark.parametrize(
     ("data", "slug", "text"),
     [
-        (b"", "malformed", "not canonical CBOR: ends where an item should begin (byte 0)"),
-        (cbor.encode(1), "malformed", "not an array of format name, version and body"),
-        (cbor.encode(("rtshcua/policy", True, 1)), "malformed", "not an array of format name, version and body"),
-        (cbor.encode(("rtshcua/policy", 1)), "malformed", "not an array of format name, version and body"),
+        (b"", "malformed", "this is no `rtshcua/policy`: not canonical CBOR: ends where an item should begin (byte 0)"),
+        (cbor.encode(1), "malformed", "this is no `rtshcua/policy`: not an array of format name, version and body"),
+        (
+            cbor.encode(("rtshcua/policy", True, 1)),
+            "malformed",
+            "this is no `rtshcua/policy`: not an array of format name, version and body",
+        ),
+        (
+            cbor.encode(("rtshcua/policy", 1)),
+            "malformed",
+            "this is no `rtshcua/policy`: not an array of format name, version and body",
+        ),
         (wrap(names.MISSION, 1), "unknown-format", "this is `rtshcua/mission`, not `rtshcua/policy`"),
         (
             cbor.encode(("rtshcua/policy", 2, 1)),

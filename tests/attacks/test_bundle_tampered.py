@@ -1,32 +1,17 @@
 """Threat: a bundle changes on its way to the vehicle. Whatever byte flips, wherever it is cut, it does not open."""
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
-
 import pytest
 
+from reference.bundle_case import NOW, root, sealed
 from rtshcua.wire import bundle
 from rtshcua.wire.untrusted import Untrusted
 
-
-def _case() -> ModuleType:
-    path = Path(__file__).parents[1] / "unit" / "wire" / "test_bundle.py"
-    spec = importlib.util.spec_from_file_location("bundle_case", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-CASE = _case()
-SEALED: bytes = CASE.sealed()
+SEALED = sealed()
 
 
 def opens(data: bytes) -> bool:
     try:
-        bundle.open_bundle(data, root=CASE.root(), vehicle="quad-07", now_us=CASE.NOW)
+        bundle.open_bundle(data, root=root(), vehicle="quad-07", now_us=NOW)
     except Untrusted:
         return False
     return True

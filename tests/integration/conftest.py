@@ -17,12 +17,7 @@ import pytest
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.wire.keys import Duty
-
-TESTS = str(Path(__file__).resolve().parents[1])
-if TESTS not in sys.path:
-    sys.path.insert(0, TESTS)
-
-from virtual import case  # noqa: E402  needs the path above
+from virtual import case
 
 PATIENCE_S = 60.0
 COMMAND = [sys.executable, "-m", "rtshcua.cli.app"]

@@ -1,6 +1,5 @@
 """What `run` refuses between loading a bundle and flying it."""
 
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -8,17 +7,13 @@ from typing import Any, cast
 import pytest
 from msgspec.structs import replace
 
-TESTS = str(Path(__file__).resolve().parents[2])
-if TESTS not in sys.path:
-    sys.path.insert(0, TESTS)
-
-from reference.flat_case import MISSION, POLICY  # noqa: E402  needs the path above
-from reference.world import VEHICLE, loaded  # noqa: E402
-from rtshcua.adapters.clock import SystemClock  # noqa: E402
-from rtshcua.adapters.files.replay import FileReplayStore  # noqa: E402
-from rtshcua.cli import launch  # noqa: E402
-from rtshcua.diagnostics.exits import ExitCode  # noqa: E402
-from rtshcua.model.flat.signal import SignalSource  # noqa: E402
+from reference.flat_case import MISSION, POLICY
+from reference.world import VEHICLE, loaded
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.cli import launch
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.signal import SignalSource
 
 LATER = 1 << 52  # us
 

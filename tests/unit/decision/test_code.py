@@ -26,7 +26,11 @@ T, F, U = TRUE, FALSE, UNKNOWN
 YES = apply(Op.LE, const(0), const(0))
 BOTH_NUMBERS = "two numbers are needed on the stack"
 
+LARGEST = apply(Op.ADD, scaled(signal(BATTERY), 512), const(512))  # at most 2**62
+
 REFUSED = [
+    (apply(Op.ADD, scaled(signal(BATTERY), 512), const(513)), "instruction 3: the number may exceed 64 bits"),
+    (apply(Op.LE, scaled(signal(BATTERY), 512), const(513)), "instruction 3: the number may exceed 64 bits"),
     ((), "0 integers are not 1 to 128 instructions"),
     ((Op.CONST, 1), "2 integers are not 1 to 128 instructions"),
     (YES * 50, "450 integers are not 1 to 128 instructions"),
@@ -47,6 +51,7 @@ REFUSED = [
     (apply(Op.EQ, YES, const(1)), f"instruction 4: {BOTH_NUMBERS}"),
     (apply(Op.EQ, const(1), YES), f"instruction 4: {BOTH_NUMBERS}"),
     ((Op.ADD, 0, 0), f"instruction 0: {BOTH_NUMBERS}"),
+    (apply(Op.ADD, const(1)), f"instruction 1: {BOTH_NUMBERS}"),
     (apply(Op.SUB, YES, const(1)), f"instruction 4: {BOTH_NUMBERS}"),
     (apply(Op.SUB, const(1), YES), f"instruction 4: {BOTH_NUMBERS}"),
     ((Op.SCALE, 2, 0), "instruction 0: one number is needed on the stack"),
@@ -106,6 +111,8 @@ def test_refused(code: tuple[int, ...], problem: str) -> None:
         apply(Op.GE, argument(2), const(1)),
         (Op.ARGUMENT_IN, 2, 0),
         (Op.TIME_IN, 0, DAY),
+        apply(Op.LE, LARGEST, const(0)),
+        apply(Op.GE, scaled(signal(BATTERY), 512), const(-512)),
         apply(Op.LE, const(-MAX_VALUE), scaled(const(1), -MAX_VALUE)),
         apply(Op.LE, const(MAX_VALUE), scaled(const(1), MAX_VALUE)),
     ],
@@ -174,6 +181,7 @@ B = {BATTERY: interval(2, 5)}
         (apply(Op.LE, signal(BATTERY), const(5)), {BATTERY: maybe(interval(2, 5))}, T | U),
         (apply(Op.GE, signal(BATTERY), const(5)), {BATTERY: MISSING}, U),
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: members({3, 4})}, T),
+        ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: members({3, 4, 5, 6})}, T),
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: members({2, 4})}, T | F),
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: members({0, 7})}, F),
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: interval(3, 6)}, T),

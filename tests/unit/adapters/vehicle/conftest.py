@@ -1,8 +1,6 @@
 """A driver that flies the simulated vehicle in virtual time, with no runtime above it."""
 
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,13 +8,8 @@ import pytest
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Readings, Ready, Succeeded, TakenOver
 from rtshcua.simulation.config import Kind, SimulationConfig
-
-TESTS = str(Path(__file__).resolve().parents[3])
-if TESTS not in sys.path:
-    sys.path.insert(0, TESTS)
-
-from virtual.policy import POLICY, geo  # noqa: E402  needs the path above
-from virtual.vehicle import SECOND, VirtualVehicle  # noqa: E402
+from virtual.policy import POLICY, geo
+from virtual.vehicle import SECOND, VirtualVehicle
 
 
 class Flyer:

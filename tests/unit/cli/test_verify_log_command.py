@@ -47,7 +47,7 @@ def test_a_sound_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "closed and signed by log key" in out
     assert "complete" not in out.replace("completed", "")
     assert "\033" not in out
-    assert max(map(len, out.splitlines())) <= 120
+    assert max(len(line) for line in out.splitlines() if str(run) not in line) <= 120  # a path is never broken
 
 
 def test_file_and_folder_are_the_same(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,6 @@ POLICY: Final = Domain(b"rtshcua/policy")  # the payload of a policy envelope
 MISSION: Final = Domain(b"rtshcua/mission")  # the payload of a mission envelope
 BUNDLE: Final = Domain(b"rtshcua/bundle")  # a whole bundle
 BINDING: Final = Domain(b"rtshcua/binding")  # paper symbol `B`: an invocation and all that it rests on
-CONTRACT: Final = Domain(b"rtshcua/contract")  # one skill contract
 ROOT: Final = Domain(b"rtshcua/root")  # the payload of a trust root
 KEY: Final = Domain(b"rtshcua/key")  # a duty and a public key
 

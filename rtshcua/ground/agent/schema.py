@@ -4,8 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-FORMAT = "rtshcua/mission-spec"
-VERSION = 1
+from rtshcua.wire import names
+
+FORMAT, VERSION = names.MISSION_SPEC.name, names.MISSION_SPEC.version
 
 NAME = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$"
 

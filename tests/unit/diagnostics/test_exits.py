@@ -1,6 +1,7 @@
 """The table of exit codes is a promise: a change here breaks scripts."""
 
 import re
+from pathlib import Path
 
 from rtshcua.diagnostics.exits import ExitCode, as_markdown
 
@@ -37,3 +38,7 @@ def test_markdown_has_a_row_for_each_code() -> None:
         "| 0 | `ok` | done; a flight succeeded, a log verified, sources have no errors |",
     ]
     assert len(lines) == 2 + len(ExitCode)
+
+
+def test_the_readme_shows_the_table_as_it_is(checkout: Path) -> None:
+    assert as_markdown() in (checkout / "README.md").read_text(encoding="utf-8")

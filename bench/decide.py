@@ -144,7 +144,7 @@ def asked_of_authority(policy: PreparedPolicy, keys: list[Key]) -> Callable[[], 
 
 def prepared(invocation: flat.Invocation, policy: PreparedPolicy) -> PreparedInvocation:
     """An invocation that is known to be well-formed."""
-    found = prepare_invocation(invocation, policy)
+    found = prepare_invocation(invocation, policy, flat.MISSION.phases)
     assert not isinstance(found, Malformed), found
     return found
 

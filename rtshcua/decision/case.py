@@ -1,9 +1,15 @@
 """One case to decide: everything that the steps read, as sets of values; a single situation is a set of one."""
 
+from collections.abc import Sequence
+
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.decision.values import MAYBE, MISSING, PRESENT, Sets, Span, Value
 from rtshcua.model.flat.situation import Context, Now, State
+
+#: what a single situation may say of a temporal monitor
+SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
 
 
 class Case:
@@ -15,16 +21,25 @@ class Case:
         self, invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, exact: bool
     ) -> None:
         self.invocation, self.policy, self.context, self.exact = invocation, policy, context, exact
-        values, self.monotonic, utc, self.error = sets
-        self.at = Environment([*values, MISSING], invocation.arguments, utc, self.error)
+        _, self.monotonic, utc, self.error, _ = sets
+        self.at = environment(sets, policy, invocation.arguments, invocation.phase)
         self.utc: Span = utc[0] if len(utc) == 1 else (min(low for low, _ in utc), max(high for _, high in utc))
         self.release: Span = (context.released_us, context.released_us)
+
+
+def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
+    """A set of situations, as conditions read it; `phase` is that of the invocation, -1 where there is none."""
+    values, _, utc, error, monitors = sets
+    if len(monitors) != len(policy.monitors):
+        monitors = ()
+    return Environment([*values, MISSING], arguments, utc, error, None, monitors, phase)
 
 
 def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     """The set whose only member is this situation: a slot that is missing, stale or beyond all sense is MISSING.
 
-    A state of the wrong size is a fault of whoever made it; nothing of it is believed.
+    A state of the wrong size is a fault of whoever made it; nothing of it is believed. The same goes for the truths of
+    temporal monitors, where there are too few or too many, or one is no truth.
     """
     limits = policy.limits
     values: list[Value]
@@ -37,12 +52,18 @@ def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
         ]
     else:
         values = [MISSING] * len(limits)
+    monitors: Sequence[Truth] = state.monitors
+    count = len(policy.monitors)
+    if len(monitors) != count or (count and not SINGLE.issuperset(monitors)):
+        monitors = (UNKNOWN,) * count
     utc, error = now.utc_us, max(now.utc_error_us, 0)
-    return Sets(values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error))
+    return Sets(values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error), monitors)
 
 
-def is_situation(sets: Sets) -> bool:
+def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:
     """Whether a set of situations has one member only."""
     spans = (sets.monotonic_us, sets.utc_error_us, *sets.utc_us)
     points = all(low == high and gap != MAYBE for low, high, gap, _ in sets.values)
+    if len(sets.monitors) != len(policy.monitors) or not SINGLE.issuperset(sets.monitors):
+        return False
     return points and len(sets.utc_us) == 1 and all(low == high for low, high in spans)

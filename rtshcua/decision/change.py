@@ -35,7 +35,10 @@ Made: TypeAlias = dict[Subject, int]
 
 
 class Changes:
-    """Looks for changes to what an environment knows. None means that no change of a value helps, or none is known."""
+    """Looks for changes to what an environment knows. None means that no change of a value helps, or none is known.
+
+    What a temporal monitor says, no value of this moment changes; and an invocation stays in its phase.
+    """
 
     def __init__(self, at: Environment, tables: Tables) -> None:
         self._at, self._tables = at, tables
@@ -64,14 +67,19 @@ class Changes:
                 return None
 
     def help(self, node: tree.Node, goal: bool, made: Made) -> bool:
-        """Whether the condition has the truth `goal` once subjects have the values given; a clock is then exact."""
-        slots, arguments, utc = list(self._at.slots), list(self._at.arguments), self._at.utc
+        """Whether the condition has the truth `goal` once subjects have the values given.
+
+        A time of day is the next one there is, for zones may exist on some days only, and the clock is then exact.
+        """
+        here = self._at
+        slots, arguments, utc, error = list(here.slots), list(here.arguments), here.utc, here.error
         for (argument, at), value in made.items():
             if at is None:
-                utc = ((value - self._tables.utc_offset_us,) * 2,)
+                first = utc[0][0]
+                utc, error = ((first + (value - first - self._tables.utc_offset_us) % DAY,) * 2,), (0, 0)
             else:
                 (arguments if argument else slots)[at] = point(value)
-        changed = Environment(slots, arguments, utc, (0, 0), self._at.place)
+        changed = Environment(slots, arguments, utc, error, here.place, here.monitors, here.phase, here.through)
         return build(node, self._tables)(changed) == (TRUE if goal else FALSE)
 
     def _all(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[Change, ...] | None:

@@ -11,7 +11,7 @@ from rtshcua.decision.volume import Planner
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
-from rtshcua.model.flat.policy import Policy, Rule
+from rtshcua.model.flat.policy import Monitor, Policy, Rule
 
 
 class Compiler:
@@ -23,7 +23,9 @@ class Compiler:
         self._conditions: dict[int, Condition] = {}
         self._requires: dict[int, Guards] = {}
         self.tables = Tables(
-            zones=tuple(PreparedZone(number, zone) for number, zone in enumerate(policy.zones)),
+            zones=tuple(
+                PreparedZone(number, zone, policy.vehicle.utc_offset_us) for number, zone in enumerate(policy.zones)
+            ),
             tables=policy.tables,
             sets=tuple(frozenset(members) for members in policy.sets),
             known=_well_known(policy),
@@ -35,6 +37,12 @@ class Compiler:
         node = parse(clause.code, self._scope.about(*contracts))
         assert not isinstance(node, str), node
         return node
+
+    def monitored(self, monitor: Monitor, number: int) -> Condition:
+        """The condition that the temporal monitor of this number looks at."""
+        node = parse(monitor.when.code, self._scope.inside_monitor(number))
+        assert not isinstance(node, str), node
+        return build(node, self.tables)
 
     def guards(self, clauses: tuple[Clause, ...], contract: Contract) -> Guards:
         """The clauses of a contract."""

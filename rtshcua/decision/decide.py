@@ -86,7 +86,7 @@ def possible(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, context: Context
 ) -> frozenset[Possible]:
     """Every (outcome, reason, target) that some situation of the sets may have, and perhaps some that none has."""
-    exact = is_situation(sets)
+    exact = is_situation(sets, policy)
     found: set[Possible] = set()
     for _, (outcome, reason, _) in _verdicts(Case(invocation, policy, context, sets, exact)):
         if outcome is _FALLBACK:

@@ -2,7 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
 from rtshcua.decision.daytime import Daytime
@@ -11,12 +11,17 @@ from rtshcua.decision.truth import AND, FALSE, NOT, OR, TRUE, UNKNOWN, Truth
 from rtshcua.decision.values import ABSENT, Span, Value
 from rtshcua.decision.zones import PreparedZone
 
+#: the phase of what belongs to no mission, and of a phase that the policy does not name
+NO_PHASE: Final = -1
+
 
 class Environment:
     """What a condition is evaluated over: a value for each slot (and MISSING after the last), the arguments, where the
-    vehicle is (None: where the state says; found when first asked), and UTC with its error."""
+    vehicle is (None: where the state says; found when first asked), UTC with its error, the truth of each temporal
+    monitor (none at all: nothing is said about any), and the number of the invocation's phase among the policy's phase
+    names. Zones are asked about every moment from now to `through` us from now."""
 
-    __slots__ = ("arguments", "error", "place", "slots", "utc")
+    __slots__ = ("arguments", "error", "monitors", "phase", "place", "slots", "through", "utc")
 
     def __init__(
         self,
@@ -25,10 +30,18 @@ class Environment:
         utc: tuple[Span, ...],
         error: Span,
         place: Place | None = None,
+        monitors: Sequence[Truth] = (),
+        phase: int = NO_PHASE,
+        through: int = 0,
     ) -> None:
         self.slots, self.arguments = slots, arguments
         self.utc, self.error = utc, error
         self.place = place
+        self.monitors, self.phase, self.through = monitors, phase, through
+
+    def over(self, slots: Sequence[Value], place: Place | None, through: int) -> "Environment":
+        """The same, with other values in the slots, and the vehicle elsewhere, until `through` us from now."""
+        return Environment(slots, self.arguments, self.utc, self.error, place, self.monitors, self.phase, through)
 
 
 Condition: TypeAlias = Callable[[Environment], Truth]
@@ -42,6 +55,12 @@ class Tables(NamedTuple):
     sets: tuple[frozenset[int], ...]
     known: WellKnown
     utc_offset_us: int
+
+
+def within(place: Place, zone: PreparedZone, at: Environment, through: int) -> Truth:
+    """Whether a place is inside a zone, at any moment from now to `through` us from now."""
+    truth = place.inside(zone)
+    return truth if zone.times is None else AND[truth][zone.times.truth(at.utc, at.error, through)]
 
 
 def always(_: Environment) -> Truth:
@@ -70,6 +89,10 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _inside_argument(cell, tables.tables[table], tables)
         case tree.PointInside(cell, zone):
             return _point_inside(cell, tables.zones[zone])
+        case tree.InPhase(members):
+            return _in_phase(tables.sets[members])
+        case tree.Monitored(monitor):
+            return _monitored(monitor)
         case _:
             return _in_window(Daytime(node.start, node.end, tables.utc_offset_us))
 
@@ -136,7 +159,8 @@ def _at_most(terms: tuple[tree.Term, ...], bound: int) -> Condition:
 
     def run(at: Environment) -> Truth:
         low, high, gap = total(terms, at)
-        return known(at_most(low, high, bound), gap)
+        truth = at_most(low, high, bound)
+        return known(truth, gap) if gap else truth
 
     return run
 
@@ -163,7 +187,7 @@ def _equal(terms: tuple[tree.Term, ...], value: int) -> Condition:
     def run(at: Environment) -> Truth:
         low, high, gap = total(terms, at)
         truth = FALSE if low > value or high < value else TRUE if low == high else TRUE | FALSE
-        return known(truth, gap)
+        return known(truth, gap) if gap else truth
 
     return run
 
@@ -180,7 +204,7 @@ def _member(argument: bool, index: int, wanted: frozenset[int]) -> Condition:
             truth = FALSE if not common else TRUE if common == high - low + 1 else TRUE | FALSE
         else:
             truth = FALSE if elements.isdisjoint(wanted) else TRUE if elements <= wanted else TRUE | FALSE
-        return known(truth, gap)
+        return known(truth, gap) if gap else truth
 
     return run
 
@@ -192,7 +216,14 @@ def _inside(zone: PreparedZone, where: WellKnown) -> Condition:
             place = at.place = here(at.slots, where)
         return place.inside(zone)
 
-    return run
+    times = zone.times
+    if times is None:
+        return run
+
+    def run_in_time(at: Environment) -> Truth:
+        return AND[run(at)][times.truth(at.utc, at.error, at.through)]
+
+    return run_in_time
 
 
 def _inside_argument(cell: int, table: tuple[int, ...], tables: Tables) -> Condition:
@@ -217,7 +248,23 @@ def _point_inside(cell: int, zone: PreparedZone) -> Condition:
     def run(at: Environment) -> Truth:
         west, east, _, _ = at.arguments[cell]
         south, north, _, _ = at.arguments[cell + 1]
-        return zone.along((west, south), (0, 0, east - west, north - south))
+        truth = zone.along((west, south), (0, 0, east - west, north - south))
+        return truth if times is None else AND[truth][times.truth(at.utc, at.error, at.through)]
+
+    times = zone.times
+    return run
+
+
+def _in_phase(wanted: frozenset[int]) -> Condition:
+    def run(at: Environment) -> Truth:
+        return TRUE if at.phase in wanted else FALSE
+
+    return run
+
+
+def _monitored(monitor: int) -> Condition:
+    def run(at: Environment) -> Truth:
+        return at.monitors[monitor] if at.monitors else TRUE | FALSE | UNKNOWN
 
     return run
 

@@ -3,13 +3,13 @@
 from typing import NamedTuple
 
 from rtshcua.decision.airspace import keeps
-from rtshcua.decision.case import situation
+from rtshcua.decision.case import environment, situation
 from rtshcua.decision.energy import SECOND
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.places import here
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.truth import FALSE, NOT, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import MISSING, PRESENT
+from rtshcua.decision.values import PRESENT
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.situation import Now, State
 
@@ -26,11 +26,11 @@ class Unkept(NamedTuple):
 def holding(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> tuple[Unkept, ...]:
     """What stands against waiting for `invocation` here: the airspace, its `degrade` rules, the charge to come home."""
     sets = situation(state, policy, now)
-    at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
     checks = [Unkept(rule.rule.text, NOT[rule.condition(at)]) for rule in invocation.candidates.degrades]
     if policy.airspace is not None:
         checks.append(
-            Unkept(policy.airspace.airspace.text, keeps(here(at.slots, policy.tables.known), policy.airspace))
+            Unkept(policy.airspace.airspace.text, keeps(here(at.slots, policy.tables.known), policy.airspace, at, 0))
         )
     checks.append(Unkept(WAY_HOME, _way_home(at, policy)))
     return tuple(check for check in checks if check.truth != TRUE)

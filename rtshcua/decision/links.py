@@ -10,12 +10,13 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from rtshcua.decision.airspace import keeps
-from rtshcua.decision.case import situation
-from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.case import environment, situation
+from rtshcua.decision.evaluate import NO_PHASE, Environment
+from rtshcua.decision.lasting import longest
 from rtshcua.decision.link import PreparedLink
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import MISSING, Sets
+from rtshcua.decision.values import Sets
 from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.flat.situation import Now, State
 
@@ -43,35 +44,36 @@ def choose_fallback(
 
 def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: int = START) -> Choice | None:
     """The first link of the policy's contingency after `after` that may fly now."""
-    return next(_chosen(policy.contingency, situation(state, policy, now), policy, after, exact=True))
+    return next(_chosen(policy.contingency, situation(state, policy, now), policy, after, True, NO_PHASE))
 
 
-def link_admissible(link: PreparedLink, state: State, policy: PreparedPolicy, now: Now) -> bool:
-    """Whether a link of a prepared chain may fly now."""
-    return admissible(link, situation(state, policy, now), policy, exact=True) == TRUE
+def link_admissible(link: PreparedLink, state: State, policy: PreparedPolicy, now: Now, phase: int = NO_PHASE) -> bool:
+    """Whether a link of a prepared chain may fly now; `phase` is that of the invocation whose chain it is."""
+    return admissible(link, situation(state, policy, now), policy, True, phase) == TRUE
 
 
 def fallbacks(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, after: int, exact: bool
 ) -> Iterator[Choice | None]:
     """The links that may be the choice, in order, and None if perhaps none flies; one situation has one answer."""
+    phase = invocation.phase
     if after < DEGRADE:
-        at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
+        at = environment(sets, policy, invocation.arguments, phase)
         for rule in invocation.candidates.degrades:
             matches = rule.condition(at)
-            truth = AND[matches][admissible(rule.target, sets, policy, exact)] if matches & TRUE else FALSE
+            truth = AND[matches][admissible(rule.target, sets, policy, exact, phase)] if matches & TRUE else FALSE
             if truth & TRUE:
                 yield Choice(DEGRADE, rule.target.link)
             if truth == TRUE:
                 return
-    yield from _chosen(invocation.chain, sets, policy, after, exact)
+    yield from _chosen(invocation.chain, sets, policy, after, exact, phase)
 
 
 def _chosen(
-    chain: Sequence[PreparedLink], sets: Sets, policy: PreparedPolicy, after: int, exact: bool
+    chain: Sequence[PreparedLink], sets: Sets, policy: PreparedPolicy, after: int, exact: bool, phase: int
 ) -> Iterator[Choice | None]:
     for index in range(max(after + 1, 0), len(chain)):
-        truth = admissible(chain[index], sets, policy, exact)
+        truth = admissible(chain[index], sets, policy, exact, phase)
         if truth & TRUE:
             yield Choice(index, chain[index].link)
         if truth == TRUE:
@@ -79,9 +81,9 @@ def _chosen(
     yield None
 
 
-def admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: bool) -> Truth:
+def admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: bool, phase: int) -> Truth:
     """Whether a link may fly, over a set of situations."""
-    at = Environment([*sets.values, MISSING], link.arguments, sets.utc_us, sets.utc_error_us)
+    at = environment(sets, policy, link.arguments, phase)
     truth = TRUE
     for _, condition in link.require:
         truth = AND[truth][condition(at)]
@@ -94,12 +96,16 @@ def _deepens_no_breach(link: PreparedLink, at: Environment, policy: PreparedPoli
     """Whether a link that moves stays in the airspace, or goes home from where the vehicle should not be."""
     airspace, known = policy.airspace, policy.tables.known
     assert airspace is not None
-    along = keeps(link.planner.volume(at.slots, known).place, airspace)
+    along = keeps(link.planner.volume(at.slots, known).place, airspace, at, _through(link, policy))
     if exact:
         along = EVERYWHERE[along]
     if link.motion != MotionKind.HOME:
         return along
-    now = keeps(policy.still.volume(at.slots, known).place, airspace)
+    now = keeps(policy.still.volume(at.slots, known).place, airspace, at, 0)
     if exact:
         now = EVERYWHERE[now]
     return (TRUE if now & FALSE else 0) | (along if now & TRUE else 0) | now & UNKNOWN
+
+
+def _through(link: PreparedLink, policy: PreparedPolicy) -> int:
+    return longest(policy.policy.contracts[link.link.skill], policy.policy.vehicle, link.link.limit_us)

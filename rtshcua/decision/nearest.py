@@ -2,15 +2,15 @@
 
 from typing import NamedTuple
 
-from rtshcua.decision.case import situation
+from rtshcua.decision.case import environment, situation
 from rtshcua.decision.change import Changes, Made
 from rtshcua.decision.decide import Decision
 from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.lasting import longest
 from rtshcua.decision.offer import Offer, offer
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.tree import Node
-from rtshcua.decision.values import MISSING
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE
 from rtshcua.model.flat.limits import FULL
@@ -37,7 +37,7 @@ def nearest(
 ) -> tuple[Nearest, ...]:
     """The changes which, made together, satisfy what decided; empty when no change of a value is known to."""
     sets = situation(state, policy, now)
-    at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
     match decision.reason:
         case Reason.ARGUMENT_RANGE:
             return _in_range(invocation)
@@ -47,7 +47,8 @@ def nearest(
             return _charged(invocation, policy, at)
         case Reason.INVARIANT:
             known = policy.tables.known
-            at = ranging(at, invocation.planner.volume(at.slots, known), known.height)
+            through = longest(invocation.invocation.contract, policy.policy.vehicle)
+            at = ranging(at, invocation.planner.volume(at.slots, known), known.height, through)
     return _fewest(_conditions(decision, invocation, policy), invocation, policy, at)
 
 

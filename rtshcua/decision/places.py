@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
+from rtshcua.decision.bands import Box
 from rtshcua.decision.truth import AND, FALSE, UNKNOWN, Truth
 from rtshcua.decision.values import ABSENT, Value
-from rtshcua.decision.zones import Box, PreparedZone
+from rtshcua.decision.zones import PreparedZone
 
 
 class Sweep:
-    """A path widened by a box (see `zones`). It remembers each zone's answer, which depends on nothing else."""
+    """A path widened by a box (see `zones`). It remembers each zone's answer, which depends on nothing else: when
+    the zone exists is asked elsewhere (`evaluate.within`)."""
 
     __slots__ = ("_answers", "box", "path")
 
@@ -42,7 +44,7 @@ class Place:
         self._answers: dict[int, Truth] = {}
 
     def inside(self, zone: PreparedZone) -> Truth:
-        """Whether the places are inside a zone."""
+        """Whether the places are inside a zone, at a time at which it exists."""
         answer = self._answers.get(zone.number)
         if answer is None:
             answer = self._answers[zone.number] = self._inside(zone)

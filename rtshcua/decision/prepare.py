@@ -10,14 +10,17 @@ from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.decision.checks.policy import problems
 from rtshcua.decision.compiler import Compiler
 from rtshcua.decision.energy import Energy
+from rtshcua.decision.evaluate import NO_PHASE
+from rtshcua.decision.lasting import longest
 from rtshcua.decision.parameters import misfit
-from rtshcua.decision.prepared import Limit, PreparedAirspace, PreparedInvocation, PreparedPolicy
-from rtshcua.decision.reads import slots_read, where
-from rtshcua.decision.rules import Candidates, RuleIndex
+from rtshcua.decision.prepared import Limit, PreparedAirspace, PreparedInvocation, PreparedMonitor, PreparedPolicy
+from rtshcua.decision.reads import monitored, slots_read, where
+from rtshcua.decision.rules import RuleIndex
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.limits import MAX_DURATION, MAX_GAP, MAX_VALUE
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Policy
 from rtshcua.model.flat.signal import POSITION
@@ -45,6 +48,10 @@ def prepare(policy: Policy) -> PreparedPolicy | Malformed:
         airspace=None if policy.airspace is None else _airspace(policy.airspace, compiler),
         contingency=compiler.links(policy.contingency),
         still=Planner(MotionKind.HOLD, (), None, policy.vehicle.position_error),
+        monitors=tuple(
+            PreparedMonitor(monitor.kind, monitor.window_us, compiler.monitored(monitor, number))
+            for number, monitor in enumerate(policy.monitors)
+        ),
     )
 
 
@@ -55,20 +62,26 @@ def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedI
         return Malformed(problem)
     prepared: list[PreparedInvocation] = []
     for step, invocation in enumerate(mission.invocations):
-        found = prepare_invocation(invocation, policy)
+        found = prepare_invocation(invocation, policy, mission.phases)
         if isinstance(found, Malformed):
             return Malformed(f"step {step}: {found.what}")
         prepared.append(found)
     return tuple(prepared)
 
 
-def prepare_invocation(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation | Malformed:
-    """The invocation, compiled, or what is wrong with it. An argument out of range is for `decide` to refuse."""
-    problem = next(mission_checks.invocation(invocation, policy.policy), None)
+def prepare_invocation(
+    invocation: Invocation, policy: PreparedPolicy, phases: tuple[str, ...]
+) -> PreparedInvocation | Malformed:
+    """The invocation of a mission with these phases, compiled, or what is wrong with it. An argument out of range is
+    for `decide` to refuse.
+    """
+    problem = next(mission_checks.invocation(invocation, policy.policy, policy.tables.zones), None)
     if problem is not None:
         return Malformed(problem)
     compiler, contract, plan = policy.compiler, invocation.contract, invocation.plan
     candidates = policy.rules.candidates(invocation.skill, invocation.role, invocation.source)
+    clauses = [*contract.require, *contract.assume, *contract.maintain]
+    clauses += [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
     return PreparedInvocation(
         invocation=invocation,
         policy=policy,
@@ -86,7 +99,10 @@ def prepare_invocation(invocation: Invocation, policy: PreparedPolicy) -> Prepar
             policy.policy.vehicle.position_error,
         ),
         energy=Energy(contract, policy.policy.vehicle),
-        reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(invocation, candidates, policy.policy)),
+        reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),
+        phase=_phase(invocation, policy.policy, phases),
+        rests_us=MAX_GAP if monitored(clauses) else MAX_DURATION,
+        lasts_us=longest(contract, policy.policy.vehicle),
     )
 
 
@@ -107,10 +123,14 @@ def _limits(policy: Policy) -> tuple[Limit, ...]:
     return tuple(limits)
 
 
-def _reads(invocation: Invocation, candidates: Candidates, policy: Policy) -> tuple[int, ...]:
-    """The slots that a decision on this invocation may read: whatever it found there bounds how long it holds."""
-    conditions = [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
+def _reads(clauses: list[Clause], policy: Policy) -> tuple[int, ...]:
+    """The slots that a decision on these clauses may read: whatever it found there bounds how long it holds."""
     vehicle = policy.vehicle
     battery = () if vehicle.battery == -1 else (vehicle.battery,)
-    slots = {*invocation.contract.reads, *slots_read(conditions, vehicle), *where(vehicle), *battery}
-    return tuple(sorted(slots))
+    return tuple(sorted({*slots_read(clauses, vehicle, policy.monitors), *where(vehicle), *battery}))
+
+
+def _phase(invocation: Invocation, policy: Policy, phases: tuple[str, ...]) -> int:
+    """The number of the invocation's phase among the policy's names. One that no condition names is as good as none."""
+    name = phases[invocation.phase] if 0 <= invocation.phase < len(phases) else None
+    return policy.phases.index(name) if name in policy.phases else NO_PHASE

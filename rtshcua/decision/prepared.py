@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.decision.compiler import Compiler
 from rtshcua.decision.energy import Energy
-from rtshcua.decision.evaluate import Tables
+from rtshcua.decision.evaluate import Condition, Tables
 from rtshcua.decision.link import Guards, PreparedLink
 from rtshcua.decision.rules import Candidates, RuleIndex
 from rtshcua.decision.values import Value
@@ -31,9 +31,17 @@ class Limit(NamedTuple):
     most: int
 
 
+class PreparedMonitor(NamedTuple):
+    """A temporal monitor: its kind, how far back it looks, and the condition that it looks at."""
+
+    kind: int
+    window_us: int
+    condition: Condition
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedPolicy:
-    """A policy that was found well-formed, compiled. `limits` has one entry a slot."""
+    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `monitors` are in order."""
 
     policy: Policy
     compiler: Compiler
@@ -43,6 +51,7 @@ class PreparedPolicy:
     airspace: PreparedAirspace | None
     contingency: tuple[PreparedLink, ...]
     still: Planner  # plans to stay: the present place with its error
+    monitors: tuple[PreparedMonitor, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +59,9 @@ class PreparedInvocation:
     """An invocation that was found well-formed, compiled under `policy`.
 
     `misfit` is the first parameter whose argument is out of range; `reads` are the slots that a decision may read, each
-    with the age in us at which it is stale.
+    with the age in us at which it is stale. `phase` is the number of its mission phase among the policy's phase names,
+    -1 if it is none of them; `rests_us` how long the observation that a decision rests on stands for the moments after;
+    `lasts_us` the longest that it may fly (`lasting.longest`).
     """
 
     invocation: Invocation
@@ -65,3 +76,6 @@ class PreparedInvocation:
     planner: Planner
     energy: Energy
     reads: tuple[tuple[int, int], ...]
+    phase: int
+    rests_us: int
+    lasts_us: int

@@ -3,20 +3,32 @@
 from collections.abc import Iterable
 
 from rtshcua.model.flat.code import Clause, Op
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import Monitor, Vehicle
 
 
-def slots_read(clauses: Iterable[Clause], vehicle: Vehicle) -> tuple[int, ...]:
-    """The slots that well-formed clauses read, ascending; asking where the vehicle is reads its position and height."""
+def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Monitor, ...] = ()) -> tuple[int, ...]:
+    """The slots that well-formed clauses read, themselves or through the policy's temporal monitors, ascending; asking
+    where the vehicle is reads its position and height.
+    """
     slots: set[int] = set()
-    for clause in clauses:
-        for at in range(0, len(clause.code), 3):
-            op = clause.code[at]
+    left, seen = list(clauses), set[int]()
+    while left:
+        code = left.pop().code
+        for at in range(0, len(code), 3):
+            op = code[at]
             if op in (Op.SIGNAL, Op.SIGNAL_IN):
-                slots.add(clause.code[at + 1])
+                slots.add(code[at + 1])
             elif op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT):
                 slots.update(where(vehicle))
+            elif op == Op.MONITOR and code[at + 1] not in seen:
+                seen.add(code[at + 1])
+                left.append(monitors[code[at + 1]].when)
     return tuple(sorted(slots))
+
+
+def monitored(clauses: Iterable[Clause]) -> bool:
+    """Whether well-formed clauses ask a temporal monitor anything."""
+    return any(Op.MONITOR in clause.code[::3] for clause in clauses)
 
 
 def where(vehicle: Vehicle) -> tuple[int, ...]:

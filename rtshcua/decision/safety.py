@@ -1,7 +1,8 @@
 """Step 7: the vehicle's envelope, airspace and invariants over the planned volume, energy, and `degrade` rules.
 
 The invariants (`maintain`, paper symbol `inv`) are evaluated with position and height ranging over the planned volume,
-everything else as it is now.
+with zones as they exist from now to the end of the contract's longest duration, everything else as it is now; a
+temporal monitor says what it says now.
 """
 
 from rtshcua.decision.airspace import keeps
@@ -29,11 +30,11 @@ def _fails(case: Case, tally: Tally) -> bool:
         return tally.fails(FALSE, Reason.ENVELOPE, None)
     volume = invocation.planner.volume(at.slots, known)
     if policy.airspace is not None:
-        truth = keeps(volume.place, policy.airspace)
+        truth = keeps(volume.place, policy.airspace, at, invocation.lasts_us)
         if truth != TRUE and tally.fails(truth, Reason.AIRSPACE, policy.airspace.airspace):
             return True
     if invocation.maintain:
-        over = ranging(at, volume, known.height)
+        over = ranging(at, volume, known.height, invocation.lasts_us)
         for clause, condition in invocation.maintain:
             truth = condition(over)
             if truth != TRUE and tally.fails(truth, Reason.INVARIANT, clause):
@@ -48,8 +49,8 @@ def _fails(case: Case, tally: Tally) -> bool:
     return False
 
 
-def ranging(at: Environment, volume: Volume, height: int) -> Environment:
-    """The same, with position and height anywhere in a volume."""
+def ranging(at: Environment, volume: Volume, height: int, through: int) -> Environment:
+    """The same, with position and height anywhere in a volume, at any time until `through` us from now."""
     slots = list(at.slots)
     slots[height] = volume.height
-    return Environment(slots, at.arguments, at.utc, at.error, volume.place)
+    return at.over(slots, volume.place, through)

@@ -1,4 +1,4 @@
-"""What code may name: the slots, cells, zones, tables and sets that exist, and of what kind they are."""
+"""What code may name: the slots, cells, zones, tables, sets and monitors that exist, and of what kind they are."""
 
 from typing import NamedTuple
 
@@ -11,14 +11,17 @@ class Scope(NamedTuple):
     """Each method answers what is wrong with naming an index, or None.
 
     `kinds` is the signal kind of each slot. `cells` is, for each skill that the code may speak of, the parameter kind
-    at each first cell: an argument must exist, of the same kind, in all of them, and in at least one.
+    at each first cell: an argument must exist, of the same kind, in all of them, and in at least one. `members` are
+    the policy's sets; `phases` counts its phase names, None where code may not ask for the phase.
     """
 
     kinds: tuple[int, ...]
     zones: int
     tables: int
-    sets: int
+    members: tuple[tuple[int, ...], ...]
     cells: tuple[dict[int, int], ...]
+    monitors: int
+    phases: int | None
 
     def number(self, slot: int) -> str | None:
         """A slot that holds a number (an enumeration's ordinal is one)."""
@@ -57,7 +60,20 @@ class Scope(NamedTuple):
 
     def set_of_members(self, index: int) -> str | None:
         """A membership set."""
-        return None if 0 <= index < self.sets else f"there is no set {index}"
+        return None if 0 <= index < len(self.members) else f"there is no set {index}"
+
+    def set_of_phases(self, index: int) -> str | None:
+        """A membership set of phase names."""
+        phases = self.phases
+        if phases is None:
+            return "the phase is asked for where there is none"
+        if not 0 <= index < len(self.members):
+            return f"there is no set {index}"
+        return None if all(0 <= member < phases for member in self.members[index]) else f"set {index} is none of phases"
+
+    def monitor(self, index: int) -> str | None:
+        """A temporal monitor."""
+        return None if 0 <= index < self.monitors else f"there is no monitor {index} here"
 
     def _argument(self, cell: int, kinds: tuple[int, ...], name: str) -> str | None:
         if not self.cells:
@@ -68,6 +84,10 @@ class Scope(NamedTuple):
     def about(self, *contracts: Contract) -> "Scope":
         """The same, for code that may name the arguments of these contracts' skills."""
         return self._replace(cells=tuple(cells_of(contract) for contract in contracts))
+
+    def inside_monitor(self, number: int) -> "Scope":
+        """The same, for the code of a temporal monitor: it may read those before it, no argument and no phase."""
+        return self._replace(cells=(), monitors=number, phases=None)
 
 
 def cells_of(contract: Contract) -> dict[int, int]:
@@ -81,4 +101,5 @@ def scope_of(policy: Policy) -> Scope:
     for signal in policy.signals:
         for slot in range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1)):
             kinds[slot] = signal.kind
-    return Scope(tuple(kinds), len(policy.zones), len(policy.tables), len(policy.sets), ())
+    monitors, phases = len(policy.monitors), len(policy.phases)
+    return Scope(tuple(kinds), len(policy.zones), len(policy.tables), policy.sets, (), monitors, phases)

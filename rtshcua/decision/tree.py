@@ -68,6 +68,18 @@ class InWindow(NamedTuple):
     end: int
 
 
+class InPhase(NamedTuple):
+    """The invocation's mission phase is in set `members` of the policy."""
+
+    members: int
+
+
+class Monitored(NamedTuple):
+    """What temporal monitor `monitor` says."""
+
+    monitor: int
+
+
 class Both(NamedTuple):
     """Kleene's `and`."""
 
@@ -88,7 +100,8 @@ class Not(NamedTuple):
     operand: "Node"
 
 
-Node: TypeAlias = AtMost | Equal | Member | Inside | InsideArgument | PointInside | InWindow | Both | Either | Not
+Atom: TypeAlias = AtMost | Equal | Member | Inside | InsideArgument | PointInside | InWindow | InPhase | Monitored
+Node: TypeAlias = Atom | Both | Either | Not
 
 
 class _Sum(NamedTuple):
@@ -224,6 +237,10 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
         case Op.TIME_IN:
             within = 0 <= a < DAY and 0 <= b <= DAY
             problem, node = None if within else f"{a}..{b} us is not a time of day", InWindow(a, b)
+        case Op.PHASE_IN:
+            problem, node = scope.set_of_phases(b) or _unused(a), InPhase(b)
+        case Op.MONITOR:
+            problem, node = scope.monitor(a) or _unused(b), Monitored(a)
         case _:
             return f"no instruction has the number {op}"
     stack.append(node)

@@ -44,7 +44,8 @@ def maybe(value: Value) -> Value:
 
 
 class Sets(NamedTuple):
-    """A set of situations: one `Value` a state slot, and the moments at which they may be met (see `Now`).
+    """A set of situations: one `Value` a state slot, the moments at which they may be met (see `Now`), and the truths
+    that each temporal monitor may have (`decision.truth`; of another length than the policy's: any truths).
 
     A point of it is one choice from each, with every age fresh; a value that may be missing stands for stale ones too.
     """
@@ -53,3 +54,4 @@ class Sets(NamedTuple):
     monotonic_us: Span
     utc_us: tuple[Span, ...]
     utc_error_us: Span
+    monitors: Sequence[int] = ()

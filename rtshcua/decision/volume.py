@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from math import isqrt
 from typing import NamedTuple
 
+from rtshcua.decision.bands import Box
 from rtshcua.decision.places import NOWHERE, Part, Place, Sweep, WellKnown
 from rtshcua.decision.truth import UNKNOWN
 from rtshcua.decision.values import ABSENT, MISSING, Span, Value
-from rtshcua.decision.zones import Box
 from rtshcua.model.flat.contract import MotionKind
 
 HOME = (0, 0)  # the origin of local coordinates

@@ -4,12 +4,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision.airspace import keeps
-from rtshcua.decision.case import situation
+from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.places import here
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.truth import NOT, TRUE, Truth
-from rtshcua.decision.values import MISSING
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Now, State
@@ -29,7 +28,7 @@ def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
     the caller keeps that clock.
     """
     sets = situation(state, policy, now)
-    at = Environment([*sets.values, MISSING], invocation.arguments, sets.utc_us, sets.utc_error_us)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
     return tuple(broken for broken in _held(invocation, policy, at) if broken.truth != TRUE)
 
 
@@ -38,6 +37,6 @@ def _held(invocation: PreparedInvocation, policy: PreparedPolicy, at: Environmen
         for clause, condition in guards:
             yield Broken(clause, condition(at))
     if policy.airspace is not None:
-        yield Broken(policy.airspace.airspace, keeps(here(at.slots, policy.tables.known), policy.airspace))
+        yield Broken(policy.airspace.airspace, keeps(here(at.slots, policy.tables.known), policy.airspace, at, 0))
     for rule in invocation.candidates.degrades:
         yield Broken(rule.rule, NOT[rule.condition(at)])

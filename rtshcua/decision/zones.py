@@ -1,29 +1,24 @@
 """Is a place, or everything along a path, inside a zone? Exact, in integers, without division.
 
-A zone is an open set: its boundary, floor and ceiling are outside. A *sweep* is a path of straight legs, each widened
-by a box; a point is a path of one place and an empty box, a set of places one place and the box they may be in, and
-what a vehicle with a position error may cover is its path and the box of that error. A sweep that touches a boundary
-counts as being on both sides of it, so that it is refused whichever side was asked.
+A zone is an open set: its boundary (that of a hole too), floor and ceiling are outside. A *sweep* is a path of straight
+legs, each widened by a box; a point is a path of one place and an empty box, a set of places one place and the box they
+may be in, and what a vehicle with a position error may cover is its path and the box of that error. A sweep that
+touches a boundary counts as being on both sides of it, so that it is refused whichever side was asked.
 
 Bounds for 64-bit arithmetic: coordinates and box sides within 2**29 mm (`MAX_COORDINATE`), hence differences within
 2**30, cross products within 2**61 and their sums with the box's within 2**62.
 """
 
 from math import isqrt
-from typing import TypeAlias
 
+from rtshcua.decision.bands import Bands, Box
+from rtshcua.decision.outline import edges
+from rtshcua.decision.slabs import Slabs
+from rtshcua.decision.times import Times
 from rtshcua.decision.truth import FALSE, TRUE, Truth
 from rtshcua.model.flat.zone import CIRCLE, Zone
 
-#: how far a sweep reaches west, south (not above 0), east and north (not below 0) of its path, mm
-Box: TypeAlias = tuple[int, int, int, int]
-#: x0, y0, x1, y1 and the bounding box west, east, south, north
-Edge: TypeAlias = tuple[int, int, int, int, int, int, int, int]
-#: x0, y0, x1, y1
-Leg: TypeAlias = tuple[int, int, int, int]
-
 NO_BOX: Box = (0, 0, 0, 0)
-FEW_EDGES = 16
 
 
 class Circle:
@@ -68,78 +63,27 @@ class Circle:
         return abs(ux * vy - uy * vx) > radius * (isqrt(square) + 1)
 
 
-class Polygon:
-    """A simple polygon. Its edges are kept in horizontal bands, so that a question looks at few of them."""
+class Area:
+    """The inside of the rings of a polygon, or of areas with holes."""
 
-    __slots__ = ("_bands", "_east", "_height", "_north", "_south", "_west")
+    __slots__ = ("clear", "contains")
 
-    def __init__(self, data: tuple[int, ...]) -> None:
-        xs, ys = data[::2], data[1::2]
-        self._west, self._east, self._south, self._north = min(xs), max(xs), min(ys), max(ys)
-        edges = [_edge(x0, y0, x1, y1) for x0, y0, x1, y1 in zip(xs, ys, xs[1:] + xs[:1], ys[1:] + ys[:1], strict=True)]
-        count = 1 if len(edges) <= FEW_EDGES else isqrt(len(edges))
-        self._height = (self._north - self._south) // count + 1
-        bands: list[list[Edge]] = [[] for _ in range(count)]
-        for edge in edges:
-            for band in range(self._band(edge[6]), self._band(edge[7]) + 1):
-                bands[band].append(edge)
-        self._bands = tuple(tuple(band) for band in bands)
-
-    def _band(self, y: int) -> int:
-        return (y - self._south) // self._height
-
-    def contains(self, x: int, y: int) -> bool:
-        """Whether a place is inside: an odd number of edges lie east of it, and none goes through it."""
-        if not (self._west < x < self._east and self._south < y < self._north):
-            return False
-        inside = False
-        for x0, y0, x1, y1, west, east, south, north in self._bands[self._band(y)]:
-            if south <= y <= north:
-                side = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)
-                if side == 0 and west <= x <= east:
-                    return False
-                if (y0 > y) != (y1 > y) and (side > 0) == (y1 > y0):
-                    inside = not inside
-        return inside
-
-    def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
-        """Whether no edge meets the widened leg: each is parted from it by a line (separating axes)."""
-        west, east = (x0, x1) if x0 < x1 else (x1, x0)
-        south, north = (y0, y1) if y0 < y1 else (y1, y0)
-        west, south, east, north = west + box[0], south + box[1], east + box[2], north + box[3]
-        first, last = max(self._band(south), 0), min(self._band(north), len(self._bands) - 1)
-        for band in self._bands[first : last + 1]:  # an edge that spans bands comes once for each
-            for ax, ay, bx, by, edge_west, edge_east, edge_south, edge_north in band:
-                if edge_east < west or edge_west > east or edge_north < south or edge_south > north:
-                    continue
-                edge, leg = (ax, ay, bx, by), (x0, y0, x1, y1)
-                if not _parted(x1 - x0, y1 - y0, edge, leg, box) and not _parted(bx - ax, by - ay, edge, leg, box):
-                    return False
-        return True
-
-
-def _edge(x0: int, y0: int, x1: int, y1: int) -> Edge:
-    return (x0, y0, x1, y1, min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1))
-
-
-def _parted(x: int, y: int, edge: Leg, leg: Leg, box: Box) -> bool:
-    """Whether a line in the direction (x, y) parts an edge from a widened leg: their cross products do not overlap."""
-    west, south, east, north = box
-    a, b, c, d = x * edge[1] - y * edge[0], x * edge[3] - y * edge[2], x * leg[1] - y * leg[0], x * leg[3] - y * leg[2]
-    least = (x * south if x > 0 else x * north) - (y * east if y > 0 else y * west)
-    most = (x * north if x > 0 else x * south) - (y * west if y > 0 else y * east)
-    return max(a, b) < min(c, d) + least or min(a, b) > max(c, d) + most
+    def __init__(self, zone: Zone) -> None:
+        legs = tuple(edges(zone))
+        self.contains = Slabs(legs).contains
+        self.clear = Bands(legs).clear
 
 
 class PreparedZone:
-    """A zone ready to be asked; `number` is its index in the policy."""
+    """A zone ready to be asked; `number` is its index in the policy, `times` is None where it exists at all times."""
 
-    __slots__ = ("ceiling", "floor", "number", "shape")
+    __slots__ = ("ceiling", "floor", "number", "shape", "times")
 
-    def __init__(self, number: int, zone: Zone) -> None:
+    def __init__(self, number: int, zone: Zone, utc_offset_us: int = 0) -> None:
         self.number = number
         self.floor, self.ceiling = zone.floor, zone.ceiling
-        self.shape: Circle | Polygon = Circle(zone.data) if zone.shape == CIRCLE else Polygon(zone.data)
+        self.shape: Circle | Area = Circle(zone.data) if zone.shape == CIRCLE else Area(zone)
+        self.times = Times(zone, utc_offset_us) if zone.daily or zone.dates else None
 
     def along(self, path: tuple[int, ...], box: Box) -> Truth:
         """Whether the places of a sweep are inside, whatever their height."""

@@ -161,7 +161,7 @@ class Recorder:
                 reason.value,
                 rule_step,
                 chain.seq,
-                RecordedState(state.ages, state.values),
+                RecordedState(ages=state.ages, monitors=state.monitors, values=state.values),
                 step,
                 target,
                 target_link,

@@ -60,10 +60,16 @@ class Genesis(Record, frozen=True):
     version: Count
 
 
-class RecordedState(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
-    """Paper symbol `S_t` as it was read: one value and one age (us) a slot, null where nothing valid was received."""
+class RecordedState(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True, gc=False
+):
+    """Paper symbol `S_t` as it was read: one value and one age (us) a slot, null where nothing valid was received; and
+    what each temporal monitor of the policy said (1 true, 2 false, 4 unknown). Without monitors there is no such field,
+    as in logs that are older than it is.
+    """
 
     ages: tuple[Integer, ...]
+    monitors: tuple[Integer, ...] = ()
     values: tuple[Integer | None, ...]
 
 

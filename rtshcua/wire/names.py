@@ -19,12 +19,12 @@ class Artefact:
 
 
 ROOT: Final = Artefact("rtshcua/root", 1)
-POLICY: Final = Artefact("rtshcua/policy", 1)
+POLICY: Final = Artefact("rtshcua/policy", 2)
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 1)
 LOG: Final = Artefact("rtshcua/log", 1, "")  # JSON lines (RFC 8785), which have no registered suffix
-REQUEST: Final = Artefact("rtshcua/request", 1)
+REQUEST: Final = Artefact("rtshcua/request", 2)  # 2: with temporal monitors
 RESPONSE: Final = Artefact("rtshcua/response", 1)
 PERMIT: Final = Artefact("rtshcua/permit", 1)
 DIAGNOSTICS: Final = Artefact("rtshcua/diagnostics", 1, "+json")

@@ -2,8 +2,12 @@
 
 The body is one string of octets in a fixed layout, big-endian: kind, step, link, the binding presented, the moment
 (monotonic, UTC and its error), the release time, `L_rem` and the phase, then the state's values (8 octets a slot,
-`UNKNOWN` for None) and ages (4 octets a slot). Times are in us. Nothing has a variable width, so one request has one
-encoding, and a boundary in C reads it in place, without a parser.
+`UNKNOWN` for None) and ages (4 octets a slot), and what its temporal monitors say (1 octet each: 1 true, 2 false, 4
+unknown). Times are in us. Nothing has a variable width, so one request has one encoding, and a boundary in C reads it
+in place, without a parser.
+
+The largest one: 21 octets around the body, 79 before the state, 12 for each of `MAX_SLOTS`, 1 for each of
+`MAX_MONITORS`: 21 + 79 + 12 * 72 + 32 = 996.
 """
 
 from functools import cache
@@ -27,6 +31,7 @@ MAX_SIZE: Final = 1023
 #: Ages saturate here; no signal may have a longer time to stale.
 MAX_AGE_US: Final = MAX_STALE + 1
 UNKNOWN: Final = -(1 << 63)
+_TRUTHS: Final = frozenset({1, 2, 4})
 
 _HEAD: Final = f">Bhh{DIGEST_BYTES}s5QH"
 _HEAD_FIELDS: Final = 10
@@ -60,7 +65,7 @@ class Malformed(msgspec.Struct, frozen=True):
 def encode(request: Request) -> bytes:
     """The request's octets. Raises `struct.error` for what no monitor and no clock makes."""
     state, now = request.state, request.now
-    prefix, layout = _form(len(state.values))
+    prefix, layout = _form(len(state.values), len(state.monitors))
     return prefix + layout.pack(
         request.kind,
         request.step,
@@ -74,14 +79,18 @@ def encode(request: Request) -> bytes:
         request.phase,
         *[UNKNOWN if value is None else value for value in state.values],
         *state.ages,
+        *state.monitors,
     )
 
 
-def decode(data: bytes, slots: int) -> Request | Malformed:
-    """Read a request for a state of `slots` slots. Accepts only the octets that `encode` makes; raises nothing."""
-    prefix, layout = _form(slots)
+def decode(data: bytes, slots: int, monitors: int) -> Request | Malformed:
+    """Read a request for a state of so many slots and temporal monitors. Accepts only the octets that `encode` makes;
+    raises nothing.
+    """
+    prefix, layout = _form(slots, monitors)
     if len(data) != len(prefix) + layout.size or not data.startswith(prefix):
-        return Malformed(f"not a request of version {names.REQUEST.version} for a state of {slots} slots")
+        version = names.REQUEST.version
+        return Malformed(f"not a request of version {version} for a state of {slots} slots and {monitors} monitors")
     fields = layout.unpack_from(data, len(prefix))
     kind, step, link, binding, at_us, utc_us, utc_error_us, released_us, remaining_us, phase = fields[:_HEAD_FIELDS]
     if kind > CONTINGENCY_LINK or step < -1 or link < -1:
@@ -93,14 +102,16 @@ def decode(data: bytes, slots: int) -> Request | Malformed:
         values = tuple([None if value == UNKNOWN else value for value in values])
     if not all([value is None or -MAX_VALUE <= value <= MAX_VALUE for value in values]):  # noqa: C419 - it is faster
         return Malformed("a state value out of range")
-    ages = fields[_HEAD_FIELDS + slots :]
+    ages, said = fields[_HEAD_FIELDS + slots : _HEAD_FIELDS + 2 * slots], fields[_HEAD_FIELDS + 2 * slots :]
+    if not _TRUTHS.issuperset(said):
+        return Malformed("what a monitor says is no truth")
     now = Now(at_us, utc_us, utc_error_us)
-    return Request(kind, step, link, binding, now, State(values, ages), released_us, phase, remaining_us)
+    return Request(kind, step, link, binding, now, State(values, ages, said), released_us, phase, remaining_us)
 
 
 @cache
-def _form(slots: int) -> tuple[bytes, Struct]:
-    """What every request for a state of so many slots begins with, and the layout of what follows."""
-    layout = Struct(f"{_HEAD}{slots}q{slots}I")
+def _form(slots: int, monitors: int) -> tuple[bytes, Struct]:
+    """What every request for a state of this size begins with, and the layout of what follows."""
+    layout = Struct(f"{_HEAD}{slots}q{slots}I{monitors}B")
     body = bytes(layout.size)
     return artefact.wrap(names.REQUEST, body)[: -layout.size], layout

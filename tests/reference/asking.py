@@ -23,7 +23,7 @@ def loaded(policy: Policy = flat.POLICY) -> PreparedPolicy:
 
 
 def ready(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation:
-    found = prepare_invocation(invocation, policy)
+    found = prepare_invocation(invocation, policy, flat.MISSION.phases)
     assert isinstance(found, PreparedInvocation), found
     return found
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
-from reference.naive_geometry import circle_far, circle_near, corners, in_shape, touches, widened
+from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone
@@ -26,7 +26,8 @@ class TooNear(Exception):
 
 @dataclass
 class World:
-    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is (None: unknown)."""
+    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is (None: unknown). A letter
+    for each temporal monitor, and the number of the phase among the policy's."""
 
     policy: Policy
     slots: list[int | None]
@@ -35,6 +36,9 @@ class World:
     error: int
     legs: list[Leg] | None
     heights: tuple[int, int] | None = None  # of the legs, where the height ranges over them
+    monitors: str = ""
+    phase: int = -1
+    through: int = 0  # zones are looked at from the moment to this much later
 
 
 def kleene_and(a: str, b: str) -> str:
@@ -98,7 +102,12 @@ def atom(op: int, a: int, b: int, world: World) -> Truths:
         case Op.POSITION_IN_ARGUMENT:
             return inside(world, policy.zones[policy.tables[b][world.arguments[a]]])
         case Op.ARGUMENT_POINT_IN:
-            return T if in_shape((world.arguments[a], world.arguments[a + 1]), policy.zones[b]) else F
+            within = T if in_shape((world.arguments[a], world.arguments[a + 1]), policy.zones[b]) else F
+            return both(within, exists(world, policy.zones[b]))
+        case Op.PHASE_IN:
+            return T if world.phase in policy.sets[b] else F
+        case Op.MONITOR:
+            return frozenset(world.monitors[a])
         case Op.TIME_IN:
             return daytime(world.utc, world.error, policy.vehicle.utc_offset_us, a, b)
         case _:
@@ -132,7 +141,7 @@ def compared(op: int, left: tuple[int, int], right: tuple[int, int], heights: tu
 
 def inside(world: World, zone: Zone) -> Truths:
     if world.legs is None:
-        return U
+        return both(U, exists(world, zone))
     found: set[str] = set()
     for a, b, box, low, high in world.legs:
         vertical = {"T" if zone.floor < z < zone.ceiling else "F" for z in (low, high)}
@@ -140,7 +149,33 @@ def inside(world: World, zone: Zone) -> Truths:
             vertical.add("T")
         flat = horizontal(a, b, box, zone)
         found |= {"T" if v == h == "T" else "F" for v, h in product(vertical, flat)}
-    return frozenset(found)
+    return both(frozenset(found), exists(world, zone))
+
+
+def both(left: Truths, right: Truths) -> Truths:
+    return frozenset(kleene_and(x, y) for x, y in product(left, right))
+
+
+def exists(world: World, zone: Zone) -> Truths:
+    """At each moment of the stretch: in its hours, and between its dates; the two looked at apart."""
+    first, error, offset = world.utc, world.error, world.policy.vehicle.utc_offset_us
+    hours: set[str] = set()
+    dates: set[str] = set()
+    turns = (0, 1, -1, error, error + 1, -error, -error - 1)
+    for boundary in (*zone.daily, *zone.dates, first):
+        for moment in {boundary + turn for turn in turns} | {boundary - offset + turn for turn in turns}:
+            same_time = first + (moment - first) % DAY
+            for at in (first, first + world.through, moment, same_time):
+                if first <= at <= first + world.through:
+                    hours |= daytime(at, error, offset, *zone.daily) if zone.daily else T
+                    dates |= between(at, error, *zone.dates) if zone.dates else T
+    return both(frozenset(hours), frozenset(dates))
+
+
+def between(utc: int, error: int, start: int, end: int) -> Truths:
+    if start <= utc - error and utc + error <= end:
+        return T
+    return F if utc + error < start or utc - error > end else U
 
 
 def horizontal(a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int], zone: Zone) -> Truths:
@@ -148,7 +183,6 @@ def horizontal(a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int,
         return T if in_shape(a, zone) else F
     outline = widened(a, b, box)
     if zone.shape != CIRCLE:
-        assert corners(zone)
         return T | F if touches(outline, zone) else T if in_shape(a, zone) else F
     if circle_far(outline, zone) < zone.data[2]:
         return T

@@ -1,20 +1,26 @@
 """Geometry by definition, in rationals: slow, obvious, and written apart from `rtshcua.decision.zones`."""
 
 from fractions import Fraction
-from itertools import pairwise
+from itertools import combinations, pairwise
 
-from rtshcua.model.flat.zone import CIRCLE, Zone
+from rtshcua.model.flat.zone import AREA, CIRCLE, Zone
 
 Point = tuple[int, int]
 
 
-def corners(zone: Zone) -> list[Point]:
-    return list(zip(zone.data[::2], zone.data[1::2], strict=True))
+def rings(zone: Zone) -> list[list[Point]]:
+    """The corners of each ring of a zone that is no circle."""
+    numbers = list(zone.data)
+    counts = [len(numbers) // 2]
+    if zone.shape == AREA:
+        counts = [numbers.pop(0) for _ in range(numbers.pop(0))]
+    found = [[(numbers.pop(0), numbers.pop(0)) for _ in range(count)] for count in counts]
+    assert not numbers
+    return found
 
 
 def edges(zone: Zone) -> list[tuple[Point, Point]]:
-    points = corners(zone)
-    return list(pairwise([*points, points[0]]))
+    return [edge for ring in rings(zone) for edge in pairwise([*ring, ring[0]])]
 
 
 def on_segment(p: Point, a: Point, b: Point) -> bool:
@@ -28,8 +34,43 @@ def on_segment(p: Point, a: Point, b: Point) -> bool:
     return len(places) == 1 and 0 <= places.pop() <= 1
 
 
+def well_formed(outlines: list[list[Point]]) -> bool:
+    """No two edges share a point but neighbours their corner, and a ring is a hole if an odd number of others holds it.
+
+    The area of each ring by the shoelace formula says which way round it goes.
+    """
+    if any(len(ring) < 3 or len(set(ring)) < len(ring) for ring in outlines):
+        return False
+    every = [[(ring[k - 1], ring[k]) for k in range(len(ring))] for ring in outlines]
+    for (i, one), (j, other) in combinations([(n, side) for n, sides in enumerate(every) for side in sides], 2):
+        shared = set(one) & set(other)
+        if i != j and segments_meet(*one, *other):
+            return False
+        if i == j and not shared and segments_meet(*one, *other):
+            return False
+        if i == j and shared and (len(shared) > 1 or folded(one, other, shared.pop())):
+            return False
+    for number, ring in enumerate(outlines):
+        around = sum(inside_ring(ring[0], other) for n, other in enumerate(outlines) if n != number)
+        area = sum(ax * by - ay * bx for (ax, ay), (bx, by) in pairwise([*ring, ring[0]]))
+        if (area > 0) != (around % 2 == 0):
+            return False
+    return True
+
+
+def folded(one: tuple[Point, Point], other: tuple[Point, Point], at: Point) -> bool:
+    """Two segments with a common end share more than that: they lead the same way from it."""
+    (a,), (b,) = set(one) - {at}, set(other) - {at}
+    return on_segment(a, at, b) or on_segment(b, at, a)
+
+
+def inside_ring(p: Point, ring: list[Point]) -> bool:
+    """The ring winds around the point."""
+    return in_polygon(p, Zone("ring", AREA, 0, 0, (1, len(ring), *(c for corner in ring for c in corner))))
+
+
 def in_polygon(p: Point, zone: Zone) -> bool:
-    """Rays cast to the east cross the outline an odd number of times; the outline itself is outside."""
+    """Rays cast to the east cross the outlines an odd number of times; the outlines themselves are outside."""
     if any(on_segment(p, a, b) for a, b in edges(zone)):
         return False
     crossings = 0

@@ -3,6 +3,7 @@
 from itertools import pairwise
 from math import ceil, isqrt
 
+from reference.flat_case import MISSION
 from reference.naive_code import Leg, Truths, World, truths
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
@@ -20,7 +21,10 @@ class Oracle:
     """One situation."""
 
     def __init__(self, policy: Policy, state: State, now: Now) -> None:
-        self.policy, self.now = policy, now
+        self.policy, self.now, self.phase = policy, now, -1
+        said = [{1: "T", 2: "F", 4: "U"}.get(truth) for truth in state.monitors]
+        heard = len(said) == len(policy.monitors) and None not in said
+        self.monitors = "".join(said) if heard else "U" * len(policy.monitors)
         self.slots: list[int | None] = [None] * policy.slots
         for signal in policy.signals:
             width, most = (2, MAX_COORDINATE) if signal.kind == 2 else (1, 2**53 - 1)
@@ -49,9 +53,15 @@ class Oracle:
         return letter
 
     def world(
-        self, arguments: tuple[int, ...], legs: list[Leg] | None, heights: tuple[int, int] | None = None
+        self,
+        arguments: tuple[int, ...],
+        legs: list[Leg] | None,
+        heights: tuple[int, int] | None = None,
+        through: int = 0,
     ) -> World:
-        return World(self.policy, self.slots, arguments, self.now.utc_us, self.now.utc_error_us, legs, heights)
+        now = self.now
+        about = (self.policy, self.slots, arguments, now.utc_us, now.utc_error_us, legs, heights)
+        return World(*about, self.monitors, self.phase, through)
 
     # ------------------------------------------------------------------------------------------ planned volume
 
@@ -75,15 +85,15 @@ class Oracle:
     def everywhere(self, found: Truths) -> str:
         return "F" if "F" in found else "U" if "U" in found else "T"
 
-    def in_airspace(self, legs: list[Leg] | None) -> str:
+    def in_airspace(self, legs: list[Leg] | None, through: int) -> str:
         airspace = self.policy.airspace
         if airspace is None:
             return "T"
         letters = set()
         for zone in airspace.inside:
-            letters |= truths((28, zone, 0), self.world((), legs))
+            letters |= truths((28, zone, 0), self.world((), legs, through=through))
         for zone in airspace.outside:
-            letters |= truths((28, zone, 0, 42, 0, 0), self.world((), legs))
+            letters |= truths((28, zone, 0, 42, 0, 0), self.world((), legs, through=through))
         return self.everywhere(frozenset(letters))
 
     # -------------------------------------------------------------------------------------------------- links
@@ -100,11 +110,18 @@ class Oracle:
         if kind == MotionKind.FLY:
             cell = next(p.cell for p in contract.parameters if p.kind == PLACE)
             path = link.arguments[cell : cell + 2]
-        if kind == MotionKind.HOME and self.in_airspace(self.volume(MotionKind.HOLD, (), None)) == "F":
+        if kind == MotionKind.HOME and self.in_airspace(self.volume(MotionKind.HOLD, (), None), 0) == "F":
             return True
-        return self.in_airspace(self.volume(kind, path, altitude)) == "T"
+        longest = link.limit_us or contract.duration_us or self.policy.vehicle.endurance_us
+        return self.in_airspace(self.volume(kind, path, altitude), longest) == "T"
+
+    def enter(self, invocation: Invocation) -> None:
+        """From here on, questions are asked in the phase of an invocation of the hand-written mission."""
+        name = MISSION.phases[invocation.phase]
+        self.phase = next((n for n, phase in enumerate(self.policy.phases) if phase == name), -1)
 
     def target(self, invocation: Invocation) -> tuple[int, Link] | None:
+        self.enter(invocation)
         for rule in self.rules(invocation, RuleKind.DEGRADE):
             if self.truth(rule.when, invocation.arguments) == "T" and self.may_fly(rule.target):
                 return -1, rule.target
@@ -127,6 +144,7 @@ class Oracle:
         ]
 
     def decide(self, invocation: Invocation, context: Context) -> Answer:
+        self.enter(invocation)
         for step in (self.one, self.two, self.three, self.three_b, self.four, self.five, self.six, self.seven):
             answer = step(invocation, context)
             if answer is not None:
@@ -221,12 +239,13 @@ class Oracle:
     def seven_letters(self, invocation: Invocation) -> list[tuple[str, Reason]]:
         contract, plan, vehicle = invocation.contract, invocation.plan, self.policy.vehicle
         legs = self.volume(plan.kind, plan.path, None if contract.motion.altitude == -1 else plan.altitude)
+        longest = contract.duration_us or vehicle.endurance_us
         letters = [
             ("T" if plan.speed <= vehicle.speed else "F", Reason.ENVELOPE),
-            (self.in_airspace(legs), Reason.AIRSPACE),
+            (self.in_airspace(legs, longest), Reason.AIRSPACE),
         ]
         heights = None if legs is None else (min(leg[3] for leg in legs), max(leg[4] for leg in legs))
-        world = self.world(invocation.arguments, legs, heights)
+        world = self.world(invocation.arguments, legs, heights, longest)
         if legs is None and vehicle.height != -1:
             world.slots = [None if slot == vehicle.height else value for slot, value in enumerate(self.slots)]
         letters += [(self.everywhere(truths(clause.code, world)), Reason.INVARIANT) for clause in contract.maintain]

@@ -5,6 +5,7 @@ seed is enough to see a failure again. Most pieces are the nominal ones, so that
 """
 
 from random import Random
+from typing import NamedTuple
 
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -15,10 +16,11 @@ from rtshcua.decision.reads import slots_read
 from rtshcua.decision.values import MISSING, Sets, Value, interval, maybe, members, point
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract, SourceKind
+from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.mission import Invocation, Plan
-from rtshcua.model.flat.policy import Airspace, Policy, Rule, RuleKind
+from rtshcua.model.flat.policy import Airspace, Monitor, MonitorKind, Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Approval, Context, Now, State
-from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
+from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 
 Code = tuple[int, ...]
 CHANCES = st.integers(0, (1 << 64) - 1).map(Random)
@@ -42,12 +44,24 @@ def number(of: Random, cells: list[int]) -> Code:
     return flat.scaled(number(of, cells), of.choice([-2, -1, 0, 2, 3]))
 
 
-def atom(of: Random, contract: Contract | None) -> Code:
+class Reach(NamedTuple):
+    """What conditions may ask for beside state and arguments: how many temporal monitors, and whether for the phase."""
+
+    monitors: int = 0
+    phased: bool = False
+
+
+NONE = Reach()
+PHASES = len(flat.POLICY.sets)  # the set of phases that a random policy asks for
+
+
+def atom(of: Random, contract: Contract | None, reach: Reach) -> Code:
     cells: dict[int, list[int]] = {kind: [] for kind in (QUANTITY, CHOICE, ZONE, PLACE)}
     for parameter in contract.parameters if contract else ():
         cells[parameter.kind].append(parameter.cell)
     zone = of.randrange(len(flat.ZONES))
     kinds = ["compare", "compare", "position", "fix", "time", *(k for k in (ZONE, CHOICE, PLACE) if cells[k])]
+    kinds += ["monitor"] * (2 * (reach.monitors > 0)) + ["phase"] * reach.phased
     match of.choice(kinds):
         case "compare":
             op = of.choice([Op.LT, Op.LE, Op.GT, Op.GE, Op.EQ, Op.NE])
@@ -59,6 +73,10 @@ def atom(of: Random, contract: Contract | None) -> Code:
             return (Op.SIGNAL_IN, flat.FIX, of.randrange(len(flat.POLICY.sets)))
         case "time":
             return (Op.TIME_IN, of.randrange(24) * flat.H, of.randrange(25) * flat.H)
+        case "monitor":
+            return (Op.MONITOR, of.randrange(reach.monitors), 0)
+        case "phase":
+            return (Op.PHASE_IN, 0, PHASES)
         case 2:
             argument = (Op.ARGUMENT_IN, cells[ZONE][0], flat.IN_BRIDGE)
             return of.choice([argument, (Op.POSITION_IN_ARGUMENT, cells[ZONE][0], flat.GROW_15)])
@@ -68,29 +86,42 @@ def atom(of: Random, contract: Contract | None) -> Code:
             return (Op.ARGUMENT_POINT_IN, cells[PLACE][0], zone)
 
 
-def condition(of: Random, contract: Contract | None, depth: int = 2) -> Code:
+def condition(of: Random, contract: Contract | None, depth: int = 2, reach: Reach = NONE) -> Code:
     kind = of.randrange(6) if depth else 0
     if kind < 3:
-        return atom(of, contract)
+        return atom(of, contract, reach)
     if kind == 3:
-        return flat.apply(Op.NOT, condition(of, contract, depth - 1))
+        return flat.apply(Op.NOT, condition(of, contract, depth - 1, reach))
     op = of.choice([Op.AND, Op.OR])
-    return flat.apply(op, condition(of, contract, depth - 1), condition(of, contract, depth - 1))
+    return flat.apply(op, *(condition(of, contract, depth - 1, reach) for _ in range(2)))
 
 
-def clause(of: Random, contract: Contract | None) -> Clause:
-    return flat.clause("some clause", condition(of, contract))
+def clause(of: Random, contract: Contract | None, reach: Reach) -> Clause:
+    return flat.clause("some clause", condition(of, contract, 2, reach))
+
+
+def monitors(of: Random, count: int) -> tuple[Monitor, ...]:
+    """Each may read those before it."""
+    return tuple(monitor(of, number) for number in range(count))
+
+
+def monitor(of: Random, number: int) -> Monitor:
+    kind = of.choice([*MonitorKind])
+    edge = kind in (MonitorKind.RISING, MonitorKind.FALLING)
+    window_us = 0 if edge else of.choice([1, 50_000, S // 2, S, 3 * S, 600 * S])
+    return Monitor(kind, window_us, clause(of, None, Reach(number)))
 
 
 # ----------------------------------------------------------------------------------------------------- policy
 
 
-def contract(of: Random, plain: Contract) -> Contract:
+def contract(of: Random, plain: Contract, monitors: tuple[Monitor, ...]) -> Contract:
     """A shipped one, or with conditions at random."""
     if of.random() < 0.5:
         return plain
+    reach = Reach(len(monitors), phased=True)
     require, assume, maintain = (
-        kept if of.random() < 0.5 else tuple(clause(of, plain) for _ in range(of.randrange(2)))
+        kept if of.random() < 0.5 else tuple(clause(of, plain, reach) for _ in range(of.randrange(2)))
         for kept in (plain.require, plain.assume, plain.maintain)
     )
     return replace(
@@ -98,13 +129,13 @@ def contract(of: Random, plain: Contract) -> Contract:
         require=require,
         assume=assume,
         maintain=maintain,
-        reads=slots_read((*require, *assume, *maintain), flat.POLICY.vehicle),
+        reads=slots_read((*require, *assume, *maintain), flat.POLICY.vehicle, monitors),
         energy=of.randrange(6_000),
         timing_class=of.choice([1] * 20 + [0, 2]),
     )
 
 
-def rule(of: Random, contracts: tuple[Contract, ...]) -> Rule:
+def rule(of: Random, contracts: tuple[Contract, ...], reach: Reach) -> Rule:
     kind = of.choice([RuleKind.PERMIT] * 6 + [*RuleKind])
     skills = of.choice([(), (flat.INSPECT,), (flat.INSPECT,), (flat.GOTO,), (flat.TAKEOFF,), (flat.HOVER, flat.HOME)])
     target = of.choice([flat.link(flat.HOME), flat.link(flat.LAND), flat.link(flat.TAKEOFF, 30 * M)])
@@ -113,7 +144,7 @@ def rule(of: Random, contracts: tuple[Contract, ...]) -> Rule:
         *skills,
         roles=of.choice([(), (0,), (0, 1)]),
         sources=of.choice([(), (0, 1), (2,)]),
-        when=None if of.random() < 0.2 else clause(of, contracts[skills[0]] if len(skills) == 1 else None),
+        when=None if of.random() < 0.2 else clause(of, contracts[skills[0]] if len(skills) == 1 else None, reach),
         approver=of.randrange(2),
         within_us=30 * S,
         target=target if kind == RuleKind.DEGRADE else None,
@@ -125,19 +156,44 @@ def zone(of: Random) -> Zone:
     if of.random() < 0.3:
         return Zone("z", CIRCLE, LOWEST, HIGHEST, (x, y, (of.randrange(10, 400) * M) ** 2))
     floor, ceiling = of.choice([LOWEST, LOWEST, 0, 10 * M]), of.choice([HIGHEST, 60 * M, 25 * M])
-    east, north = x + of.randrange(50, 600) * M, y + of.randrange(50, 600) * M
-    return Zone("z", POLYGON, floor, ceiling, flat.box(x, y, east, north))
+    width, depth = of.randrange(50, 600) * M, of.randrange(50, 600) * M
+    outer = flat.box(x, y, x + width, y + depth)
+    if of.random() < 0.5:
+        return Zone("z", POLYGON, floor, ceiling, outer)
+    x, y, width, depth = x + width // 8, y + depth // 8, width // 4, depth // 4
+    hole = (x, y, x, y + depth, x + width, y + depth, x + width, y)
+    island = flat.box(x + width // 3, y + depth // 3, x + width // 2, y + depth // 2) if of.random() < 0.5 else ()
+    counts = (3, 4, 4, 4) if island else (2, 4, 4)
+    return Zone("z", AREA, floor, ceiling, (*counts, *outer, *hole, *island))
+
+
+def timed(of: Random, zone: Zone) -> Zone:
+    """The zone at some times only, which begin or end about now."""
+    local = (flat.NOW.utc_us + flat.POLICY.vehicle.utc_offset_us) % DAY
+    near = (-10 * flat.MIN, -20_000, -1, 0, 1, 20_000, 2 * flat.MIN, 5 * flat.MIN + 20_000, 10 * flat.MIN, 8 * flat.H)
+    daily = (local + of.choice(near)) % DAY, (local + of.choice(near)) % DAY
+    start, end = (flat.NOW.utc_us + moment for moment in sorted(of.sample([*near, -8 * flat.H], 2)))
+    kind = of.randrange(3)
+    return replace(zone, daily=daily if kind else (), dates=(start, end) if kind < 2 else ())
 
 
 def policy(of: Random) -> Policy:
-    contracts = tuple(contract(of, plain) for plain in flat.CONTRACTS)
+    observed = monitors(of, of.choice([0, 0, 1, 3]))
+    phases = tuple(of.sample(("departure", "inspection", "recovery", "elsewhere"), of.randrange(4)))
+    asked = tuple(sorted(of.sample(range(len(phases)), of.randint(0, len(phases)))))
+    reach = Reach(len(observed), phased=True)
+    contracts = tuple(contract(of, plain, observed) for plain in flat.CONTRACTS)
     zones = tuple(zone(of) if of.random() < 0.2 else plain for plain in flat.ZONES)
+    zones = tuple(timed(of, one) if of.random() < 0.1 else one for one in zones)
     some = Airspace(*(tuple(of.sample(range(6), of.randrange(2))) for _ in range(2)), "airspace", 0, 0, 1)
     made = replace(
         flat.POLICY,
         contracts=contracts,
         zones=zones,
-        rules=(*(rule(of, contracts) for _ in range(of.randrange(4))), *of.choice([flat.RULES] * 8 + [()])),
+        rules=(*(rule(of, contracts, reach) for _ in range(of.randrange(4))), *of.choice([flat.RULES] * 8 + [()])),
+        monitors=observed,
+        phases=phases,
+        sets=(*flat.POLICY.sets, asked),
         airspace=of.choice([None, flat.POLICY.airspace, flat.POLICY.airspace, some]),
         vehicle=replace(flat.POLICY.vehicle, position_error=of.choice([0, 3 * M])),
     )
@@ -148,7 +204,8 @@ def _without(policy: Policy, well_known: str) -> Policy:
     """A policy whose vehicle tells less."""
     vehicle = replace(policy.vehicle, **{well_known: -1})
     contracts = tuple(
-        replace(c, reads=slots_read((*c.require, *c.assume, *c.maintain), vehicle)) for c in policy.contracts
+        replace(c, reads=slots_read((*c.require, *c.assume, *c.maintain), vehicle, policy.monitors))
+        for c in policy.contracts
     )
     return replace(policy, vehicle=vehicle, contracts=contracts)
 
@@ -175,7 +232,8 @@ def survey(of: Random, zone: Zone) -> tuple[int, ...]:
     """A path within a zone."""
     if zone == flat.ZONES[flat.BRIDGE]:
         return flat.PATH
-    xs, ys = (zone.data[:1], zone.data[1:2]) if zone.shape == CIRCLE else (zone.data[::2], zone.data[1::2])
+    data = zone.data if zone.shape != AREA else zone.data[1 + zone.data[0] : 9 + zone.data[0]]
+    xs, ys = (data[:1], data[1:2]) if zone.shape == CIRCLE else (data[::2], data[1::2])
     x, y = sum(xs) // len(xs), sum(ys) // len(ys)
     return (x, y, x + of.randrange(5 * M), y)
 
@@ -216,13 +274,17 @@ NEAR = {
 }
 
 
-def state(of: Random) -> State:
-    """Mostly nominal; a value may be near a threshold, missing, or at the edge of stale."""
+def state(of: Random, monitors: int = 0) -> State:
+    """Mostly nominal; a value may be near a threshold, missing, or at the edge of stale, and what the temporal monitors
+    say is rarely no truth, or of the wrong length."""
     values = {slot: of.choice(near) for slot, near in NEAR.items() if of.random() < 0.2}
     if of.random() < 0.2:
         values[of.randrange(flat.SLOTS)] = None
     ages = {slot: of.choice([0, S // 2, S // 2 + 1, -1]) for slot in range(flat.SLOTS) if of.random() < 0.05}
-    return flat.state(values, ages)
+    said = tuple(of.choice([1, 1, 1, 2, 4]) for _ in range(monitors))
+    if of.random() < 0.03:
+        said = of.choice([said[1:], (*said, 1), (3, *said[1:]), (0, *said[1:])])
+    return replace(flat.state(values, ages), monitors=said)
 
 
 def now(of: Random) -> Now:
@@ -251,7 +313,7 @@ def context(of: Random, invocation: Invocation) -> Context:
     )
 
 
-def sets(of: Random) -> Sets:
+def sets(of: Random, monitors: int = 0) -> Sets:
     """Mostly narrow: sets that hold everything teach little."""
     moment = now(of)
     starts = [moment.utc_us, moment.utc_us + 3][: of.choice([1, 1, 2])]
@@ -262,6 +324,7 @@ def sets(of: Random) -> Sets:
         (moment.monotonic_us, moment.monotonic_us + of.choice([0, 0, 3 * S])),
         utc,
         (error, error + of.choice([0, 5_000])),
+        tuple(of.choice([1, 1, 1, 2, 4, 3, 5, 6, 7]) for _ in range(monitors)) if of.random() < 0.9 else (),
     )
 
 
@@ -276,11 +339,13 @@ def _value(of: Random, slot: int) -> Value:
     return maybe(value) if kind < 0.85 else value
 
 
-def situation(of: Random, all_of: Sets) -> tuple[State, Now]:
+def situation(of: Random, all_of: Sets, monitors: int = 0) -> tuple[State, Now]:
     """A member of a set of situations."""
     low, high = of.choice(all_of.utc_us)
+    truths = all_of.monitors or (7,) * monitors
+    said = tuple(of.choice([single for single in (1, 2, 4) if single & truth]) for truth in truths)
     return (
-        State(tuple(_member(of, value) for value in all_of.values), (0,) * len(all_of.values)),
+        State(tuple(_member(of, value) for value in all_of.values), (0,) * len(all_of.values), said),
         Now(_within(of, *all_of.monotonic_us), _within(of, low, high), _within(of, *all_of.utc_error_us)),
     )
 

@@ -62,7 +62,8 @@ def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
         yield from within(f"number of {name} clauses", len(clauses), 0, MAX_CLAUSES)
         for number, one in enumerate(clauses):
             yield from at(f"{name} {number}", clause(one, about))
-    if contract.reads != slots_read((*contract.require, *contract.assume, *contract.maintain), policy.vehicle):
+    clauses = (*contract.require, *contract.assume, *contract.maintain)
+    if contract.reads != slots_read(clauses, policy.vehicle, policy.monitors):
         yield "`reads` is not what the clauses read"
 
 

@@ -1,6 +1,6 @@
 """A mission and its invocations, under a policy that is well-formed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.checks.contracts import contract
 from rtshcua.decision.checks.indexes import at, index, within
@@ -45,7 +45,7 @@ def _phases(contract: Contract, mission: Mission) -> int:
     return sum(1 << number for number, name in enumerate(mission.phases) if name in (contract.phases or (name,)))
 
 
-def invocation(invocation: Invocation, policy: Policy) -> Iterator[str]:
+def invocation(invocation: Invocation, policy: Policy, zones: Sequence[PreparedZone]) -> Iterator[str]:
     """What is wrong with an invocation. Arguments out of range are for `decide` to refuse, so that it is recorded."""
     yield from index("skill", invocation.skill, len(policy.contracts))
     yield from index("role", invocation.role, len(policy.roles))
@@ -61,7 +61,7 @@ def invocation(invocation: Invocation, policy: Policy) -> Iterator[str]:
     for argument in invocation.arguments:
         yield from within("argument", argument, -MAX_VALUE, MAX_VALUE)
     yield from at("plan", _plan(invocation.plan, mine, invocation.arguments))
-    if not _leads_right(invocation.plan, mine, invocation.arguments, policy):
+    if not _leads_right(invocation.plan, mine, invocation.arguments, zones[: policy.declared]):
         yield "plan: the path does not fit the arguments"
     for x, y in zip(invocation.plan.path[::2], invocation.plan.path[1::2], strict=True):
         yield from at("plan", place(policy.projection, x, y))
@@ -84,14 +84,14 @@ def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterato
         yield from within("coordinate", coordinate, -MAX_COORDINATE, MAX_COORDINATE)
 
 
-def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...], policy: Policy) -> bool:
+def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...], declared: Sequence[PreparedZone]) -> bool:
     """The path is where the arguments say: what rules and clauses are told about must be what is flown."""
     match plan.kind:
         case MotionKind.COVER:
             zone = arguments[first_cell(contract, ZONE)]
-            if not 0 <= zone < policy.declared:
+            if not 0 <= zone < len(declared):
                 return bool(plan.path)  # for `decide` to refuse
-            return bool(plan.path) and PreparedZone(zone, policy.zones[zone]).along(plan.path, NO_BOX) == TRUE
+            return bool(plan.path) and declared[zone].along(plan.path, NO_BOX) == TRUE
         case MotionKind.FLY:
             cell = first_cell(contract, PLACE)
             return plan.path == arguments[cell : cell + 2]

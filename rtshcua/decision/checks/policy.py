@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from rtshcua.decision.checks.contracts import chain, contract
 from rtshcua.decision.checks.indexes import at, within
+from rtshcua.decision.checks.monitors import monitors, phases
 from rtshcua.decision.checks.rules import airspace, rules
 from rtshcua.decision.checks.vehicle import signals, vehicle
 from rtshcua.decision.checks.zones import zones
@@ -22,7 +23,9 @@ def problems(policy: Policy) -> Iterator[str]:
     for number, members in enumerate(policy.sets):
         yield from at(f"set {number}", within("number of members", len(members), 0, MAX_MEMBERS))
     yield from within("number of contracts", len(policy.contracts), 0, MAX_CONTRACTS)
+    yield from phases(policy)
     scope = scope_of(policy)
+    yield from monitors(policy, scope)
     for one in policy.contracts:
         yield from at(f"skill `{one.name}`", contract(one, policy, scope))
     for one in policy.contracts:

@@ -8,7 +8,7 @@ from rtshcua.model.flat.contract import Contract, Link
 
 
 def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
-    """Where a mission's contract is looser than the policy's."""
+    """Where a mission's contract is looser than the policy's; no duration (0) is no limit, so looser than any."""
     for name, same in (
         ("name", mine.name == policys.name),
         ("motion", mine.motion == policys.motion),
@@ -18,7 +18,7 @@ def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
         ("phases", not policys.phases or (bool(mine.phases) and set(mine.phases) <= set(policys.phases))),
         ("deadline", mine.deadline_us <= policys.deadline_us),
         ("validity", mine.validity_us <= policys.validity_us),
-        ("duration", mine.duration_us <= policys.duration_us),
+        ("duration", not policys.duration_us or 0 < mine.duration_us <= policys.duration_us),
         ("grace", mine.grace_us <= policys.grace_us),
         ("energy", mine.energy >= policys.energy),
         ("require", _codes(mine.require) >= _codes(policys.require)),

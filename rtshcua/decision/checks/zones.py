@@ -1,15 +1,19 @@
 """Zones, tables of derived zones, and the projection."""
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 from rtshcua.decision.checks.indexes import at, index, within
-from rtshcua.model.flat.limits import MAX_TABLES, MAX_TOTAL_VERTICES, MAX_ZONES
+from rtshcua.decision.checks.rings import rings
+from rtshcua.decision.outline import rings as outline
+from rtshcua.model.flat.limits import DAY, MAX_TABLES, MAX_TOTAL_VERTICES, MAX_VALUE, MAX_ZONES
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import (
+    AREA,
     CIRCLE,
     HIGHEST,
     LOWEST,
     MAX_COORDINATE,
+    MAX_RINGS,
     MAX_VERTICES,
     POLYGON,
     SHIFT,
@@ -27,7 +31,7 @@ def zones(policy: Policy) -> Iterator[str]:
     yield from at("projection", _projection(policy.projection))
     yield from within("number of zones", len(policy.zones), 0, MAX_ZONES)
     yield from within("number of declared zones", policy.declared, 0, len(policy.zones))
-    yield from within("number of vertices", sum(len(zone.data) // 2 for zone in policy.zones), 0, MAX_TOTAL_VERTICES)
+    yield from within("number of vertices", sum(map(_vertices, policy.zones)), 0, MAX_TOTAL_VERTICES)
     for number, zone in enumerate(policy.zones):
         yield from at(f"zone {number}", _zone(zone))
     yield from within("number of tables", len(policy.tables), 0, MAX_TABLES)
@@ -54,6 +58,12 @@ def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
     yield from within("longitude", longitude, -1_800_000_000, 1_800_000_000)
 
 
+def _vertices(zone: Zone) -> int:
+    """How many vertices there are at least, before anything else is known of a zone."""
+    counts = 1 + min(max(zone.data[0], 0), MAX_RINGS) if zone.shape == AREA and zone.data else 0
+    return max(len(zone.data) - counts, 0) // 2
+
+
 def _zone(zone: Zone) -> Iterator[str]:
     yield from within("floor", zone.floor, LOWEST, HIGHEST)
     yield from within("ceiling", zone.ceiling, zone.floor, HIGHEST)
@@ -62,12 +72,40 @@ def _zone(zone: Zone) -> Iterator[str]:
             yield "a circle has a centre and a squared radius"
         yield from within("squared radius", zone.data[2], 1, MAX_COORDINATE * MAX_COORDINATE)
         coordinates = zone.data[:2]
-    elif zone.shape == POLYGON:
-        if len(zone.data) % 2:
-            yield "a coordinate is missing"
-        yield from within("number of vertices", len(zone.data) // 2, 3, MAX_VERTICES)
-        coordinates = zone.data
+    elif zone.shape in (POLYGON, AREA):
+        start = yield from _counts(zone)
+        coordinates = zone.data[start:]
     else:
         yield f"there is no shape {zone.shape}"
     for coordinate in coordinates:
         yield from within("coordinate", coordinate, -MAX_COORDINATE, MAX_COORDINATE)
+    if zone.shape != CIRCLE:
+        yield from rings(tuple(outline(zone)))
+    yield from _times(zone)
+
+
+def _counts(zone: Zone) -> Generator[str, None, int]:
+    """What is wrong with the numbers of rings and corners; where the coordinates begin."""
+    data, start = zone.data, 0
+    if zone.shape == AREA:
+        count = data[0] if data else 0
+        yield from within("number of rings", count, 1, MAX_RINGS)
+        start = 1 + count
+        for corners in data[1:start]:
+            yield from within("number of corners", corners, 3, MAX_TOTAL_VERTICES)
+        if len(data) != start + 2 * sum(data[1:start]):
+            yield "the coordinates are not as many as the corners of the rings need"
+    else:
+        if len(data) % 2:
+            yield "a coordinate is missing"
+        yield from within("number of vertices", len(data) // 2, 3, MAX_VERTICES)
+    return start
+
+
+def _times(zone: Zone) -> Iterator[str]:
+    if len(zone.daily) not in (0, 2) or len(zone.dates) not in (0, 2):
+        yield "a time has a start and an end"
+    if zone.daily and not (0 <= zone.daily[0] < DAY and 0 <= zone.daily[1] <= DAY):
+        yield f"{zone.daily[0]}..{zone.daily[1]} us is no window of a day"
+    if zone.dates and not 0 <= zone.dates[0] <= zone.dates[1] <= MAX_VALUE:
+        yield f"{zone.dates[0]}..{zone.dates[1]} us is no interval of UTC"

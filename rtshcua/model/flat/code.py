@@ -33,6 +33,8 @@ class Op(IntEnum):
     POSITION_IN_ARGUMENT = 29  # ... inside the zone that table b gives for the zone in argument cell a
     ARGUMENT_POINT_IN = 30  # the point in argument cells a, a + 1 (x, y in mm) is inside zone b, at any height
     TIME_IN = 32  # the local time of day is in a .. b us since midnight; a > b wraps over midnight
+    PHASE_IN = 34  # the invocation's mission phase is one of set b (indexes into the policy's `phases`)
+    MONITOR = 36  # push truth of temporal monitor a, as the state has it
     AND = 40  # truth truth -> truth, Kleene
     OR = 41
     NOT = 42  # truth -> truth
@@ -41,7 +43,8 @@ class Op(IntEnum):
 class Clause(Flat, frozen=True):
     """A condition with the text and the place it was written, so that a refusal can be explained without the sources.
 
-    `source` indexes the policy's (or mission's) table of file names; `start`, `end` are character offsets.
+    `source` indexes the policy's table of file names, and after it the mission's, for what a step says of its own;
+    `start`, `end` are character offsets.
     """
 
     text: str

@@ -30,3 +30,7 @@ MAX_RULE_KEYS = 1 << 18  # entries of the rule index: skills times roles, summed
 MAX_INVOCATIONS = 16_384
 MAX_PHASES = 64
 MAX_PATH = 8_192  # points
+MAX_MONITORS = 32
+MAX_WINDOW = 600_000_000  # us: how far back a temporal monitor looks
+MAX_GAP = 1_000_000  # us: when more time passes between two observations, what was in between is not known
+MAX_PHASE_NAMES = 64

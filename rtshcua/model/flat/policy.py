@@ -39,6 +39,26 @@ class Rule(Flat, frozen=True):
     end: int
 
 
+class MonitorKind(IntEnum):
+    """What a temporal monitor remembers of its condition."""
+
+    FOR_LAST = 0  # it was true all through the window: bounded-past historically
+    WITHIN_LAST = 1  # it was true at some moment of the window: bounded-past once
+    RISING = 2  # it is true, and was false at the observation before
+    FALLING = 3  # it is false, and was true at the observation before
+
+
+class Monitor(Flat, frozen=True):
+    """A temporal monitor. `when` reads signals, zones, the time and monitors before this one; no argument, no phase.
+
+    `window_us` is 0 for RISING and FALLING.
+    """
+
+    kind: int
+    window_us: int
+    when: Clause
+
+
 class Airspace(Flat, frozen=True):
     """The vehicle stays inside every zone of `inside` and outside every zone of `outside` (zone indexes)."""
 
@@ -74,7 +94,8 @@ class Policy(Flat, frozen=True):
     """A whole policy. `zones` holds the declared zones first (`declared` of them), derived ones after.
 
     `sets` are membership sets of enumeration values or zone indexes. `tables` map each declared zone's index to a
-    derived zone's index, for `grow(argument, margin)`. `sources` are file names for spans, `source_digests` the
+    derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
+    mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
     SHA-256 of each.
     """
 
@@ -95,3 +116,5 @@ class Policy(Flat, frozen=True):
     contingency: tuple[Link, ...]
     sources: tuple[str, ...]
     source_digests: tuple[bytes, ...]
+    monitors: tuple[Monitor, ...] = ()
+    phases: tuple[str, ...] = ()

@@ -7,11 +7,13 @@ class State(Flat, frozen=True):
     """Paper symbol `S_t`: one integer a slot in its signal's canonical unit, None where nothing valid was ever
     received.
 
+    `monitors` has the truth of each temporal monitor of the policy at the last observation: 1 true, 2 false, 4 unknown.
     `ages` are in us at the moment of the decision, one a slot; the age of a slot that is None does not count.
     """
 
     values: tuple[int | None, ...]
     ages: tuple[int, ...]
+    monitors: tuple[int, ...] = ()
 
 
 class Now(Flat, frozen=True):

@@ -10,7 +10,8 @@ MAX_COORDINATE = 1 << 29  # mm, about 537 km
 MAX_VERTICES = 4096
 LOWEST, HIGHEST = -(1 << 30), 1 << 30  # mm above home: no floor, no ceiling
 
-CIRCLE, POLYGON = 0, 1
+MAX_RINGS = 1024
+CIRCLE, POLYGON, AREA = 0, 1, 2
 
 
 class Projection(Flat, frozen=True):
@@ -18,8 +19,8 @@ class Projection(Flat, frozen=True):
     >> SHIFT`.
 
     `east` and `north` are mm per 1e-7 degree, times 2**SHIFT, computed at compile time on the WGS 84 ellipsoid at home.
-    The shift rounds towards minus infinity: at most 1 mm. Distances are true to about 1 part in 10,000 within 5 km of
-    home at mid-latitudes.
+    The shift rounds towards minus infinity: at most 1 mm. At mid-latitudes, distances are true to 1 part in 1,000 within
+    5 km of home and to 1 part in 10,000 within 500 m; docs/adr/0011-zones.md has the bound.
     """
 
     latitude: int
@@ -52,8 +53,9 @@ class Zone(Flat, frozen=True):
     """An open set: a point on its boundary, floor or ceiling is outside.
 
     `shape` is `CIRCLE` with `data` = (x, y, radius squared), or `POLYGON` with `data` = (x0, y0, x1, y1, ...),
-    simple and counter-clockwise. `floor`, `ceiling` in mm above home. `name` is what a person wrote, `grow(...)`
-    for a derived one.
+    simple and counter-clockwise, or `AREA` with `data` = (rings, corners of each ring ..., x0, y0, ...): outer rings
+    counter-clockwise, holes clockwise, all simple and without a common point. `floor`, `ceiling` in mm above home.
+    `name` is what a person wrote, `grow(...)` for a derived one.
     """
 
     name: str
@@ -61,3 +63,5 @@ class Zone(Flat, frozen=True):
     floor: int
     ceiling: int
     data: tuple[int, ...]
+    daily: tuple[int, ...] = ()  # (start, end): only between these us since local midnight, over midnight if reversed
+    dates: tuple[int, ...] = ()  # (start, end): only between these us of UTC since the epoch, both included

@@ -33,19 +33,29 @@ class TimeOfDay(Node):
 
 
 class Reference(Node):
-    """A signal, an argument, a zone, a zone's entry, an enumerator, or `local time`, by name."""
+    """A signal, an argument, a zone, a zone's entry, an enumerator, `local time` or the mission's `phase`, by name."""
 
     kind: Literal["reference"] = "reference"
     name: str
 
 
 class Arithmetic(Node):
-    """`left operator right` over values of one dimension; `*` takes a plain number on one side."""
+    """`left operator right`. `+` and `-` take values of one dimension; of `*` one side, of `/` the right side is known
+    at compile time, and dimensions multiply: `speed * 3 s` is a length, `length / 4 m/s` a duration.
+    """
 
     kind: Literal["arithmetic"] = "arithmetic"
-    operator: Literal["+", "-", "*"]
+    operator: Literal["+", "-", "*", "/"]
     left: "Value"
     right: "Value"
+
+
+class Function(Node):
+    """`abs(a)`, `min(a, b, ...)`, `max(a, b, ...)` over numbers of one dimension and datum."""
+
+    kind: Literal["function"] = "function"
+    name: Literal["abs", "min", "max"]
+    operands: tuple["Value", ...]
 
 
 class Grow(Node):
@@ -53,7 +63,7 @@ class Grow(Node):
 
     kind: Literal["grow"] = "grow"
     zone: Reference
-    margin: Quantity
+    margin: "Value"  # known at compile time: a length, or a parameter of a template or a mission
 
 
 class Range(Node):
@@ -65,7 +75,7 @@ class Range(Node):
 
 
 Value = Annotated[
-    Quantity | Coordinates | TimeOfDay | Reference | Arithmetic, Field(discriminator="kind")
+    Quantity | Coordinates | TimeOfDay | Reference | Arithmetic | Function, Field(discriminator="kind")
 ]  # the values a comparison or an argument may have
 
 
@@ -118,7 +128,60 @@ class Junction(Node):
     operands: tuple["Condition", ...]
 
 
-Condition = Annotated[Comparison | Within | OneOf | Inside | Not | Junction, Field(discriminator="kind")]
+class ForLast(Node):
+    """`condition for the last 3 s`: bounded-past *historically*, true while the condition was true all along."""
 
-for _node in (Arithmetic, Range, Comparison, Within, OneOf, Inside, Not, Junction):
+    kind: Literal["for-last"] = "for-last"
+    operand: "Condition"
+    window: Quantity
+
+
+class WithinLast(Node):
+    """`condition within the last 5 s`: bounded-past *once*, true if the condition was true at some moment of it."""
+
+    kind: Literal["within-last"] = "within-last"
+    operand: "Condition"
+    window: Quantity
+
+
+class Near(Node):
+    """`a within 5 s of b`: one of them is true now, and the other was within that time; the same as
+    `(a and b within the last 5 s) or (b and a within the last 5 s)`.
+    """
+
+    kind: Literal["near"] = "near"
+    left: "Condition"
+    right: "Condition"
+    window: Quantity
+
+
+class Edge(Node):
+    """`rising condition`: true now and false at the observation before; `falling` the other way round."""
+
+    kind: Literal["edge"] = "edge"
+    rising: bool
+    operand: "Condition"
+
+
+Condition = Annotated[
+    Comparison | Within | OneOf | Inside | Not | Junction | ForLast | WithinLast | Near | Edge,
+    Field(discriminator="kind"),
+]
+
+for _node in (
+    Arithmetic,
+    Function,
+    Grow,
+    Range,
+    Comparison,
+    Within,
+    OneOf,
+    Inside,
+    Not,
+    Junction,
+    ForLast,
+    WithinLast,
+    Near,
+    Edge,
+):
     _node.model_rebuild()

@@ -1,24 +1,63 @@
 """Missions: phases of steps, proposed by someone under a policy for a vehicle."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
+from pydantic import Field
+
+from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.skills import ArgumentValue
+from rtshcua.model.ir.skills import ArgumentValue, Clause, Parameter
+
+
+class Overrides(Node):
+    """The block after a step. It may only tighten the contract: shorter times, more energy kept ready, fewer phases,
+    further clauses and kinds of evidence. None or an empty tuple: as the skill says.
+    """
+
+    deadline: Quantity | None = None
+    validity: Quantity | None = None
+    duration: Quantity | None = None
+    grace: Quantity | None = None
+    energy: Quantity | None = None
+    phases: tuple[Name, ...] = ()
+    require: tuple[Clause, ...] = ()
+    assume: tuple[Clause, ...] = ()
+    maintain: tuple[Clause, ...] = ()
+    record: tuple[Name, ...] = ()
 
 
 class Step(Node):
-    """`goto(bridge_a.entry, altitude = 20 m) on inadmissible abort`."""
+    """`goto(bridge_a.entry, altitude = 20 m) on inadmissible abort { deadline 2 s }`."""
 
+    kind: Literal["step"] = "step"
     skill: Name
     arguments: tuple[ArgumentValue, ...]
     on_inadmissible: Literal["abort", "hold", "skip"]
+    overrides: Overrides | None = None
+
+
+class Repeat(Node):
+    """`repeat 3 { ... }`: its items in order, so many times. Elaboration unrolls it."""
+
+    kind: Literal["repeat"] = "repeat"
+    count: Quantity
+    items: tuple["Item", ...]
+
+
+Item = Annotated[Step | Repeat, Field(discriminator="kind")]
+Repeat.model_rebuild()
 
 
 class Phase(Node):
-    """A named stretch of the mission; its steps run in order."""
+    """A named stretch of the mission; its steps run in order. After elaboration, all of them are steps."""
 
     name: Name
-    steps: tuple[Step, ...]
+    items: tuple[Item, ...]
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps of an elaborated phase."""
+        return tuple(item for item in self.items if isinstance(item, Step))
 
 
 class MissionDecl(Node):
@@ -33,3 +72,7 @@ class MissionDecl(Node):
     proposer: Name | None  # who: openclaw
     role: Name | None  # on whose behalf
     phases: tuple[Phase, ...]
+    parameters: tuple[Parameter, ...] = ()  # `mission m(area: zone, height: altitude in 5 m .. 30 m = 20 m) under ...`
+    most_time: Quantity | None = None  # `lasts at most 20 min`
+    most_energy: Quantity | None = None  # `energy at most 60 %`
+    most_steps: int | None = None  # `steps at most 40`

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rtshcua.model.ir.expression import Coordinates, Quantity
+from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, TimeOfDay
 from rtshcua.model.ir.node import Name, Node
 
 
@@ -17,20 +17,72 @@ class Circle(Node):
 
 
 class Polygon(Node):
-    """A simple polygon by its corners, WGS 84, in either direction, not closed by a repeated corner."""
+    """A simple polygon by its corners, WGS 84, in either direction, not closed by a repeated corner. `holes` are simple
+    polygons inside of it that do not belong to it, nor do their edges.
+    """
 
     kind: Literal["polygon"] = "polygon"
     corners: tuple[Coordinates, ...]
+    holes: tuple[tuple[Coordinates, ...], ...] = ()
+
+
+class Corridor(Node):
+    """`corridor(a, b, c, width 40 m)`: all points nearer to the line through the places than half the width."""
+
+    kind: Literal["corridor"] = "corridor"
+    points: tuple[Coordinates, ...]
+    width: Quantity
+
+
+class GeoJson(Node):
+    """`from "zones/bridge.geojson"`, `from "..." feature "name"`: a Polygon or MultiPolygon of RFC 7946. `path` is as
+    written, relative to the source; `feature` is a Feature's `id`, or its `name` property.
+    """
+
+    kind: Literal["geojson"] = "geojson"
+    path: str
+    feature: str | None
+
+
+class Combination(Node):
+    """`union(a, b, ...)`, or `difference(a, b, ...)`: what is in the first and in none of the others."""
+
+    kind: Literal["combination"] = "combination"
+    operator: Literal["union", "difference"]
+    shapes: tuple["Shape", ...]
+
+
+#: a reference names another zone, of which the ground plan counts
+Shape = Annotated[
+    Circle | Polygon | Corridor | GeoJson | Combination | Reference,
+    Field(discriminator="kind"),
+]
+
+
+class Daily(Node):
+    """`active 08:00 .. 18:00`: the zone exists between these local times of every day, over midnight if reversed."""
+
+    start: TimeOfDay
+    end: TimeOfDay
+
+
+class Dates(Node):
+    """`active "2026-05-01T08:00Z" .. "2026-05-02T18:00Z"`: the zone exists between two moments, us since the epoch."""
+
+    start_us: int
+    end_us: int
 
 
 class ZoneDecl(Node):
-    """`zone bridge_a = polygon(...) floor 0 m ceiling 60 m above home entry 47.39 N, 8.54 E`."""
+    """`zone bridge_a = polygon(...) floor 0 m ceiling 60 m above home entry 47.39 N, 8.54 E active 08:00 .. 18:00`."""
 
     name: Name
-    shape: Annotated[Circle | Polygon, Field(discriminator="kind")]
+    shape: Shape
     floor: Quantity | None
     ceiling: Quantity | None
     entry: Coordinates | None
+    daily: Daily | None = None
+    dates: Dates | None = None
 
 
 class VehicleDecl(Node):
@@ -38,6 +90,7 @@ class VehicleDecl(Node):
 
     `endurance` is the hover time of a full battery, `reserve` the charge that must remain after landing at home,
     `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC.
+    `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by.
     """
 
     name: Name
@@ -50,3 +103,9 @@ class VehicleDecl(Node):
     endurance: Quantity
     reserve: Quantity
     utc_offset: Quantity | None
+    elevation: Quantity | None = None  # of home above sea
+    elevation_within: Quantity | None = None  # how far the real elevation of the ground at home may differ
+
+
+Combination.model_rebuild()
+ZoneDecl.model_rebuild()

@@ -4,7 +4,7 @@ from typing import Literal
 
 from rtshcua.model.ir.expression import Condition, Quantity
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.skills import LinkDecl
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
 
 
 class Rule(Node):
@@ -23,6 +23,37 @@ class Rule(Node):
     approver: Name | None  # confirm: `by role supervisor`
     within: Quantity | None  # confirm: `within 30 s`
     target: LinkDecl | None  # degrade: `to return_home`
+    #: the `use` and `delegate` that brought an elaborated rule about, the outermost first; empty as written
+    origin: tuple[Node, ...] = ()
+
+
+class Delegation(Node):
+    """`delegate goto, hover by role operator to role trainee through agent when altitude <= 10 m`.
+
+    Whatever the policy permits to `grantor` of these skills (none: of any), it permits to `grantee` too, under the
+    further condition and through no other source: so it only narrows.
+    """
+
+    skills: tuple[Name, ...]
+    grantor: Name
+    grantee: Name
+    through: tuple[Name, ...]
+    when: Condition | None
+
+
+class Use(Node):
+    """`use low_flight(bridge_a, top = 30 m)`: the rules of a template with these arguments."""
+
+    template: Name
+    arguments: tuple[ArgumentValue, ...]
+
+
+class TemplateDecl(Node):
+    """`template low_flight(area: zone, top: altitude) { permit ... }`: rules with parameters, for policies to use."""
+
+    name: Name
+    parameters: tuple[Parameter, ...]
+    rules: tuple[Rule, ...]
 
 
 class Airspace(Node):
@@ -40,3 +71,5 @@ class PolicyDecl(Node):
     rules: tuple[Rule, ...]
     airspace: Airspace | None
     contingency: tuple[LinkDecl, ...]
+    uses: tuple[Use, ...] = ()
+    delegations: tuple[Delegation, ...] = ()

@@ -3,7 +3,7 @@
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
 
@@ -26,3 +26,4 @@ class Unit(Node):
     skills: tuple[SkillDecl, ...]
     policies: tuple[PolicyDecl, ...]
     missions: tuple[MissionDecl, ...]
+    templates: tuple[TemplateDecl, ...] = ()

@@ -60,6 +60,7 @@ class SoftwareBoundary:
         self._mint = mint
         self._enforced = enforced
         self._slots = policy.policy.slots
+        self._monitors = len(policy.monitors)
         self._clauses = _ClauseNumbers(policy.policy, invocations)
         self._consumed: set[int] = set()
         self._now_us = 0  # of the last request: time does not go back
@@ -67,7 +68,7 @@ class SoftwareBoundary:
 
     def enforce(self, request: bytes) -> bytes:
         """Decide one request. Hostile bytes get a refusal; nothing is raised and nothing is remembered of them."""
-        asked = decode(request, self._slots)
+        asked = decode(request, self._slots, self._monitors)
         if isinstance(asked, Malformed):
             return encode_refusal(Status.MALFORMED)
         now_us = asked.now.monotonic_us
@@ -160,7 +161,8 @@ class SoftwareBoundary:
             return Status.UNKNOWN_STEP
         if asked.link != DEGRADE:
             link = prepared.chain[asked.link]
-            return asked.link if link_admissible(link, asked.state, self._policy, asked.now) else None
+            may = link_admissible(link, asked.state, self._policy, asked.now, prepared.phase)
+            return asked.link if may else None
         choice = choose_fallback(prepared, asked.state, self._policy, asked.now)
         if choice is None or choice.index != DEGRADE:
             return None

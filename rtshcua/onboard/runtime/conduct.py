@@ -39,7 +39,7 @@ class Conduct:
         self.ending: Ending | None = None
         self.craft = Craft()
         self.queue = InvocationQueue(loaded.bundle.mission)
-        self.monitor = StateMonitor(loaded.bundle.policy.slots)
+        self.monitor = StateMonitor(loaded.policy)
         remaining = RemainingLatency()
         self.admission = Admission(loaded, journal, self.queue, remaining)
         self.dispatcher = Dispatcher(loaded.executor, journal, remaining)

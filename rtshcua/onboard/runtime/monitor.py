@@ -1,7 +1,12 @@
-"""The state monitor: keeps the paper's `S_t`, one value and its age a slot, from what the frames carried."""
+"""The state monitor: keeps the paper's `S_t`, one value and its age a slot, from what the frames carried, and what the
+policy's temporal monitors say of it.
+"""
 
+from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.temporal import initial, observe
+from rtshcua.decision.truth import UNKNOWN
 from rtshcua.model.flat.limits import MAX_VALUE
-from rtshcua.model.flat.situation import State
+from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
 from rtshcua.wire.request import MAX_AGE_US
 
@@ -13,9 +18,12 @@ class StateMonitor:
     that comes late must not make the state younger. Slots that the policy does not have are ignored.
     """
 
-    def __init__(self, slots: int) -> None:
-        self._values: list[int | None] = [None] * slots
-        self._stamps: list[int | None] = [None] * slots
+    def __init__(self, policy: PreparedPolicy) -> None:
+        self._policy = policy
+        self._values: list[int | None] = [None] * policy.policy.slots
+        self._stamps: list[int | None] = [None] * policy.policy.slots
+        self._memory = initial(policy)
+        self._truths: tuple[int, ...] = (UNKNOWN,) * len(policy.monitors)
 
     def update(self, readings: Readings) -> None:
         """Take over what one frame reported at `readings.at_us`."""
@@ -28,9 +36,17 @@ class StateMonitor:
             self._stamps[slot] = readings.at_us
             self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
 
+    def observe(self, now: Now) -> None:
+        """Let the temporal monitors look at the state, once a turn: an edge lasts from one observation to the next."""
+        if self._policy.monitors:
+            self._memory, self._truths = observe(self._memory, self._policy, self.state(now.monotonic_us), now)
+
     def state(self, now_us: int) -> State:
-        """The state as of `now_us`. Ages saturate at 0 and `MAX_AGE_US`, and are 0 where nothing was ever reported."""
+        """The state as of `now_us`, with the truths of the last observation. Ages saturate at 0 and `MAX_AGE_US`, and
+        are 0 where nothing was ever reported.
+        """
         return State(
             values=tuple(self._values),
             ages=tuple(0 if stamp is None else min(max(now_us - stamp, 0), MAX_AGE_US) for stamp in self._stamps),
+            monitors=self._truths,
         )

@@ -37,13 +37,15 @@ class Runtime:
     def step(self, now: Now, events: Sequence[Event]) -> list[Action]:
         """What to do at `now`, which never goes back, after `events` in the order in which they happened.
 
-        To be called whenever something happens, and every few tens of ms: times run out without an event. Once the run
-        ended, nothing is done any more.
+        To be called whenever something happens, and every few tens of ms: times run out without an event. Each call is
+        one observation of the policy's temporal monitors, after what was received and before what is decided. Once the
+        run ended, nothing is done any more.
         """
         conduct = self._conduct
         for event in events:
             if conduct.stage is not Stage.ENDED:
                 self._happenings.take(now, event)
+        conduct.monitor.observe(now)
         while conduct.turn(now):
             pass
         return self._journal.take()

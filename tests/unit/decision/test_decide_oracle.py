@@ -5,6 +5,7 @@ from random import Random
 import pytest
 from hypothesis import assume, given, settings
 
+from reference import flat_case as flat
 from reference import worlds
 from reference.naive_code import TooNear
 from reference.oracle import Oracle
@@ -21,14 +22,18 @@ MANY = settings(max_examples=500)
 def prepared(of: Random) -> tuple[PreparedPolicy, PreparedInvocation]:
     policy = prepare(worlds.policy(of))
     assert isinstance(policy, PreparedPolicy), policy
-    invocation = prepare_invocation(worlds.invocation(of, policy.policy), policy)
+    invocation = prepare_invocation(worlds.invocation(of, policy.policy), policy, flat.MISSION.phases)
     assert isinstance(invocation, PreparedInvocation), invocation
     return policy, invocation
 
 
 def decides_the_same(of: Random) -> None:
     policy, invocation = prepared(of)
-    state, now, context = worlds.state(of), worlds.now(of), worlds.context(of, invocation.invocation)
+    state, now, context = (
+        worlds.state(of, len(policy.monitors)),
+        worlds.now(of),
+        worlds.context(of, invocation.invocation),
+    )
     oracle = Oracle(policy.policy, state, now)
     try:
         outcome, reason, step = oracle.decide(invocation.invocation, context)
@@ -42,11 +47,11 @@ def decides_the_same(of: Random) -> None:
 
 def holds_what_is_decided(of: Random) -> None:
     policy, invocation = prepared(of)
-    sets, context = worlds.sets(of), worlds.context(of, invocation.invocation)
+    sets, context = worlds.sets(of, len(policy.monitors)), worlds.context(of, invocation.invocation)
     answers = possible(invocation, sets, policy, context)
     assert answers
     for _ in range(8):
-        state, now = worlds.situation(of, sets)
+        state, now = worlds.situation(of, sets, len(policy.monitors))
         decision = decide(invocation, state, policy, context, now)
         assert (decision.outcome, decision.reason, decision.target) in answers
 
@@ -61,10 +66,12 @@ def test_the_oracle_decides_the_same(of: Random) -> None:
 @given(worlds.CHANCES)
 def test_the_oracle_chooses_the_same_links(of: Random) -> None:
     policy, invocation = prepared(of)
-    state, now, after = worlds.state(of), worlds.now(of), of.randrange(START, 3)
+    state, now, after = worlds.state(of, len(policy.monitors)), worlds.now(of), of.randrange(START, 3)
     oracle = Oracle(policy.policy, state, now)
     try:
+        oracle.enter(invocation.invocation)
         fallback = oracle.first(invocation.invocation.contract.fallback, after)
+        oracle.phase = -1
         contingency = oracle.first(policy.policy.contingency, after)
         may = [oracle.may_fly(link) for link in policy.policy.contingency]
     except TooNear:
@@ -86,10 +93,14 @@ def test_what_is_possible_holds_what_is_decided(of: Random) -> None:
 @given(worlds.CHANCES)
 def test_one_situation_has_one_answer(of: Random) -> None:
     policy, invocation = prepared(of)
-    state, now, context = worlds.state(of), worlds.now(of), worlds.context(of, invocation.invocation)
+    state, now, context = (
+        worlds.state(of, len(policy.monitors)),
+        worlds.now(of),
+        worlds.context(of, invocation.invocation),
+    )
     decision = decide(invocation, state, policy, context, now)
     sets = situation(state, policy, now)
-    assert is_situation(sets)
+    assert is_situation(sets, policy)
     answers = possible(invocation, sets, policy, context)
     assert answers == {(decision.outcome, decision.reason, decision.target)}
 

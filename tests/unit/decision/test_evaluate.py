@@ -3,21 +3,30 @@
 from random import Random
 
 from hypothesis import assume, given, settings
+from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference import worlds
 from reference.naive_code import Leg, TooNear, World, truths
-from rtshcua.decision.case import situation
-from rtshcua.decision.evaluate import Condition, Environment, build
+from rtshcua.decision.case import environment, situation
+from rtshcua.decision.evaluate import Condition, build
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.decision.scope import scope_of
 from rtshcua.decision.tree import parse
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.values import MISSING, Sets, point
+from rtshcua.decision.values import Sets, point
 from rtshcua.model.flat.situation import Now, State
 
-POLICY = prepare(flat.POLICY)
+MONITORS, PHASE = 2, 1
+POLICY = prepare(
+    replace(
+        flat.POLICY,
+        monitors=worlds.monitors(Random(1), MONITORS),
+        phases=flat.MISSION.phases,
+        sets=(*flat.POLICY.sets, (0, PHASE)),
+    )
+)
 assert isinstance(POLICY, PreparedPolicy)
 
 
@@ -25,8 +34,8 @@ def question(of: Random) -> tuple[tuple[int, ...], tuple[int, ...], Condition]:
     """Code, arguments that are in range, and the compiled condition."""
     skill = of.choice([flat.INSPECT, flat.GOTO])
     contract = flat.CONTRACTS[skill]
-    code = worlds.condition(of, contract, depth=3)
-    node = parse(code, scope_of(flat.POLICY).about(contract))
+    code = worlds.condition(of, contract, depth=3, reach=worlds.Reach(MONITORS, phased=True))
+    node = parse(code, scope_of(POLICY.policy).about(contract))
     assert not isinstance(node, str), node
     area = of.randrange(flat.DECLARED)
     arguments = worlds.arguments(of, skill)
@@ -39,19 +48,21 @@ def naive(code: tuple[int, ...], arguments: tuple[int, ...], state: State, now: 
     legs: list[Leg] | None = None
     if x is not None and y is not None and z is not None:
         legs = [((x, y), (x, y), (0, 0, 0, 0), z, z)]
-    (letter,) = truths(code, World(flat.POLICY, known, arguments, now.utc_us, now.utc_error_us, legs))
+    said = "".join({TRUE: "T", FALSE: "F", UNKNOWN: "U"}[truth] for truth in situation(state, POLICY, now).monitors)
+    about = (POLICY.policy, known, arguments, now.utc_us, now.utc_error_us, legs)
+    (letter,) = truths(code, World(*about, monitors=said, phase=PHASE))
     return {"T": TRUE, "F": FALSE, "U": UNKNOWN}[letter]
 
 
 def compiled(condition: Condition, arguments: tuple[int, ...], sets: Sets) -> int:
-    return condition(Environment([*sets.values, MISSING], tuple(map(point, arguments)), sets.utc_us, sets.utc_error_us))
+    return condition(environment(sets, POLICY, tuple(map(point, arguments)), PHASE))
 
 
 @settings(max_examples=500)
 @given(worlds.CHANCES)
 def test_a_single_situation(of: Random) -> None:
     code, arguments, condition = question(of)
-    state, now = worlds.state(of), worlds.now(of)
+    state, now = worlds.state(of, MONITORS), worlds.now(of)
     assert compiled(condition, arguments, situation(state, POLICY, now)) == naive(code, arguments, state, now)
 
 
@@ -59,11 +70,11 @@ def test_a_single_situation(of: Random) -> None:
 @given(worlds.CHANCES)
 def test_sets_hold_the_truth_of_each_of_their_situations(of: Random) -> None:
     code, arguments, condition = question(of)
-    sets = worlds.sets(of)
+    sets = worlds.sets(of, MONITORS)
     abstract = compiled(condition, arguments, sets)
     assert abstract in range(1, 8)
     for _ in range(4):
-        state, now = worlds.situation(of, sets)
+        state, now = worlds.situation(of, sets, MONITORS)
         try:
             truth = naive(code, arguments, state, now)
         except TooNear:

@@ -60,7 +60,7 @@ def test_where_nothing_is_on_earth_nothing_is_flown(projection: Projection, plac
     assert isinstance(policy, PreparedPolicy)
     step = flat.INVOCATIONS[1]
     there = replace(step, arguments=(*place, 20 * M), plan=replace(step.plan, path=place))
-    found = prepare_invocation(there, policy)
+    found = prepare_invocation(there, policy, flat.MISSION.phases)
     assert isinstance(found, Malformed)
     assert found.what.startswith(f"plan: {at}")
 

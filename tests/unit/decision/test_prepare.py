@@ -100,7 +100,7 @@ POLICIES: list[tuple[Policy, str]] = [
     (zone(data=(0, 0, 1, 1, 2, MAX_COORDINATE + 1)), f"zone 0: coordinate {MAX_COORDINATE + 1} is not in"),
     (zone(floor=1 << 31), "zone 0: floor 2147483648 is not in"),
     (zone(floor=10, ceiling=9), "zone 0: ceiling 9 is not in 10.."),
-    (zone(shape=2), "zone 0: there is no shape 2"),
+    (zone(shape=3), "zone 0: there is no shape 3"),
     (zone(shape=CIRCLE), "zone 0: a circle has a centre and a squared radius"),
     (zone(shape=CIRCLE, data=(0, 0, 0)), "zone 0: squared radius 0 is not in 1.."),
     (zone(shape=CIRCLE, data=(1 << 40, 0, 1)), f"zone 0: coordinate {1 << 40} is not in"),
@@ -247,6 +247,7 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (mine(deadline_us=S.contract.deadline_us + 1), "`deadline` is looser than in the policy"),
     (mine(validity_us=S.contract.validity_us + 1), "`validity` is looser than in the policy"),
     (mine(duration_us=S.contract.duration_us + 1), "`duration` is looser than in the policy"),
+    (mine(duration_us=0), "`duration` is looser than in the policy"),  # which would be no limit
     (mine(grace_us=S.contract.grace_us + 1), "`grace` is looser than in the policy"),
     (mine(energy=S.contract.energy - 1), "`energy` is looser than in the policy"),
     (mine(require=S.contract.require[:1]), "`require` is looser than in the policy"),
@@ -283,7 +284,7 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
 
 @pytest.mark.parametrize(("invocation", "what"), INVOCATIONS, ids=[what for _, what in INVOCATIONS])
 def test_a_malformed_invocation(invocation: Invocation, what: str) -> None:
-    found = prepare_invocation(invocation, POLICY)
+    found = prepare_invocation(invocation, POLICY, flat.MISSION.phases)
     assert isinstance(found, Malformed)
     assert found.what.startswith(what)
 
@@ -292,7 +293,7 @@ def test_a_malformed_invocation(invocation: Invocation, what: str) -> None:
     "tighter",
     [
         S.contract,
-        replace(S.contract, deadline_us=1, validity_us=1, duration_us=0, grace_us=0, energy=9_999),
+        replace(S.contract, deadline_us=1, validity_us=1, duration_us=1, grace_us=0, energy=9_999),
         replace(
             S.contract,
             require=(*S.contract.require, S.contract.assume[0]),
@@ -302,13 +303,13 @@ def test_a_malformed_invocation(invocation: Invocation, what: str) -> None:
     ],
 )
 def test_a_mission_may_tighten(tighter: Any) -> None:
-    assert isinstance(prepare_invocation(replace(S, contract=tighter), POLICY), PreparedInvocation)
+    assert isinstance(prepare_invocation(replace(S, contract=tighter), POLICY, flat.MISSION.phases), PreparedInvocation)
 
 
 def test_a_mission_may_choose_among_phases_where_the_policy_names_none() -> None:
     goto = flat.INVOCATIONS[1]
     chosen = replace(goto, contract=replace(goto.contract, phases=("inspection",)))
-    assert isinstance(prepare_invocation(chosen, POLICY), PreparedInvocation)
+    assert isinstance(prepare_invocation(chosen, POLICY, flat.MISSION.phases), PreparedInvocation)
 
 
 MISSION = flat.MISSION
@@ -395,10 +396,10 @@ def test_no_damage_makes_it_fail(of: Random) -> None:
     policy = prepare(damage(of, whole) if of.random() < 0.7 else whole)
     if isinstance(policy, Malformed):
         return
-    invocation = prepare_invocation(damage(of, worlds.invocation(of, whole)), policy)
+    invocation = prepare_invocation(damage(of, worlds.invocation(of, whole)), policy, flat.MISSION.phases)
     if isinstance(invocation, Malformed):
         return
-    state, now = damage(of, worlds.state(of)), damage(of, worlds.now(of))
+    state, now = damage(of, worlds.state(of, len(policy.monitors))), damage(of, worlds.now(of))
     context = damage(of, worlds.context(of, invocation.invocation))
     assert decide(invocation, state, policy, context, now).step in range(1, 9)
     watch(invocation, state, policy, now)

@@ -44,7 +44,8 @@ def test_a_place_out_of_all_coordinates() -> None:
     far = 1 << 29
     step = flat.INVOCATIONS[1]
     there = replace(step, arguments=(far + 1, 0, 20_000))
-    assert prepare_invocation(there, POLICY) == Malformed("plan: the path does not fit the arguments")
+    found = prepare_invocation(there, POLICY, flat.MISSION.phases)
+    assert found == Malformed("plan: the path does not fit the arguments")
     edge = replace(step, arguments=(far, 0, 20_000), plan=replace(step.plan, path=(far, 0)))
     assert ask(edge).reason is Reason.AIRSPACE
 

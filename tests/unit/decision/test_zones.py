@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from reference import outlines, worlds
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.decision.places import Place, Sweep
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
@@ -27,8 +28,10 @@ def flat(points: list[tuple[int, int]]) -> tuple[int, ...]:
     return tuple(coordinate for point in points for coordinate in point)
 
 
-#: any closed outline: the rule is even-odd, so crossing itself does not matter
-OUTLINES = st.lists(POINTS, min_size=3, max_size=24, unique=True).map(lambda points: polygon(*flat(points)))
+#: with holes and islands, or one ring; corners often fall on one line
+OUTLINES = worlds.CHANCES.map(outlines.rings).map(
+    lambda rings: outlines.polygon(rings[0]) if len(rings) == 1 else outlines.area(rings)
+)
 STARS = st.lists(st.integers(3, 30), min_size=17, max_size=40).map(
     lambda radii: polygon(
         *flat(

@@ -60,7 +60,12 @@ effects = st.builds(
     counts,
     counts,
 )
-states = st.builds(RecordedState, st.lists(integers).map(tuple), st.lists(st.none() | integers).map(tuple))
+states = st.builds(
+    RecordedState,
+    ages=st.lists(integers).map(tuple),
+    monitors=st.lists(integers).map(tuple),
+    values=st.lists(st.none() | integers).map(tuple),
+)
 contexts = st.builds(
     RecordedContext,
     st.lists(st.tuples(integers, integers, integers, integers), max_size=2).map(tuple),
@@ -116,6 +121,15 @@ def test_a_line_is_canonical_and_reads_back(record: AnyRecord) -> None:
     line = encode(record)
     assert line == jcs(msgspec.to_builtins(record)).encode() + b"\n"
     assert read(line) == record
+
+
+def test_a_state_names_its_temporal_monitors_only_where_there_are_any() -> None:
+    """So that a log from before there were any is read as it was written."""
+    bare = RecordedState(ages=(5,), values=(None,))
+    assert msgspec.json.encode(bare) == b'{"ages":[5],"values":[null]}'
+    some = RecordedState(ages=(5,), monitors=(1, 4), values=(None,))
+    assert msgspec.json.encode(some) == b'{"ages":[5],"monitors":[1,4],"values":[null]}'
+    assert msgspec.json.decode(msgspec.json.encode(bare), type=RecordedState) == bare
 
 
 def test_fields_are_sorted_and_begin_with_a_lower_case_letter() -> None:

@@ -3,6 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from reference import flat_case as flat
+from reference.asking import POLICY
 from reference.flat_case import MISSION
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.onboard.ports import Readings
@@ -13,38 +15,38 @@ from rtshcua.wire.request import MAX_AGE_US
 
 
 def test_nothing_received_is_unknown_and_of_no_age() -> None:
-    state = StateMonitor(2).state(1_000)
-    assert (state.values, state.ages) == ((None, None), (0, 0))
+    state = StateMonitor(POLICY).state(1_000)
+    assert (state.values, state.ages, state.monitors) == ((None,) * flat.SLOTS, (0,) * flat.SLOTS, ())
 
 
 def test_values_age_until_they_are_reported_again() -> None:
-    monitor = StateMonitor(2)
+    monitor = StateMonitor(POLICY)
     monitor.update(Readings(100, ((0, 7), (1, -7))))
     monitor.update(Readings(300, ((1, None),)))
     state = monitor.state(400)
-    assert (state.values, state.ages) == ((7, None), (300, 100))
+    assert (state.values[:2], state.ages[:2]) == ((7, None), (300, 100))
 
 
 def test_a_frame_that_comes_late_is_set_aside() -> None:
-    monitor = StateMonitor(1)
+    monitor = StateMonitor(POLICY)
     monitor.update(Readings(300, ((0, 7),)))
     monitor.update(Readings(200, ((0, 8),)))
-    assert monitor.state(400).values == (7,)
+    assert monitor.state(400).values[0] == 7
 
 
 def test_ages_saturate_at_both_ends() -> None:
-    monitor = StateMonitor(1)
+    monitor = StateMonitor(POLICY)
     monitor.update(Readings(500, ((0, 1),)))
-    assert monitor.state(400).ages == (0,)
-    assert monitor.state(1 << 60).ages == (MAX_AGE_US,)
+    assert monitor.state(400).ages[0] == 0
+    assert monitor.state(1 << 60).ages[0] == MAX_AGE_US
 
 
 def test_what_is_beyond_all_sense_is_unknown() -> None:
-    monitor = StateMonitor(1)
-    monitor.update(Readings(0, ((0, MAX_VALUE), (5, 1), (-1, 1))))
-    assert monitor.state(0).values == (MAX_VALUE,)
+    monitor = StateMonitor(POLICY)
+    monitor.update(Readings(0, ((0, MAX_VALUE), (flat.SLOTS, 1), (-1, 1))))
+    assert monitor.state(0).values == (MAX_VALUE, *(None,) * (flat.SLOTS - 1))
     monitor.update(Readings(0, ((0, -MAX_VALUE - 1),)))
-    assert monitor.state(0).values == (None,)
+    assert monitor.state(0).values[0] is None
 
 
 def test_the_queue_releases_step_by_step_and_phase_by_phase() -> None:

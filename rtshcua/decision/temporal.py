@@ -1,0 +1,130 @@
+"""Temporal monitors: the bounded past of a condition, in constant memory.
+
+Time is monotonic, in us. An *observation* is a moment at which the runtime looks at the state. Let the observations so
+far be at t_1 <= t_2 <= ... <= t_n = t, the present one last, and let v_i be the truth of the condition c in the state
+at t_i. The truth of c over time, s_c, is a step function:
+
+    s_c(tau) = v_i      at tau = t_i, and for t_i < tau < t_i+1, if t_i+1 - t_i <= MAX_GAP
+    s_c(tau) = UNKNOWN  for t_i < tau < t_i+1, if t_i+1 - t_i > MAX_GAP, and for tau < t_1
+
+Where several observations fall on one moment, each of them counts there. A time that goes back is taken to stand
+still. Each operator is defined on s_c (Kleene's order, FALSE < UNKNOWN < TRUE):
+
+    FOR_LAST w     min of s_c(tau) for t - w <= tau <= t      MTL's historically, H[0, w] c
+    WITHIN_LAST w  max of s_c(tau) for t - w <= tau <= t      MTL's once, O[0, w] c
+    RISING         not v_n-1 and v_n                          v_0 = UNKNOWN
+    FALLING        v_n-1 and not v_n
+
+What a monitor says is again the truth of a condition over time, so monitors nest: an inner one stands before the outer
+one in the policy, and is observed before it.
+
+Source: bounded-past MTL (Thati and Rosu, "Monitoring algorithms for metric temporal logic specifications", 2005), with
+Kleene's three truth values; the windows are closed on both sides. To know whether a stretch of a truth meets the window
+it is enough to know the last us that belongs to it, one number for each truth that can decide.
+"""
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from rtshcua.decision.case import environment, situation
+from rtshcua.decision.evaluate import NO_PHASE
+from rtshcua.decision.prepared import PreparedMonitor, PreparedPolicy
+from rtshcua.decision.truth import AND, FALSE, NOT, TRUE, UNKNOWN, Truth
+from rtshcua.model.flat.limits import MAX_GAP
+from rtshcua.model.flat.policy import MonitorKind
+from rtshcua.model.flat.situation import Now, State
+
+_NEVER: Final = -(1 << 62)  # us: before any window
+
+
+class Remembered(NamedTuple):
+    """What is kept of one condition: its truth at the last observation, and the last us of its time line so far at
+    which it was true, false and unknown.
+    """
+
+    last: Truth
+    true_us: int
+    false_us: int
+    unknown_us: int
+
+
+class Memory(NamedTuple):
+    """What is kept between two observations; `at_us` is the moment of the last one, None before the first."""
+
+    at_us: int | None
+    conditions: tuple[Remembered, ...]
+
+
+def initial(policy: PreparedPolicy) -> Memory:
+    """Before the first observation."""
+    return Memory(None, (Remembered(UNKNOWN, _NEVER, _NEVER, _NEVER),) * len(policy.monitors))
+
+
+def observe(memory: Memory, policy: PreparedPolicy, state: State, now: Now) -> tuple[Memory, tuple[Truth, ...]]:
+    """One observation: what to remember of it, and what each monitor of the policy says now (`State.monitors`).
+
+    What `state` says of the monitors is not looked at.
+    """
+    at_us = now.monotonic_us if memory.at_us is None else max(now.monotonic_us, memory.at_us)
+    truths: list[Truth] = []
+    at = environment(situation(state, policy, now), policy, (), NO_PHASE)
+    at.monitors = truths  # it grows: a monitor reads those before it
+    conditions: list[Remembered] = []
+    for monitor, before in zip(policy.monitors, memory.conditions, strict=True):
+        after = _observed(before, monitor.condition(at), memory.at_us, at_us)
+        truths.append(_SAYS[monitor.kind](monitor, before, after, at_us))
+        conditions.append(after)
+    return Memory(at_us, tuple(conditions)), tuple(truths)
+
+
+def _observed(before: Remembered, truth: Truth, last_us: int | None, at_us: int) -> Remembered:
+    """The time line up to and with an observation: what lies since the last one, then what is so now."""
+    _, true_us, false_us, unknown_us = before
+    if last_us is None or at_us - last_us > MAX_GAP:
+        unknown_us = at_us - 1
+    elif at_us > last_us:
+        if before.last == TRUE:
+            true_us = at_us - 1
+        elif before.last == FALSE:
+            false_us = at_us - 1
+        else:
+            unknown_us = at_us - 1
+    if truth == TRUE:
+        return Remembered(truth, at_us, false_us, unknown_us)
+    if truth == FALSE:
+        return Remembered(truth, true_us, at_us, unknown_us)
+    return Remembered(UNKNOWN, true_us, false_us, at_us)
+
+
+def _for_last(monitor: PreparedMonitor, _: Remembered, after: Remembered, at_us: int) -> Truth:
+    """H[0, w] c: FALSE if some moment of t - w .. t was FALSE, else UNKNOWN if one was, else TRUE."""
+    start_us = at_us - monitor.window_us
+    if after.false_us >= start_us:
+        return FALSE
+    return UNKNOWN if after.unknown_us >= start_us else TRUE
+
+
+def _within_last(monitor: PreparedMonitor, _: Remembered, after: Remembered, at_us: int) -> Truth:
+    """O[0, w] c: TRUE if some moment of t - w .. t was TRUE, else UNKNOWN if one was, else FALSE."""
+    start_us = at_us - monitor.window_us
+    if after.true_us >= start_us:
+        return TRUE
+    return UNKNOWN if after.unknown_us >= start_us else FALSE
+
+
+def _rising(_: PreparedMonitor, before: Remembered, after: Remembered, __: int) -> Truth:
+    """Not c at the observation before, and c now: FALSE where either rules it out, UNKNOWN where one is missing."""
+    return AND[NOT[before.last]][after.last]
+
+
+def _falling(_: PreparedMonitor, before: Remembered, after: Remembered, __: int) -> Truth:
+    """c at the observation before, and not c now."""
+    return AND[before.last][NOT[after.last]]
+
+
+_SAYS: dict[int, Callable[[PreparedMonitor, Remembered, Remembered, int], Truth]] = {
+    MonitorKind.FOR_LAST: _for_last,
+    MonitorKind.WITHIN_LAST: _within_last,
+    MonitorKind.RISING: _rising,
+    MonitorKind.FALLING: _falling,
+}

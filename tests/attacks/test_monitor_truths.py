@@ -1,0 +1,76 @@
+"""A runtime that was taken over claims what temporal monitors never said: of a wrong length, or what is no truth.
+
+That it lies about what they did say, the boundary cannot see, no more than it could about the wind itself; the log
+keeps what was claimed.
+"""
+
+import pytest
+from msgspec.structs import replace
+
+from reference.flat_case import CONTRACTS, MISSION, POLICY, TAKEOFF, WIND, M, S, apply, clause, const, signal
+from reference.world import START, FakeVehicle, answer_to, loaded, request_for
+from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.policy import Monitor, MonitorKind
+from rtshcua.model.flat.situation import State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.wire.response import Answer, Status
+
+BREEZE = clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M)))
+
+
+def armed() -> Loaded:
+    """Taking off needs the wind to have been calm for 3 s."""
+    takeoff = replace(
+        CONTRACTS[TAKEOFF],
+        require=(clause("wind.speed < 8 m/s for the last 3 s", (Op.MONITOR, 0, 0)),),
+        assume=(),
+        reads=(WIND,),
+    )
+    policy = replace(
+        POLICY, monitors=(Monitor(MonitorKind.FOR_LAST, 3 * S, BREEZE),), contracts=(takeoff, *CONTRACTS[1:])
+    )
+    first = replace(MISSION.invocations[0], contract=takeoff)
+    return loaded(policy, replace(MISSION, invocations=(first, *MISSION.invocations[1:])))
+
+
+def claiming(of: Loaded, *monitors: int) -> bytes:
+    values = FakeVehicle().values
+    state = State(tuple(values[slot] for slot in range(len(values))), (0,) * len(values), monitors)
+    return request_for(of, state=state)
+
+
+@pytest.mark.parametrize("monitors", [(), (1, 1), (1,) * 13, (0,), (3,), (5,), (7,), (255,)])
+def test_what_is_no_truth_of_each_monitor_is_no_request(monitors: tuple[int, ...]) -> None:
+    of = armed()
+    assert answer_to(of, claiming(of, *monitors)) is Status.MALFORMED
+    assert isinstance(answer_to(of, claiming(of, 1)), Answer), "nothing is remembered of it"
+
+
+@pytest.mark.parametrize(
+    ("truth", "outcome", "reason"),
+    [
+        (1, Outcome.ALLOW, Reason.ADMITTED),
+        (2, Outcome.FALLBACK, Reason.STATE_VIOLATED),
+        (4, Outcome.DEFER, Reason.STATE_UNKNOWN),
+    ],
+)
+def test_each_truth_is_decided_on(truth: int, outcome: Outcome, reason: Reason) -> None:
+    of = armed()
+    answer = answer_to(of, claiming(of, truth))
+    assert isinstance(answer, Answer)
+    assert (answer.outcome, answer.reason) == (outcome, reason)
+
+
+def test_what_a_monitor_says_now_cannot_be_used_later() -> None:
+    """The permit ends a second after the observation at the latest, however fresh the wind is."""
+    of = armed()
+    answer = answer_to(of, claiming(of, 1))
+    assert isinstance(answer, Answer)
+    assert answer.valid_until_us <= START.monotonic_us + S
+
+
+def test_a_request_for_a_policy_without_monitors_is_no_request_here() -> None:
+    of, without = armed(), loaded()
+    assert answer_to(of, request_for(without)) is Status.MALFORMED
+    assert answer_to(without, claiming(of, 1)) is Status.MALFORMED

@@ -1,0 +1,67 @@
+"""Small programs in text, and what checking them finds."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.compiler.program import check_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+#: the frozen library of the checker's twins
+LIBRARY = str(CHECKOUT / "tests" / "golden" / "checker" / "library")
+IMPORTS = "".join(
+    f'import "lib:{name}.rts"\n'
+    for name in (
+        "policies/site",
+        *(f"skills/{skill}" for skill in ("signals", "takeoff", "hover", "goto", "return_home", "emergency_land")),
+    )
+)
+
+
+def findings(text: str) -> tuple[Diagnostic, ...]:
+    """All findings on one source."""
+
+    def read(path: str) -> bytes:
+        return text.encode() if path == "probe.rts" else Path(path).read_bytes()
+
+    return check_program(load(["probe.rts"], read, LIBRARY), dialect.load())
+
+
+def found(text: str) -> list[tuple[str, str]]:
+    """The codes and messages of all findings."""
+    return [(each.code.id, each.message) for each in findings(text)]
+
+
+def skill(name: str, **parts: str) -> str:
+    """A skill that holds, with other parts instead; a part of the value "" is left out."""
+    written = {
+        "motion": "hold",
+        "class": "tactical",
+        "deadline": "5 s",
+        "valid": "for 40 min",
+        "lasts": "at most 1 min",
+        "fallback": "return_home, emergency_land",
+        "energy": "at most 5 %",
+        **parts,
+    }
+    return f"skill {name} {{\n" + "".join(f"  {key} {value}\n" for key, value in written.items() if value) + "}\n"
+
+
+def policy(*rules: str, contingency: str = "return_home, emergency_land") -> str:
+    """A policy that permits everything, with further rules."""
+    lines = ["permit any by any through agent, operator, onboard, reflex", *rules, f"contingency {contingency}"]
+    return "policy rules version 1 {\n" + "".join(f"  {line}\n" for line in lines) + "}\n"
+
+
+def mission(*steps: str, under: str = "rules@1") -> str:
+    """A mission of one phase, after whose name `departure` the library's `takeoff` asks."""
+    body = "".join(f"    {step}\n" for step in steps)
+    header = f"mission flight under {under} on quad {{\n  proposed by agent openclaw for role operator\n"
+    return f"{header}  phase departure {{\n{body}  }}\n}}\n"
+
+
+def program(*parts: str, imports: Iterable[str] = (IMPORTS,)) -> str:
+    """Parts of one source, with their imports."""
+    return "".join((*imports, *parts))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.reduce import reduction
+from rtshcua.ground.language.reduce import Reduction, reduction
 from rtshcua.ground.language.table import END, Table
 
 
@@ -33,12 +33,16 @@ class Automaton:
     states: list[int] = field(default_factory=lambda: [0])
     values: list[Any] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
+    rules: list[Reduction] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Binds each rule to its action, once for the text, however often the parser stops in it."""
+        self.rules = [reduction(rule, self.source.file, self.actions) for rule in self.table.rules]
 
     def run(self, offset: int) -> Failure | None:
         """Parses from `offset` on; None when the text was read to its end."""
         rows, lexers, last = self.table.rows, self.table.lexers, self.table.end
-        rules = [reduction(rule, self.source.file, self.actions) for rule in self.table.rules]
-        states, values, starts = self.states, self.values, self.starts
+        rules, states, values, starts = self.rules, self.states, self.values, self.starts
         text, skip = self.source.text, self.table.skip
         end = offset  # of the last token that was shifted
         while True:

@@ -1,9 +1,10 @@
 """What the parser would take where it stands, in a person's words."""
 
+import re
 from collections.abc import Iterable
 
 from rtshcua.ground.language.automaton import Automaton
-from rtshcua.ground.language.recovery import open_block, pending, shifts
+from rtshcua.ground.language.recovery import open_block, owner, shifts
 from rtshcua.ground.language.table import END
 
 WORDS = {
@@ -13,16 +14,30 @@ WORDS = {
     "<TIME_OF_DAY>": "a time of day",
     "<UNIT>": "a unit",
     "<COMPARE>": "a comparison",
+    "<DIVIDE>": "`/`",
     "<LOCAL_TIME>": "`local time`",
     "<_GROW>": "`grow`",
+    "<_CIRCLE>": "`circle`",
+    "<_POLYGON>": "`polygon`",
+    "<_CORRIDOR>": "`corridor`",
+    "<COMBINE>": "`union`, `difference`",
+    "<FUNCTION>": "`abs`, `min`, `max`",
+    "<_REPEAT>": "`repeat`",
+    "<_RISING>": "`rising`",
+    "<_FALLING>": "`falling`",
     "<_ONE_OF>": "`one of`",
     "<_ON_INADMISSIBLE>": "`on inadmissible`",
     END: "the end of the file",
 }
 
-VALUE = {"<NAME>", "<NUMBER>", "<TIME_OF_DAY>", "<LOCAL_TIME>", "-", "("}
+_QUOTED = re.compile("`([^`]+)`")
+
+VALUE = {"<NAME>", "<NUMBER>", "<TIME_OF_DAY>", "<LOCAL_TIME>", "<FUNCTION>", "-", "("}
+CONDITION = {"not", "<_RISING>", "<_FALLING>"}  # what only a condition begins with
 NUMBER = {"-", "<NUMBER>"}
-ARITHMETIC = {"+", "-", "*"}
+ARITHMETIC = {"+", "-", "*", "<DIVIDE>"}
+CONNECTING = {"and", "or", "for", "within"}  # what may follow a condition
+SHAPE = {"<_CIRCLE>", "<_POLYGON>", "<_CORRIDOR>", "<COMBINE>"}
 
 
 def accepted(automaton: Automaton) -> set[str]:
@@ -47,7 +62,7 @@ def parts(automaton: Automaton, symbols: Iterable[str]) -> set[str]:
 
 def phrase(automaton: Automaton, word: str) -> str:
     """`word` with the words that can only follow it: `stale after`, `lasts at most`."""
-    said, state = [word], _after(automaton, word)
+    said, state = [word], _after(automaton, word) if word.isalpha() else None
     while state is not None:
         tokens = {symbol: step for symbol, step in automaton.table.rows[state].items() if _is_token(symbol)}
         (only, state) = next(iter(tokens.items())) if len(tokens) == 1 else ("", None)
@@ -66,27 +81,41 @@ def describe(automaton: Automaton, symbols: set[str]) -> str:
         rest -= beginnings(automaton)
         said.append("a declaration")
     if rest >= VALUE:
-        said.append("a condition" if "not" in rest else "a value")
-        rest -= VALUE | {"not"}
+        said.append("a condition" if rest & CONDITION else "a value")
+        rest -= VALUE | CONDITION
     if "<COMPARE>" in rest:
         said.append("a comparison")
         rest -= ARITHMETIC | {"<COMPARE>", "in", "inside", "outside"}
     elif "+" in rest:
         said.append("an operator")
-        rest -= ARITHMETIC | {"and", "or"}
+        rest -= ARITHMETIC | (CONNECTING if "and" in rest else set())
     if rest >= NUMBER:
         said.append("a number")
         rest -= NUMBER
+    if rest >= SHAPE:
+        said.append("a shape")
+        rest -= SHAPE
     items = parts(automaton, rest)
-    owner = pending(automaton)
-    if len(items) > 3 and owner is not None:
+    whose = owner(automaton)
+    if len(items) > 3 and whose is not None:
         rest -= items
-        said.append(f"another part of the {owner[0]}")
+        said.append(f"another part of the {whose[0]}")
     if said:
         rest.discard(END)
     said += sorted(WORDS[symbol] for symbol in rest if symbol in WORDS)
     said += sorted(f"`{phrase(automaton, symbol)}`" for symbol in rest if symbol not in WORDS)
     return " or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
+
+
+def words(symbols: Iterable[str]) -> set[str]:
+    """The words of the language among `symbols`, also those that are kinds of token."""
+    return {
+        word for symbol in symbols for word in (_QUOTED.findall(WORDS.get(symbol, "")) or [symbol]) if _is_word(word)
+    }
+
+
+def _is_word(text: str) -> bool:
+    return text.replace(" ", "").isalpha()
 
 
 def _is_token(symbol: str) -> bool:

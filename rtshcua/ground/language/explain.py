@@ -7,15 +7,25 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.automaton import Automaton, Failure
-from rtshcua.ground.language.expected import accepted, beginnings, describe, parts, phrase
-from rtshcua.ground.language.recovery import at_line_start, open_braces, pending
+from rtshcua.ground.language.expected import (
+    CONDITION,
+    SHAPE,
+    VALUE,
+    accepted,
+    beginnings,
+    describe,
+    parts,
+    phrase,
+    words,
+)
+from rtshcua.ground.language.recovery import at_line_start, open_braces, owner, pending
 from rtshcua.ground.language.table import END, NAME
 from rtshcua.ground.language.wording import SHOWN, short
 
 #: Characters and words of other notations, and what stands for them here.
 FOREIGN = {
-    "≤": "<=", "≥": ">=", "≠": "!=", "–": "-", "−": "-", "×": "*", "“": '"', "”": '"', "'": '"', "‘": '"', "’": '"',
-    "#": "//", "&": "and", "&&": "and", "|": "or", "||": "or", "!": "not", "…": "..",
+    "≤": "<=", "≥": ">=", "≠": "!=", "–": "-", "−": "-", "×": "*", "÷": "/", "“": '"', "”": '"', "'": '"', "‘": '"',
+    "’": '"', "#": "//", "&": "and", "&&": "and", "|": "or", "||": "or", "!": "not", "…": "..",
 }  # fmt: skip
 
 LISTED = 20  # words that a help lists
@@ -32,11 +42,15 @@ def explain(automaton: Automaton, failure: Failure) -> Diagnostic:
         return _unclosed_block(automaton, span, found)
     shown = f"`{short(found)}`" if found else "the end of the file"
     message = f"found {shown}, expected {describe(automaton, symbols)}"
+    if found == "not" and symbols & CONDITION:
+        return Diagnostic(SYNTAX, message, span, "put it in brackets, as in `(not a > b)`")
     if NAME in symbols and automaton.table.words.get(found) is False:
         return Diagnostic(SYNTAX, f"`{found}` is a reserved word, so it is no name", span, "choose another name")
     if found == "{" and symbols == {"("}:
         insert = Fix(Span(span.file, span.start, span.start), "() ", "write `()`")
-        return Diagnostic(SYNTAX, message, span, "a skill that takes nothing is written with `()`", fixes=(insert,))
+        begun = pending(automaton)
+        what = "template" if begun is not None and begun[0] == "template" else "skill"
+        return Diagnostic(SYNTAX, message, span, f"a {what} that takes nothing is written with `()`", fixes=(insert,))
     meant = _meant(found, symbols)
     if meant is not None:
         fix = Fix(span, meant, f"write `{meant}`")
@@ -48,22 +62,28 @@ def _meant(found: str, symbols: set[str]) -> str | None:
     """The word or mark that the author probably meant."""
     if found in ("=", "==") and symbols & {"=", "<COMPARE>"}:
         return "==" if found == "=" else "="
-    words = {symbol for symbol in symbols if symbol.isalpha()}
-    return nearest(found, words) if found[:1].isalpha() and len(found) <= SHOWN else None
+    known = words(symbols) - {found}
+    return nearest(found, known) if found[:1].isalpha() and len(found) <= SHOWN else None
 
 
 def _help(automaton: Automaton, failure: Failure, symbols: set[str]) -> str | None:
-    if failure.kind == "<COMPARE>":
+    if failure.kind == "<COMPARE>" and not symbols >= VALUE:
         return "comparisons are not chained: write `height in 5 m .. 10 m`, or join two by `and`"
     begin = beginnings(automaton)
     if begin <= symbols:
         return f"declarations begin with {_listed(begin)}"
     items = parts(automaton, symbols)
-    owner = pending(automaton)
-    if len(items) > 3 and owner is not None:
-        return f"parts of a {owner[0]} begin with {_listed({phrase(automaton, item) for item in items})}"
+    whose = owner(automaton)
+    if len(items) > 3 and whose is not None:
+        return f"parts of a {whose[0]} begin with {_listed({phrase(automaton, item) for item in items})}"
+    if "the" in symbols or symbols == {"last"}:
+        return "a look back is written as in `for the last 3 s` or `within the last 3 s`"
     if symbols in ({"N", "S"}, {"E", "W"}):
         return "a place is its latitude and longitude, as in `47.3977 N, 8.5456 E`"
+    if automaton.source.slice(Span(automaton.source.file, failure.start, failure.end)) in words(symbols):
+        return "its parts go in `(` and `)`"
+    if symbols >= SHAPE:
+        return f"shapes are {_listed(words(SHAPE))}"
     return None
 
 
@@ -78,8 +98,8 @@ def _begins_declaration(automaton: Automaton, failure: Failure, word: str) -> bo
 def _unclosed_block(automaton: Automaton, span: Span, found: str) -> Diagnostic:
     at = open_braces(automaton)[-1]
     brace = Span(span.file, automaton.starts[at], automaton.starts[at] + 1)
-    owner = pending(automaton)
-    what = f"{owner[0]} `{short(owner[1].text)}`" if owner is not None and owner[1] is not None else "block"
+    whose = owner(automaton)
+    what = f"{whose[0]} `{short(whose[1].text)}`" if whose is not None and whose[1] is not None else "block"
     where = "the next declaration begins here" if found else "the file ends here"
     return Diagnostic(
         UNCLOSED,

@@ -3,24 +3,23 @@
 from dataclasses import dataclass
 from typing import TypeVar
 
-from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE, TOO_MANY_FINDINGS
+from rtshcua.diagnostics.codes import NOT_TEXT, TOO_MANY_FINDINGS
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
 from rtshcua.ground.language.build.missions import Builder
 from rtshcua.ground.language.explain import explain
-from rtshcua.ground.language.recovery import file_level, pending, resume
+from rtshcua.ground.language.faults import MAX_SIZE, too_large
+from rtshcua.ground.language.recovery import file_level, misread, pending, resume
 from rtshcua.ground.language.table import table
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
-
-MAX_SIZE = 8 << 20  # bytes or characters of one file
 
 T = TypeVar("T", bound=Node)
 
@@ -65,19 +64,13 @@ def _refused(source: Source) -> Diagnostic | None:
     return None
 
 
-def too_large(file: str, size: int) -> Diagnostic:
-    """The finding for a file of `size` bytes or characters, which is not read at all."""
-    limit = MAX_SIZE >> 20
-    help = "split it into several files, and import them"
-    return Diagnostic(TOO_LARGE, f"`{file}` is {-(-size >> 20)} MiB large; at most {limit} MiB are read", None, help)
-
-
 def _run(automaton: Automaton, builder: Builder) -> None:
     offset: int | None = 1 if automaton.source.text.startswith("\ufeff") else 0
     while offset is not None:
         failure = automaton.run(offset)
         if failure is None:
             return
+        failure = misread(automaton, failure)
         builder.note(explain(automaton, failure))
         begun = pending(automaton)
         offset = resume(automaton, failure.start)
@@ -102,4 +95,5 @@ def _unit(source: Source, declarations: list[Node]) -> Unit:
         skills=of(SkillDecl),
         policies=of(PolicyDecl),
         missions=of(MissionDecl),
+        templates=of(TemplateDecl),
     )

@@ -8,7 +8,7 @@ comes to its end.
 import re
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.automaton import Automaton
+from rtshcua.ground.language.automaton import Automaton, Failure
 from rtshcua.ground.language.table import Row
 from rtshcua.model.ir.node import Name
 
@@ -59,6 +59,21 @@ def open_braces(automaton: Automaton) -> list[int]:
     return found
 
 
+def owner(automaton: Automaton) -> tuple[str, Name | None] | None:
+    """What the innermost open block belongs to, and its name: a phase, a step, or else the pending declaration."""
+    values, braces = automaton.values, open_braces(automaton)
+    inner = values[braces[0] + 1 : braces[-1]] if len(braces) > 1 else []
+    while inner:
+        if isinstance(inner[-1], Name):
+            return ("phase" if "phase" in inner[-2:-1] else "step"), inner[-1]
+        if inner[-1] == "repeat":
+            return "repeat", None
+        if inner[-1] == "in":
+            break
+        inner.pop()
+    return pending(automaton)
+
+
 def open_block(automaton: Automaton) -> tuple[int, int] | None:
     """The innermost open block: the place in the states where its next part is read, and how many braces lie deeper."""
     rows, states = automaton.table.rows, automaton.states
@@ -67,6 +82,21 @@ def open_block(automaton: Automaton) -> tuple[int, int] | None:
             if at < len(states) and shifts(rows[states[at]], "}"):
                 return at, depth
     return None
+
+
+def misread(automaton: Automaton, failure: Failure) -> Failure:
+    """Where a block is not closed, the word that begins the next declaration may have been read as the name of a step;
+    then that word is what failed, and the stacks are left as they were before it.
+    """
+    word, at = (automaton.values[-1], automaton.starts[-1]) if automaton.values else ("", 0)
+    begins = isinstance(word, str) and shifts(automaton.table.rows[0], word)
+    named = automaton.source.text[failure.start : failure.start + 1]
+    if begins and (named.isalpha() or named in ("_", '"')) and at_line_start(automaton.source, at):
+        before = automaton.table.rows[automaton.states[-2]]
+        if "}" in before and not shifts(before, word):
+            _unwind(automaton, len(automaton.states) - 1, at)
+            return Failure(at, at + len(word), word)
+    return failure
 
 
 def resume(automaton: Automaton, failed: int) -> int | None:

@@ -9,7 +9,7 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.node import Name, Node
 
-MAX_DEPTH = 64  # of parentheses, `not` and arithmetic; far above what a person writes, far below what Python can walk
+MAX_DEPTH = 64  # of what stands within its like; far above what a person writes, far below what Python can walk
 
 MAX_FINDINGS = 1000  # in one file; a text that has more is not one of ours
 
@@ -93,11 +93,10 @@ class Base:
                 fixes=(Fix(name.span, plain, f"call it `{short(plain)}`"),),
             )
 
-    def nested(self, node: Node, *inner: Node) -> Node:
-        """`node`, counting how deeply expressions are nested; one level too many is reported once, and not built."""
-        depth = 1 + max(self._depths.get(id(part), 0) for part in inner)
+    def nested(self, node: Node, *inner: Node, help: str = "split it into several clauses, joined by `and`") -> Node:
+        """`node`, counting how deeply such are nested; one level too many is reported once, and not built."""
+        depth = 1 + max((self._depths.get(id(part), 0) for part in inner), default=0)
         if depth == MAX_DEPTH + 1:
-            help = "split it into several clauses, joined by `and`"
             self.report(TOO_DEEP, f"this is nested more than {MAX_DEPTH} deep", node.span, help)
         if depth > MAX_DEPTH:
             node = inner[0]

@@ -2,15 +2,20 @@
 
 from typing import Any, Literal
 
+from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.literals import Literals
 from rtshcua.model.ir.expression import (
     Arithmetic,
     Comparison,
     Condition,
+    Edge,
+    ForLast,
+    Function,
     Grow,
     Inside,
     Junction,
+    Near,
     Not,
     OneOf,
     Quantity,
@@ -18,6 +23,7 @@ from rtshcua.model.ir.expression import (
     Reference,
     Value,
     Within,
+    WithinLast,
 )
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.skills import Clause
@@ -38,9 +44,17 @@ class Conditions(Literals):
         """`left + right`, `left - right`."""
         return self.nested(Arithmetic(span=span, operator=operator, left=left, right=right), left, right)
 
-    def product(self, span: Span, left: Value, operator: Literal["*"], right: Value) -> Node:
-        """`left * right`."""
+    def product(self, span: Span, left: Value, operator: Literal["*", "/"], right: Value) -> Node:
+        """`left * right`, `left / right`."""
         return self.nested(Arithmetic(span=span, operator=operator, left=left, right=right), left, right)
+
+    def function(self, span: Span, name: Literal["abs", "min", "max"], *operands: Value) -> Node:
+        """`abs(value)`, `min(value, value, ...)`, `max(value, value, ...)`."""
+        if (len(operands) == 1) != (name == "abs"):
+            takes = "one value" if name == "abs" else "two values or more"
+            help = "write it as in `abs(a - b)`" if name == "abs" else f"write it as in `{name}(a, b)`"
+            self.report(SYNTAX, f"`{name}` takes {takes}, not {len(operands)}", span, help)
+        return self.nested(Function(span=span, name=name, operands=operands), *operands)
 
     def bracket(self, span: Span, value: Node) -> Node:
         """Parentheses leave what is in them as it is, and count as a level."""
@@ -72,9 +86,29 @@ class Conditions(Literals):
         """`subject outside region`."""
         return Inside(span=span, subject=subject, region=region, negated=True)
 
-    def grow(self, span: Span, zone: Reference, margin: Quantity) -> Grow:
+    def grow(self, span: Span, zone: Reference, margin: Value) -> Grow:
         """`grow(zone, margin)`."""
         return Grow(span=span, zone=zone, margin=margin)
+
+    def rising(self, span: Span, operand: Condition) -> Node:
+        """`rising operand`."""
+        return self.nested(Edge(span=span, rising=True, operand=operand), operand)
+
+    def falling(self, span: Span, operand: Condition) -> Node:
+        """`falling operand`."""
+        return self.nested(Edge(span=span, rising=False, operand=operand), operand)
+
+    def for_last(self, span: Span, operand: Condition, window: Quantity) -> Node:
+        """`operand for the last 3 s`."""
+        return self.nested(ForLast(span=span, operand=operand, window=window), operand)
+
+    def within_last(self, span: Span, operand: Condition, window: Quantity) -> Node:
+        """`operand within the last 5 s`."""
+        return self.nested(WithinLast(span=span, operand=operand, window=window), operand)
+
+    def near(self, span: Span, left: Condition, window: Quantity, right: Condition) -> Node:
+        """`left within 5 s of right`."""
+        return self.nested(Near(span=span, left=left, right=right, window=window), left, right)
 
     def negation(self, span: Span, operand: Condition) -> Node:
         """`not operand`."""

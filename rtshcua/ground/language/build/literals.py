@@ -1,11 +1,12 @@
 """Numbers, places, times, texts and names."""
 
-from rtshcua.diagnostics.codes import DATUM_NOT_ALLOWED, NOT_EXACT, OUT_OF_BOUNDS, UNKNOWN_UNIT
+from rtshcua.diagnostics.codes import BAD_PERIOD, DATUM_NOT_ALLOWED, NOT_EXACT, OUT_OF_BOUNDS, UNKNOWN_UNIT
 from rtshcua.diagnostics.diagnostic import Fix
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.build.base import Base
 from rtshcua.ground.language.exact import CANONICAL, Exact, Trouble, exact
+from rtshcua.ground.language.moment import moment
 from rtshcua.ground.language.wording import SHOWN, short
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name
@@ -44,6 +45,10 @@ class Literals(Base):
         self._check(found, number, span)
         return found.value
 
+    def count(self, span: Span, number: str) -> Quantity:
+        """A plain whole number, with its place."""
+        return Quantity(span=span, value=self.integer(span, number), dimension=Dimension.COUNT)
+
     def quantity(self, span: Span, minus: str | None, number: str, unit: str | None, datum: str | None) -> Quantity:
         """A number with its unit, in the canonical unit; a length above something is an altitude."""
         value, dimension, trouble = found = exact(number, unit, minus is not None)
@@ -75,6 +80,15 @@ class Literals(Base):
         if value >= DAY or int(minutes) >= 60:
             self.report(OUT_OF_BOUNDS, f"`{text}` is not a time of day", span, "times go from `00:00` to `23:59`")
         return TimeOfDay(span=span, value=value * UNITS["min"].numerator)
+
+    def moment(self, span: Span, raw: str) -> int:
+        """A moment, `"2026-05-01T08:00Z"`, in us since the epoch."""
+        try:
+            return moment(raw[1:-1])
+        except ValueError as error:
+            help = "write it as in `2026-05-01T08:00Z` or `2026-05-01T10:00:00+02:00`"
+            self.report(BAD_PERIOD, f"`{short(raw[1:-1])}` is not a moment: {error}", span, help)
+            return 0
 
     def _degrees(self, span: Span, number: str, most: int, what: str, negative: bool) -> int:
         found = exact(number, "deg", negative)

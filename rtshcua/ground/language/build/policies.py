@@ -6,8 +6,8 @@ from rtshcua.ground.language.build.base import Part
 from rtshcua.ground.language.build.skills import Skills
 from rtshcua.model.ir.expression import Condition, Quantity
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Airspace, PolicyDecl, Rule
-from rtshcua.model.ir.skills import LinkDecl
+from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, Rule, TemplateDecl, Use
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
 
 Names = tuple[Name, ...]
 
@@ -60,7 +60,22 @@ class Policies(Skills):
         """`contingency hover for 10 s, return_home, emergency_land`."""
         return Part("contingency", span, links)
 
-    def policy(self, span: Span, name: Name, version: int, *given: Rule | Part) -> None:
+    def use(self, span: Span, template: Name, arguments: tuple[ArgumentValue, ...] | None) -> Use:
+        """`use low_flight(bridge_a, top = 30 m)`."""
+        return Use(span=span, template=template, arguments=arguments or ())
+
+    def delegate(
+        self, span: Span, skills: Names, grantor: Name, grantee: Name, through: Names | None, when: Condition | None
+    ) -> Delegation:
+        """`delegate goto by role operator to role trainee through agent when altitude <= 10 m`."""
+        return Delegation(span=span, skills=skills, grantor=grantor, grantee=grantee, through=through or (), when=when)
+
+    def template(self, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *rules: Rule) -> None:
+        """`template low_flight(area: zone, top: altitude) { permit ... }`."""
+        self.undotted(name, "template")
+        self.declare(TemplateDecl(span=span, name=name, parameters=parameters or (), rules=rules), name)
+
+    def policy(self, span: Span, name: Name, version: int, *given: Rule | Use | Delegation | Part) -> None:
         """`policy bridge_inspection version 7 { ... }`."""
         self.undotted(name, "policy")
         found = self.parts("policy", name, [part for part in given if isinstance(part, Part)])
@@ -72,6 +87,8 @@ class Policies(Skills):
                 rules=tuple(rule for rule in given if isinstance(rule, Rule)),
                 airspace=found["airspace"].value if "airspace" in found else None,
                 contingency=found["contingency"].value if "contingency" in found else (),
+                uses=tuple(use for use in given if isinstance(use, Use)),
+                delegations=tuple(each for each in given if isinstance(each, Delegation)),
             ),
             name,
         )

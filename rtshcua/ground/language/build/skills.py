@@ -5,7 +5,7 @@ from typing import Any, Literal, NamedTuple
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
-from rtshcua.ground.language.build.places import Places
+from rtshcua.ground.language.build.vehicles import Vehicles
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name
@@ -20,7 +20,7 @@ class Choice(NamedTuple):
     default: Name | None
 
 
-class Skills(Places):
+class Skills(Vehicles):
     """Capabilities, what they need, and what flies when they end early."""
 
     def parameter(self, span: Span, name: Name, type: Name, range: Range | None, default: Value | None) -> Parameter:

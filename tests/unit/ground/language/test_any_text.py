@@ -12,7 +12,8 @@ from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language import generate
 from rtshcua.ground.language.automaton import Automaton
-from rtshcua.ground.language.parse import MAX_SIZE, parse
+from rtshcua.ground.language.faults import MAX_SIZE
+from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.table import table
 
 CHECKOUT = Path(__file__).resolve().parents[4]
@@ -20,10 +21,25 @@ SHIPPED = [
     path.read_text(encoding="utf-8")
     for folder in ("skills", "policies", "missions")
     for path in sorted((CHECKOUT / folder).glob("*.rts"))
-]
+] + [Path(__file__).with_name("forms.rts").read_text(encoding="utf-8")]
 LARK = generate.lark((CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8"))
 
-TOKENS = sorted({*table().words, *"(){},:=@+-*", "..", "<=", "==", '"t"', "08:00", "a", "a.b", "3", "2.5", "m", "%"})
+LED = [
+    "abs(",
+    "circle(",
+    "falling",
+    "grow(",
+    "local time",
+    "max",
+    "on inadmissible",
+    "one of",
+    "repeat",
+    "rising",
+    "union",
+]
+TOKENS = sorted(
+    {*table().words, *LED, *"(){},:=@+-*/", "..", "<=", "==", '"t"', "08:00", "a", "a.b", "3", "2.5", "m", "%"}
+)
 
 
 class Nothing:

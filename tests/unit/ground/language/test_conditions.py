@@ -44,6 +44,26 @@ def condition(plain: Plain, unit: Read, text: str) -> Any:
                 "negated": True,
             },
         ),
+        (
+            "a inside grow(z, margin)",
+            {
+                "kind": "inside",
+                "subject": "&a",
+                "region": {"kind": "grow", "zone": "&z", "margin": "&margin"},
+                "negated": False,
+            },
+        ),
+        (
+            "abs(a) < max(1, b,)",
+            {
+                "kind": "comparison",
+                "operator": "<",
+                "left": {"kind": "function", "name": "abs", "operands": ["&a"]},
+                "right": {"kind": "function", "name": "max", "operands": [(1, "count"), "&b"]},
+            },
+        ),
+        ("phase == inspection", {"kind": "comparison", "operator": "==", "left": "&phase", "right": "&inspection"}),
+        ("phase in {a, b}", {"kind": "one-of", "subject": "&phase", "names": ["a", "b"]}),
     ],
 )
 def test_condition(plain: Plain, unit: Read, text: str, expected: dict[str, Any]) -> None:
@@ -54,8 +74,12 @@ def shape(found: Any) -> Any:
     """Only how operators nest: comparisons as the name on their left."""
     if found["kind"] == "junction":
         return (found["operator"], *(shape(operand) for operand in found["operands"]))
-    if found["kind"] == "not":
-        return ("not", shape(found["operand"]))
+    if found["kind"] in ("not", "for-last", "within-last"):
+        return (found["kind"], *found.get("window", ())[:1], shape(found["operand"]))
+    if found["kind"] == "edge":
+        return ("rising" if found["rising"] else "falling", shape(found["operand"]))
+    if found["kind"] == "near":
+        return ("near", found["window"][0], shape(found["left"]), shape(found["right"]))
     return found["left"].removeprefix("&")
 
 
@@ -69,6 +93,23 @@ def shape(found: Any) -> Any:
         ("not (a>1 or b>1)", ("not", ("or", "a", "b"))),
         ("not not a>1", ("not", ("not", "a"))),
         ("(a>1 or (b>1 or c>1)) or d>1", ("or", ("or", "a", ("or", "b", "c")), "d")),
+        ("a>1 for the last 1 us", ("for-last", 1, "a")),
+        ("a>1 within the last 2 us", ("within-last", 2, "a")),
+        ("a>1 within 3 us of b>1", ("near", 3, "a", "b")),
+        ("rising a>1", ("rising", "a")),
+        ("rising a>1 within the last 2 us", ("within-last", 2, ("rising", "a"))),
+        ("rising falling rising a>1", ("rising", ("falling", ("rising", "a")))),
+        ("rising(a>1 for the last 1 us)", ("rising", ("for-last", 1, "a"))),
+        ("not a>1 for the last 3 us", ("not", ("for-last", 3, "a"))),
+        ("(not a>1) for the last 3 us", ("for-last", 3, ("not", "a"))),
+        ("not rising a>1", ("not", ("rising", "a"))),
+        ("a>1 or b>1 for the last 3 us", ("or", "a", ("for-last", 3, "b"))),
+        ("(a>1 and b>1) for the last 3 us", ("for-last", 3, ("and", "a", "b"))),
+        ("a>1 or b>1 within 1 us of c>1 and d>1", ("or", "a", ("and", ("near", 1, "b", "c"), "d"))),
+        ("a>1 for the last 1 us within the last 2 us", ("within-last", 2, ("for-last", 1, "a"))),
+        ("a>1 within 1 us of b>1 within 2 us of c>1", ("near", 2, ("near", 1, "a", "b"), "c")),
+        ("a>1 within 1 us of (b>1 within 2 us of c>1)", ("near", 1, "a", ("near", 2, "b", "c"))),
+        ("a>1 within 1 us of rising b>1 for the last 2 us", ("for-last", 2, ("near", 1, "a", ("rising", "b")))),
     ],
 )
 def test_precedence_of_conditions(plain: Plain, unit: Read, text: str, expected: Any) -> None:
@@ -83,12 +124,21 @@ def test_precedence_of_conditions(plain: Plain, unit: Read, text: str, expected:
         ("a - b - c", ("-", ("-", "a", "b"), "c")),
         ("a - (b - c)", ("-", "a", ("-", "b", "c"))),
         ("((a))", "a"),
+        ("a / b / c", ("/", ("/", "a", "b"), "c")),
+        ("a / b * c", ("*", ("/", "a", "b"), "c")),
+        ("a * (b / c)", ("*", "a", ("/", "b", "c"))),
+        ("a/ b - c /d", ("-", ("/", "a", "b"), ("/", "c", "d"))),
+        ("a / // comments divide nothing\n b /* nor here */", ("/", "a", "b")),
+        ("min(a - b, max(c, d) * e) / f", ("/", ("min", ("-", "a", "b"), ("*", ("max", "c", "d"), "e")), "f")),
+        ("abs(abs((a))) + b", ("+", ("abs", ("abs", "a")), "b")),
     ],
 )
 def test_precedence_of_values(plain: Plain, unit: Read, text: str, expected: Any) -> None:
     def nested(found: Any) -> Any:
         if isinstance(found, str):
             return found.removeprefix("&")
+        if found["kind"] == "function":
+            return (found["name"], *map(nested, found["operands"]))
         return (found["operator"], nested(found["left"]), nested(found["right"]))
 
     assert nested(condition(plain, unit, f"x > {text}")["right"]) == expected

@@ -1,4 +1,6 @@
-"""Every declaration of the language, and the IR that it becomes. Spans and conditions have their own tests."""
+"""Every declaration of the language, and the IR that it becomes. Spans, conditions, policies and missions have their
+own tests.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -101,6 +103,23 @@ def test_vehicle(plain: Plain, unit: Read) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("elevation 408 m above sea", {"elevation": (408_000, "altitude", "sea")}),
+        (
+            "elevation 408.5 m above sea within 5 m",
+            {"elevation": (408_500, "altitude", "sea"), "elevation_within": (5_000, "length")},
+        ),
+    ],
+)
+def test_elevation(plain: Plain, unit: Read, text: str, expected: dict[str, Any]) -> None:
+    source = f"""vehicle v {{ identity "a" home 1 N, 2 E within 3 m speed at most 1 m/s climb at most 1 m/s {text}
+      position error 1 m energy 100 % = 1 min hover reserve 1 % }}"""
+    vehicle = plain(unit(source).vehicles[0])
+    assert {name: value for name, value in vehicle.items() if name.startswith("elevation")} == expected
+
+
 def test_parameters(plain: Plain, unit: Read) -> None:
     text = """skill s(
       area: zone, altitude: altitude in 5 m .. 60 m = 20 m, pattern: one of grid, perimeter, orbit = grid,
@@ -172,101 +191,3 @@ def test_skill(plain: Plain, unit: Read) -> None:
         ],
     }
     assert [len(skill[name]) for name in ("require", "assume", "maintain")] == [3, 1, 2]
-
-
-def test_policy(plain: Plain, unit: Read) -> None:
-    text = """policy p version 7 {
-      permit a, b by role operator, pilot through agent, operator when x < 3 m
-      permit any by any
-      forbid c by any through agent
-      confirm a when x < 1 m by role supervisor within 30 s
-      confirm b by role supervisor
-      degrade any when battery < 25 % to hover for 5 s
-      degrade a to land
-      airspace inside city, field outside school
-      contingency hover for 10 s, land
-    }
-    policy q version 1 { airspace outside z }
-    """
-    first, second = plain(unit(text).policies)
-    assert second == {"name": "q", "version": 1, "airspace": {"outside": ["z"]}}
-    less = {"kind": "comparison", "operator": "<", "left": "&x"}
-    assert first == {
-        "name": "p",
-        "version": 7,
-        "rules": [
-            {
-                "kind": "permit",
-                "skills": ["a", "b"],
-                "roles": ["operator", "pilot"],
-                "through": ["agent", "operator"],
-                "when": less | {"right": (3_000, "length")},
-            },
-            {"kind": "permit"},
-            {"kind": "forbid", "skills": ["c"], "through": ["agent"]},
-            {
-                "kind": "confirm",
-                "skills": ["a"],
-                "when": less | {"right": (1_000, "length")},
-                "approver": "supervisor",
-                "within": (30_000_000, "duration"),
-            },
-            {"kind": "confirm", "skills": ["b"], "approver": "supervisor"},
-            {
-                "kind": "degrade",
-                "when": {"kind": "comparison", "operator": "<", "left": "&battery", "right": (2_500, "ratio")},
-                "target": {"skill": "hover", "limit": (5_000_000, "duration")},
-            },
-            {"kind": "degrade", "skills": ["a"], "target": {"skill": "land"}},
-        ],
-        "airspace": {"inside": ["city", "field"], "outside": ["school"]},
-        "contingency": [{"skill": "hover", "limit": (10_000_000, "duration")}, {"skill": "land"}],
-    }
-
-
-def test_mission(plain: Plain, unit: Read) -> None:
-    text = """mission m under p@7 on quad {
-      intent "Look." proposed by agent openclaw for role operator
-      phase a { goto(z.entry, 1 N, 2 E, altitude = 20 m,) on inadmissible skip look() on   inadmissible hold }
-      phase b { land() on inadmissible abort land() }
-      phase c { }
-    }
-    mission n under q@1 on quad { }
-    """
-    first, second = plain(unit(text).missions)
-    assert second == {"name": "n", "policy": "q", "policy_version": 1, "vehicle": "quad"}
-    assert first == {
-        "name": "m",
-        "policy": "p",
-        "policy_version": 7,
-        "vehicle": "quad",
-        "intent": "Look.",
-        "source": "agent",
-        "proposer": "openclaw",
-        "role": "operator",
-        "phases": [
-            {
-                "name": "a",
-                "steps": [
-                    {
-                        "skill": "goto",
-                        "arguments": [
-                            {"value": "&z.entry"},
-                            {"value": (10_000_000, 20_000_000)},
-                            {"name": "altitude", "value": (20_000, "length")},
-                        ],
-                        "on_inadmissible": "skip",
-                    },
-                    {"skill": "look", "on_inadmissible": "hold"},
-                ],
-            },
-            {
-                "name": "b",
-                "steps": [
-                    {"skill": "land", "on_inadmissible": "abort"},
-                    {"skill": "land", "on_inadmissible": "abort"},
-                ],
-            },
-            {"name": "c"},
-        ],
-    }

@@ -1,12 +1,13 @@
-"""The import closure: each file once, every fault a finding."""
+"""The import closure, and the files that zones are read from: each once, every fault a finding."""
 
 from collections.abc import Iterable
 
 import pytest
 
-from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE
+from rtshcua.diagnostics.codes import IMPORT_CYCLE, IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE, Severity
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.load import Program, load
-from rtshcua.ground.language.parse import MAX_SIZE
 
 
 class Files:
@@ -57,11 +58,122 @@ def test_closure_in_the_order_in_which_it_is_reached() -> None:
     assert list(program.stable.values()) == ["a.rts", "b.rts", "sub/c.rts", "lib:d.rts", "sub/e.rts", "lib:f.rts"]
 
 
-def test_a_circle_of_imports_is_harmless() -> None:
+def circles(program: Program) -> list[tuple[str, str]]:
+    """The file of each import that closes a circle, and the circle by the first letters of its files."""
+    found = [each for each in program.diagnostics if each.code is IMPORT_CYCLE]
+    assert all(each.severity is Severity.WARNING for each in found)
+    said = [each.message.removeprefix("this import closes a circle: ").strip("`") for each in found]
+    files = [each.span.file if each.span else "" for each in found]
+    return [
+        (file[3:-4], "".join(name[3:-4] for name in text.split(" -> "))) for file, text in zip(files, said, strict=True)
+    ]
+
+
+def test_files_of_a_circle_of_imports_are_read_once() -> None:
     files = Files(a='import "b.rts"', b='import "c.rts" import "b.rts"', c='import "a.rts"')
     program = files.load("a", "a", "c")
-    assert program.diagnostics == ()
     assert files.reads == ["/w/a.rts", "/w/c.rts", "/w/b.rts"]
+    assert circles(program) == [("c", "abca"), ("b", "bb")]
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({"a": "b", "b": ""}, []),
+        ({"a": "bc", "b": "d", "c": "d", "d": ""}, []),
+        ({"a": "a"}, [("a", "aa")]),
+        ({"a": "b", "b": "a"}, [("b", "aba")]),
+        ({"a": "b", "b": "c", "c": "db", "d": "b"}, [("d", "bcdb"), ("c", "bcb")]),
+        ({"a": "bcd", "b": "a", "c": "a", "d": "d"}, [("b", "aba"), ("c", "aca"), ("d", "dd")]),
+        ({"a": "cb", "b": "c", "c": "b"}, [("b", "cbc")]),
+        ({"a": "b"}, []),
+    ],
+)
+def test_circles_of_imports(files: dict[str, str], expected: list[tuple[str, str]]) -> None:
+    sources = {name: "".join(f'import "{other}.rts"\n' for other in others) for name, others in files.items()}
+    assert circles(Files(**sources).load("a")) == expected
+
+
+def test_a_circle_is_shown_whole() -> None:
+    (found,) = Files(a='import "b.rts"', b='\nimport "a.rts"').load("a").diagnostics
+    assert found.message == "this import closes a circle: `/w/a.rts -> /w/b.rts -> /w/a.rts`"
+    assert (found.span, [label.span for label in found.labels]) == (Span("/w/b.rts", 1, 15), [Span("/w/a.rts", 0, 14)])
+
+
+def test_long_circles_are_found_and_cut_short() -> None:
+    names = [f"f{number}" for number in range(300)]
+    sources = {name: f'import "{after}.rts"' for name, after in zip(names, [*names[1:], "f0"], strict=True)}
+    (found,) = Files(**sources).load("f0").diagnostics
+    shown = found.message.split(" -> ")
+    assert shown[5:8] == ["/w/f5.rts", "(289 more)", "/w/f295.rts"]
+    assert (len(shown), len(found.labels)) == (13, 12)
+
+
+SQUARE = b'{"type": "Polygon", "coordinates": []}'
+
+
+def test_files_that_zones_are_read_from() -> None:
+    files = Files(
+        a='import "sub/b.rts" zone p from "p.geojson" zone q from "sub/../p.geojson" feature "f"',
+        sub__b='zone r from "../p.geojson" zone s from "lib:zones/s.geojson"',
+    )
+    files.files |= {"/w/p.geojson": SQUARE, "/w/lib/zones/s.geojson": b"\xef\xbb\xbfany text"}
+    program = files.load("a")
+    assert program.diagnostics == ()
+    assert program.data == {"/w/p.geojson": SQUARE, "/w/lib/zones/s.geojson": b"\xef\xbb\xbfany text"}
+    assert program.data_names == {
+        ("/w/a.rts", "p.geojson"): "/w/p.geojson",
+        ("/w/a.rts", "sub/../p.geojson"): "/w/p.geojson",
+        ("/w/sub/b.rts", "../p.geojson"): "/w/p.geojson",
+        ("/w/sub/b.rts", "lib:zones/s.geojson"): "/w/lib/zones/s.geojson",
+    }
+    assert program.stable == {
+        "/w/a.rts": "a.rts",
+        "/w/sub/b.rts": "sub/b.rts",
+        "/w/p.geojson": "p.geojson",
+        "/w/lib/zones/s.geojson": "lib:zones/s.geojson",
+    }
+    assert list(program.sources) == ["/w/a.rts", "/w/sub/b.rts"]
+    assert files.reads.count("/w/p.geojson") == 1
+
+
+def test_a_file_of_a_zone_that_is_missing() -> None:
+    files = Files(a='zone z from "brigde.geojson" feature "x \\"y\\"" zone y from "brigde.geojson"')
+    files.files["/w/bridge.geojson"] = SQUARE
+    program = files.load("a")
+    (found,) = program.diagnostics
+    assert found.code is NO_SUCH_FILE
+    assert found.message == "cannot read `brigde.geojson`: there is no such file"
+    assert found.help == "looked for it at `/w/brigde.geojson`; did you mean `bridge.geojson`?"
+    assert found.fixes[0].replacement == 'from "bridge.geojson" feature "x \\"y\\""'
+    assert found.span is not None
+    assert program.sources["/w/a.rts"].slice(found.span) == 'from "brigde.geojson" feature "x \\"y\\""'
+    assert (program.data, program.data_names) == ({}, {})
+    assert [zone.name.text for zone in program.units[0].zones] == ["z", "y"]
+    (found,) = Files(a='zone z from "bridge.geojson"').load("a").diagnostics
+    assert found.fixes == ()
+
+
+@pytest.mark.parametrize("path", ["", "/etc/passwd", "C:x.geojson", "a\\\\b.geojson", "~/x", "http://x/y.geojson"])
+def test_paths_of_zones_that_mean_nothing_elsewhere(path: str) -> None:
+    files = Files(a=f'zone z from "{path}"')
+    (found,) = files.load("a").diagnostics
+    assert found.code is IMPORT_PATH
+    assert found.help == "write it with `/`, as in `bridge.geojson` or `lib:bridge.geojson`"
+    assert files.reads == ["/w/a.rts"]
+
+
+def test_files_of_zones_that_are_no_text_or_huge() -> None:
+    files = Files(a='zone y from "y.geojson"\nzone z from "z.geojson" zone l from "lib:l"')
+    files.files |= {"/w/y.geojson": b"{\xff}", "/w/z.geojson": b" " * (MAX_SIZE + 1)}
+    program = files.load("a", library=None)
+    assert [(found.code, found.span) for found in program.diagnostics] == [
+        (NOT_TEXT, Span("/w/a.rts", 7, 23)),
+        (TOO_LARGE, Span("/w/a.rts", 31, 47)),
+        (IMPORT_PATH, Span("/w/a.rts", 55, 67)),
+    ]
+    assert program.diagnostics[0].message == "byte 1 (0xff) of `/w/y.geojson` is not UTF-8, so the file is not text"
+    assert (program.data, program.data_names) == ({}, {})
 
 
 def test_stable_names_do_not_depend_on_the_machine() -> None:
@@ -142,4 +254,4 @@ def test_byte_order_mark_and_line_ends() -> None:
 
 
 def test_nothing_asked_for() -> None:
-    assert load([], Files().read) == Program((), {}, (), frozenset(), {})
+    assert load([], Files().read) == Program((), {}, (), frozenset(), {}, {}, {})

@@ -1,5 +1,7 @@
 """All errors of a text are reported, each once, and what is good is kept."""
 
+import pytest
+
 from rtshcua.diagnostics.codes import NOT_WRITTEN, SYNTAX, TOO_DEEP, UNCLOSED, UNKNOWN_UNIT, WRITTEN_TWICE
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.build.base import MAX_DEPTH, MAX_FINDINGS
@@ -19,6 +21,7 @@ def codes(parsed: Parsed) -> list[str]:
 def kept(parsed: Parsed) -> set[str]:
     unit = parsed.unit
     found = (*unit.zones, *unit.skills, *unit.policies, *unit.missions, *unit.signals, *unit.enums, *unit.vehicles)
+    found = (*found, *unit.templates)
     return {node.name.text for node in found}
 
 
@@ -78,6 +81,38 @@ def test_a_block_that_is_not_closed() -> None:
     assert first.labels[0].text == "the next declaration begins here"
 
 
+def test_a_block_that_is_not_closed_among_steps() -> None:
+    """The next declaration's first word may be a step's name there."""
+    for block in ("", "repeat 2 {", "repeat 2 { repeat 3 {", "x() {"):
+        parsed = run(f"mission bad under p@1 on v {{ phase a {{ x() {block}\n" + GOOD.format(1))
+        assert codes(parsed) == [UNCLOSED.slug], block
+        assert kept(parsed) == {"good1"}
+    parsed = run('mission bad under p@1 on v { phase a {\nimport "x.rts"\n' + GOOD.format(1))
+    assert codes(parsed) == [UNCLOSED.slug]
+    assert [each.path for each in parsed.unit.imports] == ["x.rts"]
+    parsed = run("mission good under p@1 on v { phase a {\nzone()\nmission(1)\nimport(a)\n} }\n")
+    assert codes(parsed) == []
+
+
+def test_goes_on_within_the_blocks_of_a_mission_and_a_template() -> None:
+    parsed = run(
+        "mission bad under p@1 on v {\n"
+        "  phase a { repeat 2 { x() {\n deadlin 2 s\n grace 1 parsec\n require a >\n record b c\n } } }\n"
+        "  phase b { repeat x { } }\n"
+        "  steps at most few\n"
+        "  phase c { repeat 2 { x(] } }\n"
+        "}\n"
+        + GOOD.format(1)
+        + "template bad2(a: zone) {\n  permit x\n  airspace inside z\n  permit x by any\n  forbid y by\n}\n"
+        + "template good2() { forbid x by any }\n"
+        + "policy bad3 version 1 {\n  use x\n  delegate x by y\n  permit any by any\n}\n"
+        + GOOD.format(3)
+    )
+    assert codes(parsed) == [SYNTAX.slug, UNKNOWN_UNIT.slug, *[SYNTAX.slug] * 8]
+    assert kept(parsed) == {"good1", "good2", "good3"}
+    assert parsed.broken == {"bad", "bad2", "bad3"}
+
+
 def test_parts_are_written_once_and_not_left_out() -> None:
     parsed = run('vehicle v { identity "a" identity "b" }\nvehicle w { identity "c" }\n' + GOOD.format(1))
     assert codes(parsed) == [WRITTEN_TWICE.slug, NOT_WRITTEN.slug]
@@ -95,6 +130,40 @@ def test_nesting_has_a_limit_and_is_reported_once() -> None:
     assert codes(run(f"skill s() {{ require {'not ' * deep} a > 1 }}")) == [TOO_DEEP.slug]
     assert codes(run(f"skill s() {{ require a > {'a + ' * deep} 1 }}")) == [TOO_DEEP.slug]
     assert codes(run(f"skill s() {{ require {' and '.join(['a > 1'] * deep)} }}")) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "before", "after"),
+    [
+        ("skill s() { require §a > 1§ }", "", " for the last 1 s"),
+        ("skill s() { require §a > 1§ }", "", " within the last 1 s"),
+        ("skill s() { require §a > 1§ }", "", " within 1 s of b > 1"),
+        ("skill s() { require §a > 1§ }", "rising ", ""),
+        ("skill s() { require §a > 1§ }", "(falling ", ")"),
+        ("skill s() { require §a > 1§ }", "not (", ")"),
+        ("skill s() { require a inside grow(z, §b§) }", "abs(", ")"),
+        ("skill s() { require a > §b§ }", "min(1, ", ", 2)"),
+        ("skill s() { require a > §b§ }", "", " / 2"),
+        ("zone z = union(§a§)", "union(b, ", ")"),
+        ("zone z = union(§a§)", "difference(", ", b)"),
+        ("mission m under p@1 on v { phase a { §§ } }", "repeat 2 { ", " }"),
+        ("mission m under p@1 on v { phase a { §x()§ } }", "repeat 2 { x() ", " x() }"),
+    ],
+)
+def test_every_kind_of_nesting_has_the_limit(text: str, before: str, after: str) -> None:
+    start, middle, end = text.split("§")
+
+    def nested(levels: int) -> str:
+        return f"{start}{before * levels}{middle}{after * levels}{end}"
+
+    def runs(levels: int) -> bool:
+        found = codes(run(nested(levels)))
+        assert found in ([], [TOO_DEEP.slug])
+        return not found
+
+    assert runs(MAX_DEPTH // 2 - 1)
+    assert not runs(MAX_DEPTH + 1)
+    assert not runs(MAX_DEPTH * 100)
 
 
 def test_a_text_with_very_many_errors_ends_early() -> None:

@@ -28,7 +28,7 @@ def references(node: Node) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize(("name", "steps"), [("short", 3), ("standard", 6), ("extended", 12)])
+@pytest.mark.parametrize(("name", "steps"), [("short", 3), ("standard", 6), ("extended", 12), ("one_bridge", 4)])
 def test_missions(checkout: Path, name: str, steps: int) -> None:
     found = program(checkout, f"missions/{name}.rts")
     (mission,) = [mission for unit in found.units for mission in unit.missions]

@@ -16,6 +16,8 @@ enum § = § { § = 1, b = 2 }
 signal § : § = §.§, §.§ or B.§ unknown at §, 3 stale after 5 s
 signal a.§ : § = A.§ stale after 5 s
 zone § = circle(1 N, 2 E, 3 m) floor 1 m
+zone § = union(§, difference(§, circle(1 N, 2 E, 3 m), §))
+zone § from "x" feature "y" active 08:00 .. 09:00
 vehicle § {
   identity "x" home 1 N, 2 E within 50 m speed at most 12 m/s climb at most 3 m/s
   position error 3 m energy 100 % = 18 min hover reserve 15 %
@@ -24,11 +26,18 @@ skill §(§: §, b: one of §, c, § = §, d: speed in § .. § = §, e: one of 
   motion fly to § at § speed §
   class §
   valid for 1 s during §, §
-  require § > § + § and not § == § or § in § .. § and § in {§, §} or § inside § or § outside grow(§, 3 m)
+  require § > § + § and not § == § or § in § .. § and § in {§, §} or § inside § or § outside grow(§, §)
+  assume rising § > § for the last 3 s within the last 3 s or not falling § inside § within 3 s of § == §
+    and max(§, § / §) < abs(§ - §) * §
   fallback §(§, § = §) for 2 s, §
   record §, §
 }
+template §(§: §, §: role = §) {
+  permit § by role § through § when § > §
+}
 policy § version 1 {
+  use §(§, § = §)
+  delegate § by role § to role § through § when § > §
   permit §, § by role §, § through §, § when § > §
   forbid any by any through §
   confirm § by role § within 3 s
@@ -36,14 +45,20 @@ policy § version 1 {
   airspace inside §, § outside §, §
   contingency §, §
 }
-mission § under §@1 on § {
+mission §(§: zone = §, §: § in § .. § = §) under §@1 on § {
   proposed by § § for role §
+  lasts at most 2 min energy at most 3 % steps at most 4
+  phase § { repeat 3 { §() } §() { deadline 2 s valid for 3 s during § require § > § record § } §() repeat 1 { } }
   phase § { §() §(§, § = §) on inadmissible skip §() on inadmissible hold }
 }
 """
 
 
-@pytest.mark.parametrize("word", SOFT)
+#: what is a word only with what follows it
+LED = ["abs", "circle", "corridor", "difference", "falling", "grow", "max", "min", "polygon", "rising", "union"]
+
+
+@pytest.mark.parametrize("word", [*SOFT, *LED, "repeat", "one", "local"])
 def test_soft(word: str) -> None:
     assert parse(Source("x", EVERYWHERE.replace("§", word))).diagnostics == ()
 
@@ -55,8 +70,31 @@ def test_reserved(word: str) -> None:
     assert found.message == f"`{word}` is a reserved word, so it is no name"
 
 
-def test_two_words_that_stand_before_a_name_of_their_own() -> None:
-    text = "mission m under p@1 on v { phase a { on() on() on inadmissible skip on() grow(grow) } }"
+@pytest.mark.parametrize("word", [*LED, "repeat", "on"])
+def test_words_that_stand_before_a_name_of_their_own(word: str) -> None:
+    text = f"mission m under p@1 on v {{ phase a {{ {word}() {word} () on inadmissible skip {word}({word}) }} }}"
     parsed = parse(Source("x", text))
     assert parsed.diagnostics == ()
-    assert [step.skill.text for step in parsed.unit.missions[0].phases[0].steps] == ["on", "on", "on", "grow"]
+    assert [step.skill.text for step in parsed.unit.missions[0].phases[0].steps] == [word] * 3
+
+
+@pytest.mark.parametrize("word", ["rising", "falling"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "§ < 3",
+        "§<3",
+        "§ in {a}",
+        "§ in 1 .. 2",
+        "§ inside z",
+        "§\toutside z",
+        "§ - 3 > a",
+        "§ * 2 > a",
+        "(§) > a",
+        "a > §",
+    ],
+)
+def test_a_signal_may_be_called_as_an_edge_is(word: str, text: str) -> None:
+    parsed = parse(Source("x", f"skill s() {{ require {text.replace('§', word)} }}"))
+    assert parsed.diagnostics == ()
+    assert parsed.unit.skills[0].require[0].condition.kind != "edge"

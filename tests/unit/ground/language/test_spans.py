@@ -5,13 +5,31 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.diagnostics.span import Source
+from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.parse import parse
-from rtshcua.model.ir.expression import Arithmetic, Coordinates, Grow, Quantity, Range, Reference, TimeOfDay
+from rtshcua.model.ir.expression import (
+    Arithmetic,
+    Coordinates,
+    Function,
+    Grow,
+    Quantity,
+    Range,
+    Reference,
+    TimeOfDay,
+)
+from rtshcua.model.ir.missions import Overrides, Repeat, Step
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import Circle, Combination, Corridor, Daily, Dates, GeoJson, Polygon
+from rtshcua.model.ir.policies import Delegation, Rule, Use
 
 SHIPPED = sorted(path for folder in ("skills", "policies", "missions") for path in
                  (Path(__file__).resolve().parents[4] / folder).glob("*.rts"))  # fmt: skip
+
+FORMS = Path(__file__).with_name("forms.rts")
+
+CONDITIONS = {
+    "comparison", "within", "one-of", "inside", "not", "for-last", "within-last", "near", "edge",
+}  # fmt: skip
 
 #: rarely used corners, with tabs, comments and line ends in the middle
 CORNERS = """\ufeff// first\r
@@ -31,11 +49,18 @@ mission m under p@1 on v { proposed by agent o for role r phase q{ c( d ) on
 def nodes(node: Node) -> Iterator[tuple[Node, Node]]:
     """Every node with its parent."""
     for field in type(node).model_fields:
-        value = getattr(node, field)
-        for child in value if isinstance(value, tuple) else (value,):
-            if isinstance(child, Node):
-                yield child, node
-                yield from nodes(child)
+        for child in within(getattr(node, field)):
+            yield child, node
+            yield from nodes(child)
+
+
+def within(value: object) -> Iterator[Node]:
+    """The nodes of a field: itself, those of a tuple, those of tuples in it."""
+    if isinstance(value, Node):
+        yield value
+    elif isinstance(value, tuple) and not isinstance(value, Span):
+        for part in value:
+            yield from within(part)
 
 
 def read(path: Path) -> str:
@@ -68,7 +93,7 @@ def without_spans(value: object) -> object:
     return value
 
 
-@pytest.mark.parametrize("text", [pytest.param(read(path), id=path.stem) for path in SHIPPED] + [CORNERS])
+@pytest.mark.parametrize("text", [pytest.param(read(path), id=path.stem) for path in (*SHIPPED, FORMS)] + [CORNERS])
 def test_spans(text: str) -> None:
     source = Source("x.rts", text)
     parsed = parse(source)
@@ -84,15 +109,32 @@ def test_spans(text: str) -> None:
             assert written == ("one of" if node.text == "choice" else node.text)
         elif isinstance(node, Reference):
             assert " ".join(written.split()) == node.name
-        elif isinstance(node, TimeOfDay | Coordinates | Arithmetic) or (
+        elif isinstance(node, TimeOfDay | Coordinates | Arithmetic | Function) or (
             isinstance(node, Quantity) and "utc" not in written
         ):
             assert same(reparsed(written), node)
         elif isinstance(node, Grow | Range):
             found = reparsed(f"a inside {written}" if isinstance(node, Grow) else f"a in {written}")
             assert same(getattr(found, "region" if isinstance(node, Grow) else "range"), node)
-        elif getattr(node, "kind", None) in ("comparison", "within", "one-of", "inside", "not"):
+        elif getattr(node, "kind", None) in CONDITIONS:
             assert same(reparsed(written), node)
+        elif isinstance(node, Circle | Polygon | Corridor | Combination | GeoJson):
+            mark = "" if isinstance(node, GeoJson) else "="
+            assert same(parse(Source("again", f"zone z {mark} {written}")).unit.zones[0].shape, node)
+        elif isinstance(node, Daily | Dates):
+            zone = parse(Source("again", f"zone z = circle(1 N, 2 E, 3 m) {written}")).unit.zones[0]
+            assert same(zone.daily if isinstance(node, Daily) else zone.dates, node)
+        elif isinstance(node, Step | Repeat):
+            mission = parse(Source("again", f"mission m under p@1 on v {{ phase a {{ {written} }} }}")).unit.missions[0]
+            assert same(mission.phases[0].items[0], node)
+        elif isinstance(node, Overrides):
+            mission = parse(
+                Source("again", f"mission m under p@1 on v {{ phase a {{ x() {written} }} }}")
+            ).unit.missions[0]
+            assert same(mission.phases[0].items[0].overrides, node)
+        elif isinstance(node, Rule | Use | Delegation):
+            policy = parse(Source("again", f"policy p version 1 {{ {written} }}")).unit.policies[0]
+            assert same((*policy.rules, *policy.uses, *policy.delegations)[0], node)
     assert count > 5
 
 

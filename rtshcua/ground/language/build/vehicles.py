@@ -1,13 +1,13 @@
-"""Zones and vehicles."""
+"""Vehicles."""
 
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
-from rtshcua.ground.language.build.signals import Signals
+from rtshcua.ground.language.build.zones import Zones
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.places import Circle, Polygon, VehicleDecl, ZoneDecl
+from rtshcua.model.ir.places import VehicleDecl
 from rtshcua.model.quantity import UNITS, Dimension
 
 FULL = 100 * UNITS["%"].numerator
@@ -15,35 +15,8 @@ FULL = 100 * UNITS["%"].numerator
 VEHICLE_PARTS = ("identity", "home", "speed", "climb", "position error", "energy", "reserve")
 
 
-class Places(Signals):
-    """Where things are, and what flies."""
-
-    def circle(self, span: Span, center: Coordinates, radius: Quantity) -> Circle:
-        """`circle(47.3977 N, 8.5456 E, 120 m)`."""
-        return Circle(span=span, center=center, radius=radius)
-
-    def polygon(self, span: Span, *corners: Coordinates) -> Polygon:
-        """`polygon(47.3 N, 8.5 E, ...)`."""
-        return Polygon(span=span, corners=corners)
-
-    def floor(self, span: Span, altitude: Quantity) -> Part:
-        """`floor 0 m`."""
-        return Part("floor", span, altitude)
-
-    def ceiling(self, span: Span, altitude: Quantity) -> Part:
-        """`ceiling 60 m above home`."""
-        return Part("ceiling", span, altitude)
-
-    def entry(self, span: Span, place: Coordinates) -> Part:
-        """`entry 47.3982 N, 8.5466 E`."""
-        return Part("entry", span, place)
-
-    def zone(self, span: Span, name: Name, shape: Circle | Polygon, *given: Part) -> None:
-        """`zone bridge_a = polygon(...) floor 0 m ceiling 60 m entry ...`."""
-        self.undotted(name, "zone")
-        found = self.parts("zone", name, given)
-        floor, ceiling, entry = (found[key].value if key in found else None for key in ("floor", "ceiling", "entry"))
-        self.declare(ZoneDecl(span=span, name=name, shape=shape, floor=floor, ceiling=ceiling, entry=entry), name)
+class Vehicles(Zones):
+    """What flies."""
 
     def identity(self, span: Span, text: str) -> Part:
         """`identity "quad-07"`."""
@@ -86,6 +59,10 @@ class Places(Signals):
         value = -offset.value if sign == "-" else offset.value
         return Part("clock", span, Quantity(span=span, value=value, dimension=Dimension.DURATION))
 
+    def elevation(self, span: Span, altitude: Quantity, within: Quantity | None) -> Part:
+        """`elevation 408 m above sea within 5 m`."""
+        return Part("elevation", span, (altitude, within))
+
     def vehicle(self, span: Span, name: Name, *given: Part) -> None:
         """`vehicle quad { ... }`."""
         self.undotted(name, "vehicle")
@@ -97,6 +74,7 @@ class Places(Signals):
 
     def _finish_vehicle(self, span: Span, name: Name, found: dict[str, Part]) -> None:
         home, within = found["home"].value
+        elevation, elevation_within = found["elevation"].value if "elevation" in found else (None, None)
         self.declare(
             VehicleDecl(
                 span=span,
@@ -110,6 +88,8 @@ class Places(Signals):
                 endurance=found["energy"].value,
                 reserve=found["reserve"].value,
                 utc_offset=found["clock"].value if "clock" in found else None,
+                elevation=elevation,
+                elevation_within=elevation_within,
             ),
             name,
         )

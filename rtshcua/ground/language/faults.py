@@ -1,0 +1,83 @@
+"""The findings about files that are asked for and cannot be had as they must be."""
+
+import posixpath
+
+from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE
+from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.language.paths import LIBRARY
+from rtshcua.model.ir.places import GeoJson
+from rtshcua.model.ir.program import Import
+
+Wanted = Import | GeoJson  # what names a file: its `path` as written, and the `span` of all that it is written with
+
+MAX_SIZE = 8 << 20  # bytes or characters of one file
+
+
+def not_portable(by: Wanted) -> Diagnostic:
+    """A path that means nothing on another machine, or in a library that is not there."""
+    if by.path.startswith(LIBRARY):
+        message = f"`{by.path}` is in the library, and there is none here"
+        return Diagnostic(IMPORT_PATH, message, by.span)
+    what, example = ("importing file", "../skills/goto.rts") if isinstance(by, Import) else ("source", "bridge.geojson")
+    library = f"{LIBRARY}{example.removeprefix('../')}"
+    return Diagnostic(
+        IMPORT_PATH,
+        f"`{by.path}` is not a path relative to the {what}",
+        by.span,
+        f"write it with `/`, as in `{example}` or `{library}`",
+    )
+
+
+def unreadable(name: str, by: Wanted | None, error: OSError | ValueError, near: str | None) -> Diagnostic:
+    """A file that cannot be read; `near` is the name beside it that was probably meant."""
+    written = name if by is None else by.path
+    strerror = error.strerror if isinstance(error, OSError) else str(error)
+    why = "there is no such file" if is_missing(error) else (strerror or "it is unreadable").lower()
+    looked = None if written == name else f"looked for it at `{name}`"
+    fixes: tuple[Fix, ...] = ()
+    help = looked
+    if near is not None:
+        meant = posixpath.join(posixpath.dirname(written), near)
+        help = f"did you mean `{meant}`?" if looked is None else f"{looked}; did you mean `{meant}`?"
+        fixes = () if by is None else (_fix(by, meant),)
+    span = None if by is None else by.span
+    return Diagnostic(NO_SUCH_FILE, f"cannot read `{written}`: {why}", span, help, fixes=fixes)
+
+
+def is_missing(error: OSError | ValueError) -> bool:
+    """Whether there is no such file, rather than one that cannot be read."""
+    return isinstance(error, FileNotFoundError | NotADirectoryError)
+
+
+def too_large(file: str, size: int, by: GeoJson | None = None) -> Diagnostic:
+    """A file of `size` bytes or characters, which is not looked at."""
+    limit = MAX_SIZE >> 20
+    message = f"`{file}` is {-(-size >> 20)} MiB large; at most {limit} MiB are read"
+    if by is None:
+        return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
+    return Diagnostic(TOO_LARGE, message, by.span, "keep only the areas that are needed in it")
+
+
+def not_text(source: Source, data: bytes, start: int) -> Diagnostic:
+    """A source that is no UTF-8 from byte `start` on; `source` has what could be made of it."""
+    at = len(data[:start].decode("utf-8", errors="replace"))
+    return Diagnostic(
+        NOT_TEXT,
+        f"byte {start} (0x{data[start]:02x}) is not UTF-8, so the file is not text",
+        Span(source.file, at, at + 1),
+        "save it as UTF-8; if it is a compiled bundle, `rtshcua show` prints it",
+    )
+
+
+def data_not_text(name: str, by: GeoJson, data: bytes, start: int) -> Diagnostic:
+    """A GeoJSON file that is no UTF-8 from byte `start` on."""
+    message = f"byte {start} (0x{data[start]:02x}) of `{name}` is not UTF-8, so the file is not text"
+    return Diagnostic(NOT_TEXT, message, by.span, "save it as UTF-8")
+
+
+def _fix(by: Wanted, meant: str) -> Fix:
+    if isinstance(by, Import):
+        return Fix(by.span, f'import "{meant}"', f"import `{meant}`")
+    feature = "" if by.feature is None else by.feature.replace("\\", "\\\\").replace('"', '\\"')
+    return Fix(by.span, f'from "{meant}"' + (f' feature "{feature}"' if feature else ""), f"read `{meant}`")

@@ -5,10 +5,13 @@ from enum import Enum
 
 
 class Severity(Enum):
-    """`ERROR` forbids compiling; `WARNING` is a best-effort finding."""
+    """`ERROR` forbids compiling; `WARNING` is a best-effort finding; `NOTE` says that a check could not decide, and
+    stays a note when warnings are denied.
+    """
 
     ERROR = "error"
     WARNING = "warning"
+    NOTE = "note"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,9 @@ NOT_WRITTEN = _code("E0107", "not-written", "a declaration lacks a part that it 
 NO_SUCH_FILE = _code("E0108", "no-such-file", "a file that is asked for or imported cannot be read")
 IMPORT_PATH = _code("E0109", "import-path", "an import names its file in a way that means nothing elsewhere")
 TOO_MANY_FINDINGS = _code("E0110", "too-many-findings", "a file has more errors than are reported at once")
+IMPORT_CYCLE = _code("E0111", "import-cycle", "files import each other in a circle", Severity.WARNING)
+NOT_GEOJSON = _code("E0112", "not-geojson", "a file that a zone is read from is not GeoJSON")
+GEOJSON_SHAPE = _code("E0113", "geojson-shape", "a GeoJSON file does not hold the one area that is asked for")
 
 # E02: names
 UNKNOWN_NAME = _code("E0201", "unknown-name", "a name is used that nothing declares")
@@ -68,6 +74,10 @@ EMPTY_RANGE = _code("E0316", "empty-range", "a range's first end is above its se
 BAD_SUBJECT = _code("E0317", "bad-subject", "something is asked to be inside a zone that cannot be")
 NOT_CONSTANT = _code("E0318", "not-constant", "a value is not known before the flight where it must be")
 NOT_POSITIVE = _code("E0319", "not-positive", "a quantity is zero or negative where it must be above zero")
+TIMED_ARGUMENT = _code("E0320", "timed-argument", "what is observed over time reads an argument, or the phase")
+WINDOW_LENGTH = _code("E0321", "window-length", "a temporal window is longer than what is kept on board")
+BAD_DIVISION = _code("E0322", "bad-division", "a value is divided by zero, or by what is not known at compile time")
+PHASE_NAME = _code("E0323", "phase-name", "the mission's phase is compared with something that names no phase")
 
 # E04: signals and the dialect
 UNKNOWN_MESSAGE = _code("E0401", "unknown-message", "the dialect has no such message")
@@ -91,10 +101,19 @@ BAD_COORDINATES = _code("E0502", "bad-coordinates", "coordinates are not on the 
 FLOOR_ABOVE_CEILING = _code("E0503", "floor-above-ceiling", "a zone's floor is not below its ceiling")
 ENTRY_OUTSIDE = _code("E0504", "entry-outside", "a zone's entry does not lie inside of it")
 ZONE_VANISHES = _code("E0505", "zone-vanishes", "a zone is so narrow that nothing is left of it when it shrinks")
-ZONE_SHAPE = _code("E0506", "zone-shape", "a grown or shrunk zone has holes or parts, and cannot be flown by")
+ZONE_SHAPE = _code("E0506", "zone-shape", "the outline of a zone cannot be had in whole millimetres, or not within reach")
 TOO_FAR = _code("E0507", "too-far", "a place is further from the vehicle's home than the local plane reaches")
 PATH_OUTSIDE = _code("E0508", "path-outside", "the planned path leaves the policy's airspace")
 AREA_TOO_SMALL = _code("E0509", "area-too-small", "an area is too small to be covered by a survey path")
+ZONE_CYCLE = _code("E0510", "zone-cycle", "a zone is made of itself")
+NO_ELEVATION = _code("E0511", "no-elevation", "an altitude above sea is used, and the vehicle's elevation is not known")
+EMPTY_ZONE = _code("E0512", "empty-zone", "nothing is left of a zone")
+BAD_PERIOD = _code("E0513", "bad-period", "the times between which a zone is active are none")
+RETURN_OUTSIDE = _code("E0514", "return-outside", "the way home from a step leaves the policy's airspace")
+LOITER_OUTSIDE = _code(
+    "E0515", "loiter-outside", "where a link of a step's chain flies or waits is outside of the airspace"
+)
+BAD_CORRIDOR = _code("E0516", "bad-corridor", "the places and the width do not make a corridor")
 
 # E06: skills, arguments, fallback chains
 UNKNOWN_ARGUMENT = _code("E0601", "unknown-argument", "an argument has the name of no parameter")
@@ -113,6 +132,14 @@ CHAIN_CYCLE = _code("E0613", "chain-cycle", "a skill is a link of its own fallba
 BEYOND_VEHICLE = _code("E0614", "beyond-vehicle", "a step asks for more than the vehicle can do")
 COVERING_LINK = _code("E0615", "covering-link", "a link of a chain would fly a survey")
 NEVER_HOLDS = _code("E0616", "never-holds", "a clause of a step's contract cannot hold with these arguments")
+NOT_TIGHTER = _code("E0617", "not-tighter", "a step's override is looser than its skill's contract")
+INFEASIBLE_LAST_LINK = _code(
+    "E0618", "infeasible-last-link", "the last link of a chain cannot do its work in the state in which it is needed"
+)
+NOT_CHAINED = _code("E0619", "not-chained", "a step needs what no step before it brings about")
+SHORT_OF_ENERGY = _code("E0620", "short-of-energy", "the mission may reach a step without the energy that it needs")
+NOT_LANDED = _code("E0621", "not-landed", "a mission ends in the air", Severity.WARNING)
+NOT_OBSERVED = _code("E0622", "not-observed", "a step's override reads what its policy does not")
 
 # E07: policies and authority
 POLICY_VERSION = _code("E0701", "policy-version", "a mission names another version of its policy than is declared")
@@ -129,6 +156,24 @@ UNKNOWN_SOURCE = _code("E0709", "unknown-source", "there is no such source of de
 RULE_ARGUMENT = _code("E0710", "rule-argument", "a rule reads an argument that not all of its skills have")
 NO_PROPOSER = _code("E0711", "no-proposer", "a mission does not say who proposes it for which role")
 EMPTY_MISSION = _code("E0712", "empty-mission", "a mission has no step")
+DELEGATION_CYCLE = _code("E0713", "delegation-cycle", "a role delegates to itself, or roles do in a circle")
+NOTHING_DELEGATED = _code("E0714", "nothing-delegated", "a role delegates what it is not permitted itself")
+EMPTY_DELEGATION = _code(
+    "E0715", "empty-delegation", "a delegation's condition can never hold together with what it delegates"
+)
+VERSION_NOT_RAISED = _code("E0716", "version-not-raised", "a policy differs from an earlier one of the same version")
+NO_RESOLVER = _code("E0717", "no-resolver", "a step may be deferred, and nothing can resolve that in time")
+NOT_ALWAYS_PERMITTED = _code(
+    "E0718", "not-always-permitted", "a step may come at a time at which it is not permitted", Severity.WARNING
+)
+DEAD_RULE = _code("E0720", "dead-rule", "a rule can never match", Severity.WARNING)
+SHADOWED_RULE = _code(
+    "E0721", "shadowed-rule", "a rule never decides, for another always outweighs it", Severity.WARNING
+)
+REDUNDANT_RULE = _code("E0722", "redundant-rule", "a rule says nothing that others do not say", Severity.WARNING)
+CONFLICTING_RULES = _code(
+    "E0723", "conflicting-rules", "two rules of the same weight ask for different things at once", Severity.WARNING
+)
 
 # E08: timing
 VALIDITY_TOO_SHORT = _code("E0801", "validity-too-short", "a step may come later than its validity lasts")
@@ -136,6 +181,14 @@ UNKNOWN_PHASE = _code("E0802", "unknown-phase", "a skill is valid only in phases
 STEP_OUTSIDE_PHASES = _code("E0803", "step-outside-phases", "a step stands in a phase in which its skill is not valid")
 PLAN_TOO_LONG = _code("E0804", "plan-too-long", "a planned path takes longer than its skill lasts at most")
 ENDLESS_STEP = _code("E0805", "endless-step", "a step of a mission neither ends by itself nor has a longest duration")
+INCOHERENT_TIMING = _code("E0806", "incoherent-timing", "the times of a contract contradict each other")
+CLASS_TIMING = _code("E0807", "class-timing", "a contract's times do not fit its timing class")
+SLOW_REACTION = _code(
+    "E0808", "slow-reaction", "noticing a breach and falling back may take longer than the contract allows"
+)
+MISSION_TIME = _code("E0809", "mission-time", "a mission may last longer than it says")
+MISSION_STEPS = _code("E0810", "mission-steps", "a mission has more steps than it says, or than fit on board")
+MISSION_ENERGY = _code("E0811", "mission-energy", "a mission may need more energy than it says")
 
 # E09: mission specifications (structured input of an agent)
 NOT_JSON = _code("E0901", "not-json", "the specification is not JSON")
@@ -152,3 +205,26 @@ CONDITION_SIZE = _code(
 )
 NUMBER_SIZE = _code("E1003", "number-size", "a number is larger than what is kept or computed on board")
 REFUSED_ON_BOARD = _code("E1004", "refused-on-board", "what the sources mean would be refused on board")
+
+# E11: what conditions mean together
+CONTRADICTION = _code("E1101", "contradiction", "conditions that must hold together never can")
+ALWAYS_HOLDS = _code("E1102", "always-holds", "a condition cannot fail, so it says nothing", Severity.WARNING)
+UNDECIDED = _code("E1103", "undecided", "a check could not decide, and says nothing either way", Severity.NOTE)
+
+# E12: what can be observed and recorded
+UNOBSERVABLE = _code("E1201", "unobservable", "a signal does not arrive often enough for what watches it")
+INSUFFICIENT_EVIDENCE = _code(
+    "E1202", "insufficient-evidence", "what is recorded does not suffice to derive a decision again"
+)
+UNWATCHED = _code("E1203", "unwatched", "what must stay true reads nothing that can change in flight", Severity.WARNING)
+
+# E13: habits
+UNUSED = _code("E1301", "unused", "something is declared and never used", Severity.WARNING)
+NAMING = _code("E1302", "naming", "a name is not written as names are", Severity.WARNING)
+BROAD_AUTHORITY = _code(
+    "E1303", "broad-authority", "a rule permits more than anyone is likely to mean", Severity.WARNING
+)
+REPEATED_NUMBER = _code(
+    "E1304", "repeated-number", "the same number stands for the same thing in several places", Severity.WARNING
+)
+UNUSED_IMPORT = _code("E1305", "unused-import", "a file is imported and nothing of it is used", Severity.WARNING)

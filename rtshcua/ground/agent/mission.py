@@ -1,14 +1,17 @@
 """From a specification that follows its schema to the IR of a mission, with the places of its JSON text."""
 
+from collections.abc import Sequence
+
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.json_tree import Path, Tree
-from rtshcua.ground.agent.schema import SpecificationShape, StepShape
-from rtshcua.ground.agent.values import parse_value
-from rtshcua.model.ir.missions import MissionDecl, Phase, Step
+from rtshcua.ground.agent.schema import OverridesShape, SpecificationShape, StepShape
+from rtshcua.ground.agent.values import Moved, parse_clauses, parse_quantity, parse_value
+from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.skills import ArgumentValue
+from rtshcua.model.ir.skills import ArgumentValue, Clause
 
 _RESERVED = frozenset({"and", "or", "not", "in", "inside", "outside", "any"})
 
@@ -36,7 +39,7 @@ class _Maker:
             Phase(
                 span=self.tree.spans["phases", number],
                 name=self.name(phase.name, ("phases", number, "name")),
-                steps=tuple(
+                items=tuple(
                     self.step(step, ("phases", number, "steps", index)) for index, step in enumerate(phase.steps)
                 ),
             )
@@ -62,8 +65,7 @@ class _Maker:
         for key, text in shape.arguments.items():
             here = (*path, "arguments", key)
             place = self.tree.spans[here]
-            offsets = string_offsets(self.source.text, place)
-            value, found = parse_value(text, Span(place.file, place.start + 1, place.end - 1), offsets.__getitem__)
+            value, found = parse_value(text, *self.within(here))
             self.found += found
             if value is not None:
                 name = Name(span=self.tree.keys[here], text=key)
@@ -73,7 +75,46 @@ class _Maker:
             skill=self.name(shape.skill, (*path, "skill")),
             arguments=tuple(arguments),
             on_inadmissible=shape.on_inadmissible,
+            overrides=None if shape.overrides is None else self.overrides(shape.overrides, (*path, "overrides")),
         )
+
+    def overrides(self, shape: OverridesShape, path: Path) -> Overrides:
+        """What a step is held to beyond its skill's contract; what says nothing sensible is reported and left out."""
+        return Overrides(
+            span=self.tree.spans[path],
+            deadline=self.quantity("deadline", shape.deadline, (*path, "deadline")),
+            validity=self.quantity("valid for", shape.valid_for, (*path, "valid_for")),
+            duration=self.quantity("lasts at most", shape.lasts_at_most, (*path, "lasts_at_most")),
+            grace=self.quantity("grace", shape.grace, (*path, "grace")),
+            energy=self.quantity("energy at most", shape.energy_at_most, (*path, "energy_at_most")),
+            phases=tuple(self.name(text, (*path, "during", at)) for at, text in enumerate(shape.during)),
+            require=self.clauses("require", shape.require, (*path, "require")),
+            assume=self.clauses("assume", shape.assume, (*path, "assume")),
+            maintain=self.clauses("maintain", shape.maintain, (*path, "maintain")),
+            record=tuple(self.name(text, (*path, "record", at)) for at, text in enumerate(shape.record)),
+        )
+
+    def quantity(self, words: str, text: str | None, path: Path) -> Quantity | None:
+        """The quantity of an override, if it is given."""
+        if text is None:
+            return None
+        value, found = parse_quantity(words, text, *self.within(path))
+        self.found += found
+        return value
+
+    def clauses(self, words: str, texts: Sequence[str], path: Path) -> tuple[Clause, ...]:
+        """The clauses of conditions."""
+        clauses: list[Clause] = []
+        for number, text in enumerate(texts):
+            some, found = parse_clauses(words, text, *self.within((*path, number)))
+            clauses += some
+            self.found += found
+        return tuple(clauses)
+
+    def within(self, path: Path) -> tuple[Span, Moved]:
+        """Where a text stands between its quotes, and where each of its characters does."""
+        place = self.tree.spans[path]
+        return Span(place.file, place.start + 1, place.end - 1), string_offsets(self.source.text, place).__getitem__
 
     def name(self, text: str, path: Path) -> Name:
         """A name with its place; the language's reserved words are none."""

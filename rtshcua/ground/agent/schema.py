@@ -43,12 +43,46 @@ class Proposer(Shape):
     role: Name
 
 
+Duration = Annotated[
+    str, StringConstraints(max_length=200), Field(description="A duration.", examples=["2 s", "500 ms", "10 min"])
+]
+Conditions = Annotated[
+    list[Annotated[str, StringConstraints(max_length=1000)]],
+    Field(
+        description="Conditions as the language writes them, over what the policy reads.",
+        examples=[["battery > 50 %", "wind.speed < 8 m/s"]],
+    ),
+]
+
+
+class OverridesShape(Shape):
+    """What holds of this step beyond its skill's contract. It may only tighten: shorter times, more energy kept ready,
+    fewer phases, further clauses and kinds of evidence.
+    """
+
+    deadline: Duration | None = None
+    valid_for: Duration | None = None
+    during: list[Name] = []
+    lasts_at_most: Duration | None = None
+    grace: Duration | None = None
+    energy_at_most: Annotated[
+        str | None, Field(description="A part of a full charge, not less than the skill's.", examples=["6 %"])
+    ] = None
+    require: Conditions = []
+    assume: Conditions = []
+    maintain: Conditions = []
+    record: list[Name] = []
+
+
 class StepShape(Shape):
-    """One step: a skill, its arguments by name, and what the mission does when it is not admitted."""
+    """One step: a skill, its arguments by name, what the mission does when it is not admitted, and what it is held to
+    beyond the skill's contract.
+    """
 
     skill: Name
     arguments: dict[Name, Text] = {}
     on_inadmissible: Literal["abort", "hold", "skip"] = "abort"
+    overrides: OverridesShape | None = None
 
 
 class PhaseShape(Shape):

@@ -11,7 +11,14 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.agent.json_tree import Path, Tree
 from rtshcua.ground.agent.pointers import pointer
-from rtshcua.ground.agent.schema import PhaseShape, PolicyName, Proposer, SpecificationShape, StepShape
+from rtshcua.ground.agent.schema import (
+    OverridesShape,
+    PhaseShape,
+    PolicyName,
+    Proposer,
+    SpecificationShape,
+    StepShape,
+)
 
 _ASKED: Mapping[str, str] = {
     "string_type": "a text",
@@ -74,7 +81,7 @@ def _wrong(path: Path, tree: Tree, error: ErrorDetails) -> Diagnostic:
     help: str | None = None
     if kind in _ASKED:
         message = f"{_ASKED[kind]} is asked, and this is {_FOUND.get(type(value), 'something else')}"
-        if kind == "string_type" and "arguments" in path:
+        if kind == "string_type" and {"arguments", "overrides"} & set(path):
             help = 'write the value as a text with its unit, such as "20 m"'
     elif kind == "literal_error":
         message, help = "this value is not accepted", f"accepted: {error.get('ctx', {}).get('expected', '')}"
@@ -94,5 +101,5 @@ def _shape_at(path: Path) -> type[BaseModel]:
     if not path:
         return SpecificationShape
     if path[0] == "phases":
-        return PhaseShape if len(path) < 4 else StepShape
+        return PhaseShape if len(path) < 4 else OverridesShape if "overrides" in path else StepShape
     return PolicyName if path[0] == "policy" else Proposer

@@ -93,6 +93,8 @@ def load_specification(
             diagnostics=(*found, *program.diagnostics),
             broken=program.broken,
             stable={name: stable(path, library, path), **program.stable},
+            data=program.data,
+            data_names=program.data_names,
         ),
         specification,
     )

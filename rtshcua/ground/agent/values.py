@@ -1,41 +1,117 @@
 """Arguments in a specification: texts in the language's own notation, parsed by the language's own parser."""
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeVar
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.parse import parse
-from rtshcua.model.ir.expression import Value
+from rtshcua.model.ir.expression import Quantity, Value
+from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.skills import Clause
+
+N = TypeVar("N", bound=Node)
 
 #: what a value stands in while it is parsed; a comment in it cannot hide what follows, which is on its own line
-_BEFORE = "mission m under p@1 on v { phase a { s(x = "
-_AFTER = "\n) } }"
+_VALUE = "mission m under p@1 on v { phase a { s(x = "
+_AFTER_VALUE = "\n) } }"
+_OVERRIDE = "mission m under p@1 on v { phase a { s() { "
+_AFTER_OVERRIDE = "\n} } }"
 
 Moved = Callable[[int], int]
+Found = tuple[Diagnostic, ...]
 
 
-def parse_value(text: str, span: Span, moved: Moved) -> tuple[Value | None, tuple[Diagnostic, ...]]:
+def parse_value(text: str, span: Span, moved: Moved) -> tuple[Value | None, Found]:
     """The value that `text` spells; `span` is where it stands, `moved` the offset of each of its characters there."""
-    parsed = parse(Source(span.file, _BEFORE + text + _AFTER))
-    found = tuple(_placed(diagnostic, span, text, moved) for diagnostic in parsed.diagnostics)
+    given = _Given(_VALUE, text, _AFTER_VALUE, span, moved)
+    step, found = given.step()
     if found:
-        return None, found[:1]
-    missions = parsed.unit.missions
-    if len(missions) == 1 and len(missions[0].phases) == 1 and len(missions[0].phases[0].steps) == 1:
-        arguments = missions[0].phases[0].steps[0].arguments
-        if len(arguments) == 1 and arguments[0].name is not None:
-            return _moved(arguments[0].value, lambda old: _place(old, span, text, moved)), ()
-    message = "a value is a quantity, a name, a place or a choice, and nothing more"
-    return None, (Diagnostic(codes.SPECIFICATION_SHAPE, message, span, 'write one value, such as "20 m"'),)
+        return None, found
+    if step is not None and len(step.arguments) == 1 and step.arguments[0].name is not None and not step.overrides:
+        return given.placed(step.arguments[0].value), ()
+    return None, (given.more("a value is a quantity, a name, a place or a choice", "20 m"),)
 
 
-def _place(old: Span, span: Span, text: str, moved: Moved) -> Span:
-    """A span of the parsed text as one of the specification, within the value."""
-    start, end = (min(max(offset - len(_BEFORE), 0), len(text)) for offset in (old.start, old.end))
-    return Span(span.file, moved(start), max(moved(end), moved(start)))
+def parse_quantity(words: str, text: str, span: Span, moved: Moved) -> tuple[Quantity | None, Found]:
+    """The quantity after the words of a step's override: `deadline`, `lasts at most`."""
+    given = _Given(f"{_OVERRIDE}{words} ", text, _AFTER_OVERRIDE, span, moved)
+    step, found = given.step()
+    if found:
+        return None, found
+    for value in () if step is None else _only(step):
+        if isinstance(value, Quantity):
+            return given.placed(value), ()
+    return None, (given.more("this is one quantity", "2 s"),)
+
+
+def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tuple[Clause, ...], Found]:
+    """The clauses of the condition after `require`, `assume` or `maintain`."""
+    given = _Given(f"{_OVERRIDE}{words} ", text, _AFTER_OVERRIDE, span, moved)
+    step, found = given.step()
+    if found:
+        return (), found
+    for value in () if step is None else _only(step):
+        if isinstance(value, tuple) and value and isinstance(value[0], Clause):
+            return tuple(given.placed(clause) for clause in value), ()
+    return (), (given.more("this is one condition", "battery > 50 %"),)
+
+
+def _only(step: Step) -> Iterator[Any]:
+    """The one part of a step's overrides; none where there are several."""
+    overrides = step.overrides
+    names = (name for name in Overrides.model_fields if name != "span")
+    parts = [] if overrides is None else [getattr(overrides, name) for name in names if getattr(overrides, name)]
+    yield from parts if len(parts) == 1 else ()
+
+
+class _Given(NamedTuple):
+    """A text that stands between others while it is parsed, and where it really stands."""
+
+    before: str
+    text: str
+    after: str
+    span: Span
+    moved: Moved
+
+    def step(self) -> tuple[Step | None, Found]:
+        """The one step that was parsed, or the first finding."""
+        parsed = parse(Source(self.span.file, self.before + self.text + self.after))
+        found = tuple(self._finding(diagnostic) for diagnostic in parsed.diagnostics)
+        if found:
+            return None, found[:1]
+        missions = parsed.unit.missions
+        if len(missions) == 1 and len(missions[0].phases) == 1 and len(missions[0].phases[0].items) == 1:
+            item = missions[0].phases[0].items[0]
+            return (item if isinstance(item, Step) else None), ()
+        return None, ()
+
+    def placed(self, node: N) -> N:
+        """A parsed node, with the places that it really has."""
+        return _moved(node, self._place)  # type: ignore[no-any-return]
+
+    def more(self, what: str, example: str) -> Diagnostic:
+        """The finding on a text that is more than one of what is asked."""
+        message = f"{what}, and nothing more"
+        return Diagnostic(codes.SPECIFICATION_SHAPE, message, self.span, f'write one value, such as "{example}"')
+
+    def _place(self, old: Span) -> Span:
+        start, end = (min(max(at - len(self.before), 0), len(self.text)) for at in (old.start, old.end))
+        return Span(self.span.file, self.moved(start), max(self.moved(end), self.moved(start)))
+
+    def _finding(self, diagnostic: Diagnostic) -> Diagnostic:
+        """A finding of the parser, with the places that lie in the text."""
+        labels = tuple(Label(self._place(label.span), label.text) for label in diagnostic.labels)
+        fixes = tuple(
+            Fix(self._place(fix.span), fix.replacement, fix.title, fix.applicability)
+            for fix in diagnostic.fixes
+            if len(self.before) <= fix.span.start and fix.span.end <= len(self.before) + len(self.text)
+        )
+        here = self.span if diagnostic.span is None else self._place(diagnostic.span)
+        return replace(diagnostic, span=here, labels=labels, fixes=fixes)
 
 
 def _moved(node: Any, place: Callable[[Span], Span]) -> Any:
@@ -48,21 +124,3 @@ def _moved(node: Any, place: Callable[[Span], Span]) -> Any:
     if isinstance(node, tuple) and not hasattr(node, "_fields"):
         return tuple(_moved(each, place) for each in node)
     return node
-
-
-def _placed(diagnostic: Diagnostic, span: Span, text: str, moved: Moved) -> Diagnostic:
-    """A finding of the parser, with the places that lie in the value."""
-
-    def at(old: Span) -> Span:
-        return _place(old, span, text, moved)
-
-    labels: Sequence[Label] = [Label(at(label.span), label.text) for label in diagnostic.labels]
-    fixes: Sequence[Fix] = [
-        Fix(at(fix.span), fix.replacement, fix.title, fix.applicability)
-        for fix in diagnostic.fixes
-        if len(_BEFORE) <= fix.span.start and fix.span.end <= len(_BEFORE) + len(text)
-    ]
-    here = span if diagnostic.span is None else at(diagnostic.span)
-    return Diagnostic(
-        diagnostic.code, diagnostic.message, here, diagnostic.help, tuple(labels), tuple(fixes), diagnostic.pointer
-    )

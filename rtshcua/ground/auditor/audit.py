@@ -2,10 +2,12 @@
 
 8. trust: the root under the pinned key, the log key's duty, the bundle under that root (`trust`)
 9. the bundle is the one that the caller knows of, if there is one
-10. each decision is derived again (`derive`), under the mode of the genesis
+10. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
+    ruled out by the states that the records hold (`observed`)
 11. evidence before effect: each dispatch follows a record that permits it (`cover`); not in mode `none`
 
-What no log can prove: that the state it records is what the vehicle's sensors saw.
+What no log can prove: that the state it records is what the vehicle's sensors saw, and that the temporal monitors said
+what follows from all observations, of which the log has those at which something was decided.
 """
 
 from base64 import b64encode
@@ -114,6 +116,9 @@ class Auditor:
             Claim("decisions", f"{_many(self._derived, 'decision')} derived again, each with the same answer"),
         ]
         unproven = [*report.unproven, Claim("state", "that the recorded state is what the vehicle's sensors saw")]
+        if basis.policy.monitors:
+            text = "what the temporal monitors said between the records: only that no recorded state rules it out"
+            unproven.append(Claim("monitors", text))
         if self._mode == UNENFORCED:
             unproven.append(Claim("enforcement", "mode `none`: nothing was enforced, so dispatches needed no permit"))
         else:

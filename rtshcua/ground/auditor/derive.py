@@ -2,11 +2,13 @@
 
 from typing import NamedTuple
 
+from rtshcua.decision.case import SINGLE
 from rtshcua.decision.decide import decide
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Decision
+from rtshcua.ground.auditor.observed import Observed
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import OnInadmissible
@@ -46,11 +48,12 @@ _WHAT = {
 
 
 class Deriver:
-    """Derives the decisions of one log in their order; remembers which ids were used up, nothing else."""
+    """Derives the decisions of one log in their order; remembers which ids were used up, and what `Observed` does."""
 
     def __init__(self, basis: Basis) -> None:
         self._basis = basis
         self._consumed: set[int] = set()
+        self._observed = Observed(basis.policy)
 
     def check(self, record: Decision) -> Flaw | None:
         """What is wrong with a decision, or None when it derives again."""
@@ -66,11 +69,16 @@ class Deriver:
 
     def _derived(self, record: Decision) -> Answer | Flaw:
         basis = self._basis
-        state = State(record.state.values, record.state.ages)
-        slots = basis.policy.policy.slots
+        state = State(record.state.values, record.state.ages, record.state.monitors)
+        slots, monitors = basis.policy.policy.slots, len(basis.policy.monitors)
         if len(state.values) != slots or len(state.ages) != slots:
             return Flaw("decision/inputs", f"the state has not the {slots} slots of the policy")
+        if len(state.monitors) != monitors or not SINGLE.issuperset(state.monitors):
+            return Flaw("decision/inputs", f"the state has not a truth for each of the policy's {monitors} monitors")
         now = Now(record.at_us, record.utc_us, record.utc_error_us)
+        flaw = self._observed.check(state, now)
+        if flaw is not None:
+            return flaw
         if record.kind == CONTINGENCY_LINK and record.step == -1:
             return self._contingency(record, state, now)
         if record.kind in (STEP, FALLBACK_LINK) and 0 <= record.step < len(basis.invocations):
@@ -123,7 +131,7 @@ class Deriver:
             choice = choose_fallback(invocation, state, basis.policy, now)
             admissible = choice is not None and choice.index == DEGRADE
         elif 0 <= record.link < len(chain):
-            admissible = link_admissible(chain[record.link], state, basis.policy, now)
+            admissible = link_admissible(chain[record.link], state, basis.policy, now, invocation.phase)
         else:
             return _no_such(record)
         return _of_link(record, invocation.invocation.binding, now, admissible=admissible)

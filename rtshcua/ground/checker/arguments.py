@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.scope import Argument, Entry, Scope
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.checker.values import typed
 from rtshcua.model.ir.expression import Coordinates, Reference, Value
 from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import ArgumentValue, SkillDecl
 from rtshcua.model.quantity import display
 
@@ -19,7 +21,7 @@ def bind_arguments(
     context: Context, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span
 ) -> tuple[Bound, ...] | None:
     """The value of every parameter of `skill`, defaults filled in; None after a finding. `span` is the whole call."""
-    pairs = _pair(context, skill, written, span)
+    pairs = pair(context, skill, written, span)
     if pairs is None:
         return None
     known = context.arguments(skill)
@@ -34,7 +36,9 @@ def bind_arguments(
     return None if None in bound else tuple(item for item in bound if item is not None)
 
 
-def _pair(context: Context, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span) -> dict[str, Value] | None:
+def pair(
+    context: Context, skill: SkillDecl | TemplateDecl, written: Sequence[ArgumentValue], span: Span
+) -> dict[str, Value] | None:
     """The written arguments by the name of their parameter; None after a finding."""
     names = [parameter.name.text for parameter in skill.parameters]
     known = set(names)
@@ -110,9 +114,10 @@ def bind_value(scope: Scope, argument: Argument, value: Value) -> Bound | None:
             help="an argument is written out, such as a number with its unit",
         )
         return None
-    if argument.type.kind is Kind.NUMBER:
-        in_range(scope, argument, value, found.constant)
-    return found.constant
+    number = stored(scope, value, argument.type, found.constant)
+    if number is not None and argument.type.kind is Kind.NUMBER:
+        in_range(scope, argument, value, number)
+    return number
 
 
 def _place(scope: Scope, value: Value) -> Bound | None:

@@ -7,13 +7,15 @@ from rtshcua.ground.checker.checks import (
     names,
     parameters,
     policies,
+    records,
     signals,
+    times,
     vehicles,
     zones,
 )
 from rtshcua.ground.checker.context import Context
 
-CHECKS = (names, signals, zones, vehicles, parameters, contracts, fallbacks, policies, missions)
+CHECKS = (names, signals, zones, vehicles, parameters, contracts, fallbacks, policies, missions, times, records)
 
 
 def check_declarations(context: Context) -> None:

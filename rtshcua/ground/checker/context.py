@@ -1,47 +1,79 @@
 """What every check is given: the program's names, the dialect, and where to report."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Argument, Scope, parameter_type
 from rtshcua.ground.checker.symbols import Symbols
-from rtshcua.ground.checker.values import typed_range
+from rtshcua.ground.checker.values import whole_range
 from rtshcua.model.ir.expression import Coordinates
+from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.policies import Rule, TemplateDecl
 from rtshcua.model.ir.skills import SkillDecl
+
+#: what has parameters
+Parametric = SkillDecl | TemplateDecl | MissionDecl
 
 #: what an argument is bound to: a canonical integer (a choice's ordinal too), a zone, or a place
 Bound = int | ZoneDecl | Coordinates
 
 
+class Instance(NamedTuple):
+    """A mission with values for its parameters, and labels that say which."""
+
+    mission: MissionDecl
+    labels: tuple[tuple[Span, str], ...]
+
+
 @dataclass(slots=True)
 class Context:
-    """One compilation's checks; `bound` keeps what arguments were resolved to, for the lowering."""
+    """One compilation's checks; `bound` keeps what arguments were resolved to, for the lowering.
+
+    `instances` has, of each mission with parameters, those that are checked; `samples` the rules of templates that no
+    policy uses, with values that their parameters might have. `data` are the files that zones are read from.
+    """
 
     symbols: Symbols
     report: Report
     dialect: Dialect
     bound: dict[int, tuple[Bound, ...]] = field(default_factory=dict)
-    _arguments: dict[int, dict[str, Argument]] = field(default_factory=dict)
+    instances: dict[str, tuple[Instance, ...]] = field(default_factory=dict)
+    samples: tuple[Rule, ...] = ()
+    data: DataFiles = field(default_factory=DataFiles)
+    _arguments: dict[int, tuple[Parametric, dict[str, Argument]]] = field(default_factory=dict)
 
     def scope(self) -> Scope:
         """Signals and zones, and no argument."""
         return Scope(self.symbols, self.report)
 
-    def arguments(self, skill: SkillDecl) -> dict[str, Argument]:
-        """The parameters of a skill that have a type, by name."""
-        found = self._arguments.get(id(skill))
-        if found is None:
-            found = self._arguments[id(skill)] = {}
+    def arguments(self, skill: Parametric) -> dict[str, Argument]:
+        """The parameters of a skill, a template or a mission that have a type, by name."""
+        known = self._arguments.get(id(skill))
+        found: dict[str, Argument] = {} if known is None else known[1]
+        if known is None:
+            self._arguments[id(skill)] = (skill, found)  # held, so that nothing else gets its identity
             unheard = Scope(self.symbols, Report(self.report.sources))  # the declaration itself is checked elsewhere
             for parameter in skill.parameters:
                 type = parameter_type(parameter)
                 if type is not None:
-                    ends = None if parameter.range is None else typed_range(unheard, parameter.range, type)
-                    low, high = (None, None) if ends is None else (ends[0].constant, ends[1].constant)
+                    ends = None if parameter.range is None else whole_range(unheard, parameter.range, type)
+                    low, high = (None, None) if ends is None else ends
                     found.setdefault(parameter.name.text, Argument(parameter, type, low, high))
         return found
+
+    def missions(self) -> Iterator[MissionDecl]:
+        """Every mission; one with parameters, for each of the values that it is checked with, which findings tell."""
+        for name, mission in self.symbols.missions.items():
+            instances = self.instances.get(name, (Instance(mission, ()),))
+            for instance in instances:
+                with self.report.within(instance.labels, len(instances)):
+                    yield instance.mission
 
     def scope_of(self, skill: SkillDecl) -> Scope:
         """What the clauses of a skill may name."""

@@ -12,7 +12,7 @@ from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
 from rtshcua.model.flat.zone import HIGHEST, MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates, Quantity
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.quantity import Datum, Dimension, display
 
 #: the largest number of each dimension that is kept on board
 LARGEST: Mapping[Dimension, int] = {
@@ -24,6 +24,9 @@ LARGEST: Mapping[Dimension, int] = {
     Dimension.RATIO: MAX_VALUE,
     Dimension.COUNT: MAX_VALUE,
 }
+
+ABOVE_SEA = number(Dimension.ALTITUDE, Datum.SEA)
+MAX_ELEVATION = 9_000_000  # mm: no ground is higher
 
 #: the local projection has no use nearer to a pole (1e-7 degree)
 MAX_LATITUDE = 850_000_000
@@ -48,9 +51,16 @@ def quantity(
 
 
 def height(context: Context, node: Quantity | None) -> None:
-    """Report a field that is no altitude above home."""
-    if node is not None and typed(context.scope(), node, HEIGHT) is not None:
+    """Report a field that is no altitude, above home or above sea."""
+    expected = HEIGHT if node is None or node.datum is not Datum.SEA else ABOVE_SEA
+    if node is not None and typed(context.scope(), node, expected) is not None:
         size(context, node, Dimension.ALTITUDE, node.value)
+
+
+def elevation(context: Context, node: Quantity | None) -> None:
+    """Report a field that is no altitude above sea."""
+    if node is not None and typed(context.scope(), node, ABOVE_SEA) is not None:
+        size(context, node, Dimension.ALTITUDE, node.value, MAX_ELEVATION)
 
 
 def size(context: Context, node: Node, dimension: Dimension, value: int, most: int | None = None) -> bool:

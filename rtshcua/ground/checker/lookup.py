@@ -9,7 +9,7 @@ from rtshcua.ground.checker.symbols import WORDS, Declaration, suggestion
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.skills import SkillDecl
 
 D = TypeVar("D", bound=Declaration)
@@ -28,6 +28,11 @@ def find_zone(context: Context, name: Name) -> ZoneDecl | None:
 def find_policy(context: Context, name: Name) -> PolicyDecl | None:
     """The policy of that name."""
     return _find(context, name, context.symbols.policies, PolicyDecl)
+
+
+def find_template(context: Context, name: Name) -> TemplateDecl | None:
+    """The template of that name."""
+    return _find(context, name, context.symbols.templates, TemplateDecl)
 
 
 def find_vehicle(context: Context, name: Name) -> VehicleDecl | None:

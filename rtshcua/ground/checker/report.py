@@ -1,20 +1,29 @@
 """Where checks put what they find."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from hashlib import sha256
 
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label, has_errors
 from rtshcua.diagnostics.span import Source, Span
 
+#: of how many uses the one finding on a template tells
+MAX_CONTEXTS = 3
+
 
 class Report:
     """Collects the findings of one compilation, and lets a check quote the sources."""
 
-    def __init__(self, sources: Mapping[str, Source]) -> None:
+    def __init__(self, sources: Mapping[str, Source], data: Mapping[str, bytes] | None = None) -> None:
         self.sources = sources
+        self._data = data or {}
         self.found: list[Diagnostic] = []
         self._digests: dict[str, bytes] = {}
+        self._context: tuple[Label, ...] = ()
+        self._among = 0
+        self._plain: dict[Diagnostic, tuple[Diagnostic, int]] = {}
 
     def add(
         self,
@@ -27,15 +36,43 @@ class Report:
         fix: tuple[Span, str, str] | None = None,
     ) -> None:
         """Report one finding; `labels` are places with their words, `fix` is a span, its replacement and a title."""
-        self.found.append(
-            Diagnostic(
-                code,
-                message,
-                span,
-                help,
-                tuple(Label(place, words) for place, words in labels),
-                () if fix is None else (Fix(*fix),),
-            )
+        found = Diagnostic(
+            code,
+            message,
+            span,
+            help,
+            tuple(Label(place, words) for place, words in labels),
+            () if fix is None else (Fix(*fix),),
+        )
+        if self._context:
+            plain, found = found, replace(found, labels=(*found.labels, *self._context))
+            self._plain[found] = plain, self._among
+        self.found.append(found)
+
+    @contextmanager
+    def within(self, labels: Iterable[tuple[Span, str]], among: int = 0) -> Iterator[None]:
+        """What is reported meanwhile gets these labels too: where a template is used, what a parameter stands for.
+
+        What is reported in all of `among` contexts depends on none of them, and gets no label.
+        """
+        before = self._context, self._among
+        self._context = (*self._context, *(Label(place, words) for place, words in labels))
+        self._among = among or self._among
+        try:
+            yield
+        finally:
+            self._context, self._among = before
+
+    def merged(self) -> tuple[Diagnostic, ...]:
+        """The findings, each once: those that differ in the labels of `within` alone are one, with those of up to
+        `MAX_CONTEXTS` contexts, of which the others say the same as the first.
+        """
+        groups: dict[Diagnostic, tuple[dict[Diagnostic, None], int]] = {}
+        for found in self.found:
+            plain, among = self._plain.get(found, (found, 0))
+            groups.setdefault(plain, ({}, among))[0][found] = None
+        return tuple(
+            plain if len(group) == among > 1 else _joined(list(group)) for plain, (group, among) in groups.items()
         )
 
     def text(self, span: Span) -> str:
@@ -48,13 +85,22 @@ class Report:
         return "" if source is None else source.slice(span)
 
     def digest(self, file: str) -> bytes:
-        """The SHA-256 of a file's text in UTF-8."""
+        """The SHA-256 of a source's text in UTF-8, or of the bytes of a file that a zone is read from."""
         digest = self._digests.get(file)
         if digest is None:
-            text = self.sources[file].text
-            digest = self._digests[file] = sha256(text.encode("utf-8", "surrogatepass")).digest()
+            source = self.sources.get(file)
+            content = self._data[file] if source is None else source.text.encode("utf-8", "surrogatepass")
+            digest = self._digests[file] = sha256(content).digest()
         return digest
 
     def failed(self) -> bool:
         """Whether anything found so far forbids going on."""
         return has_errors(self.found)
+
+
+def _joined(group: list[Diagnostic]) -> Diagnostic:
+    """One finding for several that differ in their labels."""
+    first = group[0]
+    words = {label.text for label in first.labels}
+    alike = [each for each in group if {label.text for label in each.labels} <= words][:MAX_CONTEXTS]
+    return replace(first, labels=tuple(dict.fromkeys(label for each in alike for label in each.labels)))

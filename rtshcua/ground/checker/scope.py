@@ -16,6 +16,8 @@ from rtshcua.model.ir.skills import Parameter
 from rtshcua.model.quantity import Dimension
 
 LOCAL_TIME = "local time"
+#: the mission's phase, as a condition names it
+PHASE = "phase"
 ENTRY = ".entry"
 
 
@@ -103,7 +105,7 @@ class Scope:
                     labels=[(enum.name.span, "declared here")],
                 )
                 return
-        known = [*self.arguments, *self.symbols.signals, *self.symbols.zones, LOCAL_TIME]
+        known = [*self.arguments, *self.symbols.signals, *self.symbols.zones, LOCAL_TIME, PHASE]
         self.report.add(codes.UNKNOWN_NAME, span, f"nothing declares `{name}`", help=suggestion(name, known))
 
 

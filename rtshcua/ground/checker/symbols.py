@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
 
-Declaration = EnumDecl | SignalDecl | ZoneDecl | VehicleDecl | SkillDecl | PolicyDecl | MissionDecl
+Declaration = EnumDecl | SignalDecl | ZoneDecl | VehicleDecl | SkillDecl | TemplateDecl | PolicyDecl | MissionDecl
 
 #: how a kind of declaration is called in a message
 WORDS: Mapping[type, str] = {
@@ -20,6 +20,7 @@ WORDS: Mapping[type, str] = {
     ZoneDecl: "a zone",
     VehicleDecl: "a vehicle",
     SkillDecl: "a skill",
+    TemplateDecl: "a template",
     PolicyDecl: "a policy",
     MissionDecl: "a mission",
 }
@@ -39,6 +40,7 @@ class Symbols:
     zones: dict[str, ZoneDecl] = field(default_factory=dict)
     vehicles: dict[str, VehicleDecl] = field(default_factory=dict)
     skills: dict[str, SkillDecl] = field(default_factory=dict)
+    templates: dict[str, TemplateDecl] = field(default_factory=dict)
     policies: dict[str, PolicyDecl] = field(default_factory=dict)
     missions: dict[str, MissionDecl] = field(default_factory=dict)
     broken: frozenset[str] = frozenset()
@@ -68,6 +70,7 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
             (unit.zones, symbols.zones),
             (unit.vehicles, symbols.vehicles),
             (unit.skills, symbols.skills),
+            (unit.templates, symbols.templates),
             (unit.policies, symbols.policies),
             (unit.missions, symbols.missions),
         ):

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from fractions import Fraction
+from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.model.quantity import Datum, Dimension
@@ -16,6 +18,7 @@ class Kind(Enum):
     ZONE = "zone"
     POSITION = "position"
     TIME_OF_DAY = "time of day"
+    PHASE = "phase"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +89,15 @@ RATIO = number(Dimension.RATIO)
 ZONE = Type(Kind.ZONE)
 POSITION = Type(Kind.POSITION)
 TIME_OF_DAY = Type(Kind.TIME_OF_DAY)
+MISSION_PHASE = Type(Kind.PHASE)
+
+
+class Typed(NamedTuple):
+    """A value's type, and its number in the canonical unit where it is known at compile time: exact, not yet whole."""
+
+    type: Type
+    constant: Fraction | None
+
 
 #: types by the names that a declaration may write; enumerations are declared
 NAMED: Mapping[str, Type] = {

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.made_of import named
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import ENTRY
@@ -29,7 +30,9 @@ def belongs(
         if declared is not None and declared.span.file not in files:
             foreign.setdefault(name, span)
 
-    for name, span in (*_of_policy(policy), *(found for skill in skills for found in _of_skill(skill))):
+    zones = (zone for zone in context.symbols.zones.values() if zone.span.file in files)
+    of_zones = ((each.name, each.span) for zone in zones for each in named(zone))
+    for name, span in (*_of_policy(policy), *(found for skill in skills for found in _of_skill(skill)), *of_zones):
         note(name, span)
         signal = context.symbols.signals.get(name)
         if signal is not None:

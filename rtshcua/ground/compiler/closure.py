@@ -8,7 +8,7 @@ import posixpath
 from collections.abc import Iterator, Mapping, Sequence
 
 from rtshcua.ground.language.paths import LIBRARY, imported, shown
-from rtshcua.model.ir.program import Unit
+from rtshcua.model.ir.program import Import, Unit
 
 
 class Imports:
@@ -29,16 +29,21 @@ class Imports:
                     waiting.append(found)
         return frozenset(seen)
 
+    def target(self, file: str, each: Import) -> str | None:
+        """The file of the program that an import of `file` means."""
+        if each.path.startswith(LIBRARY):
+            inside = posixpath.normpath(each.path.removeprefix(LIBRARY).lstrip("/"))
+            name = self._by_stable.get(LIBRARY + inside)
+        else:
+            path = imported(each.path, file, None)
+            name = None if path is None else shown(path)
+        return name if name in self._units else None
+
     def _imported(self, file: str) -> Iterator[str]:
         unit = self._units.get(file)
         for each in () if unit is None else unit.imports:
-            if each.path.startswith(LIBRARY):
-                inside = posixpath.normpath(each.path.removeprefix(LIBRARY).lstrip("/"))
-                name = self._by_stable.get(LIBRARY + inside)
-            else:
-                path = imported(each.path, file, None)
-                name = None if path is None else shown(path)
-            if name in self._units:
+            name = self.target(file, each)
+            if name is not None:
                 yield name
 
 

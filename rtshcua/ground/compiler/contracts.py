@@ -100,7 +100,7 @@ class Contracts:
             fallback=self.chain(skill.fallback),
             energy=skill.energy.value,
             record=tuple(name.text for name in skill.record) or DEFAULT_RECORD,
-            reads=slots_read((*require, *assume, *maintain), self._vehicle),
+            reads=slots_read((*require, *assume, *maintain), self._vehicle, tuple(self._conditions.monitors.all)),
         )
 
     def chain(self, links: Sequence[LinkDecl]) -> tuple[Link, ...]:

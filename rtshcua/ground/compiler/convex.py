@@ -1,6 +1,6 @@
 """Grown and shrunk convex polygons, in integers: the same corners come out on every machine.
 
-Most zones that people draw are convex. `offset` proves the results, and turns to shapely for all others.
+Most zones that people draw are convex. `offset` proves the results, and turns to `convolution` for all others.
 """
 
 from collections.abc import Iterator, Sequence
@@ -9,8 +9,9 @@ from itertools import pairwise
 from math import isqrt
 
 from rtshcua.ground.compiler.shapes import Outline, Point, edges
+from rtshcua.ground.compiler.vectors import dot, scaled
 
-#: a polygon with more corners is left to shapely: cutting takes the square of their number
+#: a polygon with more corners is left to `convolution`: cutting takes the square of their number
 MOST_CORNERS = 64
 
 #: a turn between two edges is rounded in steps of at most 22.5 degrees: the cosine, in thousandths
@@ -41,10 +42,10 @@ def mitred(outline: Outline, distance: int) -> list[Point]:
     corners: list[Point] = []
     for corner, before, after in _corners(outline, distance):
         normals = [before, after]
-        if _dot(before, after) < 0:
-            normals.insert(1, _scaled((before[0] + after[0], before[1] + after[1]), distance))
+        if dot(before, after) < 0:
+            normals.insert(1, scaled((before[0] + after[0], before[1] + after[1]), distance))
         for a, b in pairwise(normals):
-            share = Fraction(distance * distance, distance * distance + _dot(a, b))
+            share = Fraction(distance * distance, distance * distance + dot(a, b))
             corners.append((corner[0] + round((a[0] + b[0]) * share), corner[1] + round((a[1] + b[1]) * share)))
     return corners
 
@@ -76,30 +77,14 @@ def _cut(corners: Sequence[_Exact], dx: int, dy: int, least: int) -> list[_Exact
 
 def _corners(outline: Outline, distance: int) -> Iterator[tuple[Point, Point, Point]]:
     """Each corner with the outward normals, of length `distance`, of the edges before and after it."""
-    normals = [_scaled((b[1] - a[1], a[0] - b[0]), distance) for a, b in edges(outline)]
+    normals = [scaled((b[1] - a[1], a[0] - b[0]), distance) for a, b in edges(outline)]
     return zip(outline.corners, [normals[-1], *normals[:-1]], normals, strict=True)
 
 
 def _arc(before: Point, after: Point, distance: int, halvings: int = 3) -> list[Point]:
     """The vectors between two of length `distance`, at most a step apart."""
-    if not halvings or 1000 * _dot(before, after) >= _STEP * distance * distance:
+    if not halvings or 1000 * dot(before, after) >= _STEP * distance * distance:
         return []
-    middle = _scaled((before[0] + after[0], before[1] + after[1]), distance)
+    middle = scaled((before[0] + after[0], before[1] + after[1]), distance)
     left, right = _arc(before, middle, distance, halvings - 1), _arc(middle, after, distance, halvings - 1)
     return [*left, middle, *right]
-
-
-def _scaled(vector: Point, length: int) -> Point:
-    """The vector of that length in the same direction, its parts rounded towards zero."""
-    x, y = vector
-    root = isqrt((x * x + y * y) << 40) + 1
-
-    def part(value: int) -> int:
-        magnitude = (abs(value) * length << 20) // root
-        return magnitude if value >= 0 else -magnitude
-
-    return part(x), part(y)
-
-
-def _dot(a: Point, b: Point) -> int:
-    return a[0] * b[0] + a[1] * b[1]

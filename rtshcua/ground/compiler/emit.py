@@ -13,6 +13,8 @@ _PUSHES = frozenset(
         Op.POSITION_IN_ARGUMENT,
         Op.ARGUMENT_POINT_IN,
         Op.TIME_IN,
+        Op.PHASE_IN,
+        Op.MONITOR,
     }
 )
 _KEEPS = frozenset({Op.NOT, Op.SCALE})

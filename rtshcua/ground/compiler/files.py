@@ -9,6 +9,11 @@ from rtshcua.ground.checker.report import Report
 MAX_TEXT = 400
 
 
+def shortened(text: str) -> str:
+    """The text as it is carried on board."""
+    return text if len(text) <= MAX_TEXT else text[: MAX_TEXT - 3] + "..."
+
+
 class Files:
     """File names by index, in the order in which they are first referred to; `stable` are the names that are signed."""
 
@@ -23,10 +28,7 @@ class Files:
 
     def place(self, span: Span) -> tuple[str, int, int, int]:
         """A span as it is carried on board: its text, its file's index, its start and its end."""
-        text = self._report.text(span)
-        if len(text) > MAX_TEXT:
-            text = text[: MAX_TEXT - 3] + "..."
-        return text, self.index(span.file), span.start, span.end
+        return shortened(self._report.text(span)), self.index(span.file), span.start, span.end
 
     def span(self, file: int, start: int, end: int) -> Span:
         """The span that a place on board came from."""
@@ -41,3 +43,25 @@ class Files:
     def digests(self) -> tuple[bytes, ...]:
         """The SHA-256 of each file's text in UTF-8."""
         return tuple(self._report.digest(name) for name in self._index)
+
+
+class Joint(Files):
+    """The files of a policy, and after them those of a mission: what a step's own clauses refer to.
+
+    On board, in bundles and in logs, a clause's `source` counts the policy's sources first, then its mission's.
+    """
+
+    def __init__(self, policy: Files, mission: Files) -> None:
+        super().__init__(policy._report, mission._stable)
+        self._policy = policy
+        self._mission = mission
+
+    def index(self, file: str) -> int:
+        """The index of a file."""
+        own = self._policy._index.get(file)
+        return len(self._policy._index) + self._mission.index(file) if own is None else own
+
+    def span(self, file: int, start: int, end: int) -> Span:
+        """The span that a place came from."""
+        first = len(self._policy._index)
+        return self._policy.span(file, start, end) if file < first else self._mission.span(file - first, start, end)

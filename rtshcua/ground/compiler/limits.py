@@ -43,6 +43,8 @@ def _of_policy(span: Span, flat: Policy) -> Iterator[_Count]:
     yield span, "zones, with those grown from others", len(flat.zones), limits.MAX_ZONES
     yield span, "margins by which zones of arguments grow", len(flat.tables), limits.MAX_TABLES
     yield span, "sets of values in its conditions", len(flat.sets), limits.MAX_SETS
+    yield span, "temporal operators over different conditions", len(flat.monitors), limits.MAX_MONITORS
+    yield span, "names of phases in its conditions", len(flat.phases), limits.MAX_PHASE_NAMES
     yield span, "values in one set", max(map(len, flat.sets), default=0), limits.MAX_MEMBERS
     corners = sum(len(zone.data) // 2 for zone in flat.zones)
     yield span, "corners of zones", corners, limits.MAX_TOTAL_VERTICES

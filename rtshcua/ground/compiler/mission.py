@@ -1,14 +1,16 @@
 """A mission to the flat form: one contract-bound invocation a step, still without its id and its binding."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.compiler.files import Files
+from rtshcua.ground.compiler.files import Files, Joint
 from rtshcua.ground.compiler.plan import plan_of
 from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.compiler.tightened import Tightened
 from rtshcua.model.flat.contract import Contract, SourceKind
 from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PHASES
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
@@ -16,9 +18,16 @@ from rtshcua.model.ir.missions import MissionDecl, Phase, Step
 from rtshcua.model.ir.places import ZoneDecl
 
 
+class LoweredMission(NamedTuple):
+    """A flat mission, and the files that its contracts' clauses refer to."""
+
+    mission: Mission
+    files: Joint
+
+
 def lower_mission(
     context: Context, mission: MissionDecl, under: LoweredPolicy, names: Mapping[str, str], issued_at_us: int
-) -> Mission | None:
+) -> LoweredMission | None:
     """The mission under its lowered policy, issued at a UTC time in us; None after a finding."""
     assert mission.source is not None
     assert mission.role is not None
@@ -38,12 +47,16 @@ def lower_mission(
         return None
     files = Files(context.report, names)
     files.index(mission.span.file)
+    joint = Joint(under.files, files)
+    tightened = Tightened(context, under, joint)
     invocations: list[Invocation] = []
     for number, phase, step in steps:
         if not _known(context, step, under):
             continue
         skill = under.skills[step.skill.text]
-        contract = under.policy.contracts[skill]
+        contract = tightened.contract(step)
+        if contract is None:
+            continue
         bound = context.bound[id(step)]
         arguments = under.contracts.cells(bound)
         plan = plan_of(context, step, bound, arguments, under)
@@ -73,7 +86,7 @@ def lower_mission(
         )
     if len(context.report.found) > before:
         return None
-    return Mission(
+    flat = Mission(
         name=mission.name.text,
         intent=mission.intent or "",
         proposer="" if mission.proposer is None else mission.proposer.text,
@@ -87,15 +100,19 @@ def lower_mission(
         sources=files.names,
         source_digests=files.digests,
     )
+    return LoweredMission(flat, joint)
 
 
 def _fits(context: Context, mission: MissionDecl, steps: int) -> bool:
     good = True
-    for count, limit, what in ((steps, MAX_INVOCATIONS, "steps"), (len(mission.phases), MAX_PHASES, "phases")):
+    for code, count, limit, what in (
+        (codes.MISSION_STEPS, steps, MAX_INVOCATIONS, "steps"),
+        (codes.TOO_MANY, len(mission.phases), MAX_PHASES, "phases"),
+    ):
         if count > limit:
             good = False
             context.report.add(
-                codes.TOO_MANY,
+                code,
                 mission.name.span,
                 f"the mission has {count} {what}, and at most {limit} fit on board",
                 help="split it into several missions",
@@ -151,7 +168,8 @@ def _in_phase(context: Context, mission: MissionDecl, phase: Phase, step: Step, 
     skill = context.symbols.skills[step.skill.text]
     names = [each.name.text for each in mission.phases]
     valid = ", ".join(f"`{name}`" for name in contract.phases)
-    labels = [(name.span, "valid in this phase") for name in skill.phases]
+    own = () if step.overrides is None else step.overrides.phases
+    labels = [(name.span, "valid in this phase") for name in own or skill.phases]
     if set(contract.phases).isdisjoint(names):
         context.report.add(
             codes.UNKNOWN_PHASE,

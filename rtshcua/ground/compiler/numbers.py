@@ -1,99 +1,122 @@
-"""Numbers and their comparisons to postfix code, in integers that stay within 64 bits."""
+"""Comparisons of numbers to postfix code, in integers that stay within 64 bits.
+
+`max(a, b) <= c` is `a <= c and b <= c`, `max(a, b) >= c` is `a >= c or b >= c`, and `min` the other way round, so that
+one part which is known may decide alone. `==` is `<=` and `>=` there, `!=` is `<` or `>`.
+"""
 
 from collections.abc import Mapping
+from fractions import Fraction
+from math import gcd, lcm
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.compiler.emit import Code
+from rtshcua.ground.compiler.forms import Choice, Form, Linear, TooManyForms, Variable, plus, scaled
+from rtshcua.ground.compiler.linear import Forms
 from rtshcua.ground.compiler.slots import Slots
-from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.code import MAX_INSTRUCTIONS, Op
 from rtshcua.model.flat.limits import MAX_MAGNITUDE, MAX_VALUE
-from rtshcua.model.ir.expression import Arithmetic, Comparison, Quantity, Reference, Value, Within
+from rtshcua.model.ir.expression import Comparison, Value, Within
+from rtshcua.model.ir.node import Node
 
 _COMPARE: Mapping[str, Op] = {"<": Op.LT, "<=": Op.LE, ">": Op.GT, ">=": Op.GE, "==": Op.EQ, "!=": Op.NE}
-_ARITHMETIC: Mapping[str, Op] = {"+": Op.ADD, "-": Op.SUB}
+_ZERO = Linear({}, Fraction(0))
 
 
 class Numbers:
-    """Lowers numbers in one scope."""
+    """Lowers comparisons in one scope."""
 
     def __init__(self, report: Report, slots: Slots, scope: Scope, cells: Mapping[str, int]) -> None:
         self._report = report
-        self._slots = slots
-        self._scope = scope
-        self._cells = cells
+        self._forms = Forms(slots, scope, cells)
 
     def compare(self, code: Code, node: Comparison) -> None:
         """`left operator right`."""
-        size = self._value(code, node.left) + self._value(code, node.right)
-        self._fits(node.left, size)
-        code.add(_COMPARE[node.operator])
+        self._compare(code, node, node.left, _COMPARE[node.operator], node.right)
 
     def between(self, code: Code, node: Within) -> None:
         """`subject in low .. high`, both ends included."""
-        for end, op, connect in ((node.range.low, Op.GE, False), (node.range.high, Op.LE, True)):
-            size = self._value(code, node.subject) + self._value(code, end)
-            self._fits(node.subject, size)
-            code.add(op)
-            if connect:
-                code.add(Op.AND)
+        self._compare(code, node, node.subject, Op.GE, node.range.low)
+        self._compare(code, node, node.subject, Op.LE, node.range.high)
+        code.add(Op.AND)
 
-    def _value(self, code: Code, node: Value) -> int:
-        """Push a number; returns what it can never exceed in magnitude."""
-        constant = _constant(node)
-        if constant is not None:
-            if abs(constant) > MAX_VALUE:
-                self._too_large(node)
-            code.add(Op.CONST, constant)
-            return abs(constant)
-        match node:
-            case Reference():
-                if isinstance(self._scope.find(node.name), Argument):
-                    code.add(Op.ARGUMENT, self._cells[node.name])
-                else:
-                    code.add(Op.SIGNAL, self._slots.of(node.name))
-                return MAX_VALUE
-            case Arithmetic(operator="*"):
-                return self._scale(code, node)
-            case Arithmetic():
-                size = self._value(code, node.left) + self._value(code, node.right)
-                code.add(_ARITHMETIC[node.operator])
-                return self._fits(node, size)
-            case _:
-                raise AssertionError(node.kind)
+    def _compare(self, code: Code, node: Node, left: Value, op: Op, right: Value) -> None:
+        try:
+            low, high = self._forms.of(left), self._forms.of(right)
+            if isinstance(low, Linear) and isinstance(high, Linear):
+                self._emit(code, node, low, op, high)
+            else:
+                self._parts(code, node, plus(low, scaled(high, Fraction(-1))), op)
+        except TooManyForms:
+            self._report.add(
+                codes.CONDITION_SIZE,
+                node.span,
+                f"`{self._report.text(node.span)}` compares more than {MAX_INSTRUCTIONS} sums with each other",
+                help="a sum of `min` and `max` means each choice with each other: compare them apart",
+            )
+            self._emit(code, node, _ZERO, op, _ZERO)
 
-    def _scale(self, code: Code, node: Arithmetic) -> int:
-        left, right = _constant(node.left), _constant(node.right)
-        factor, operand = (left, node.right) if left is not None else (right, node.left)
-        assert factor is not None
-        size = self._value(code, operand) * abs(factor)
-        if abs(factor) > MAX_VALUE:
-            self._too_large(node)
-        code.add(Op.SCALE, factor)
-        return self._fits(node, size)
+    def _parts(self, code: Code, node: Node, form: Form, op: Op) -> None:
+        """`form op 0`."""
+        if isinstance(form, Linear):
+            left, right = Linear(form.terms, Fraction(0)), Linear({}, -form.constant)
+            self._emit(code, node, left, op, right)
+        elif op in (Op.EQ, Op.NE):
+            both = op == Op.EQ
+            self._parts(code, node, form, Op.LE if both else Op.LT)
+            self._parts(code, node, form, Op.GE if both else Op.GT)
+            code.add(Op.AND if both else Op.OR)
+        else:
+            self._chosen(code, node, form, op)
 
-    def _fits(self, node: Value, size: int) -> int:
-        if size > MAX_MAGNITUDE:
-            self._too_large(node)
-            return 0
-        return size
+    def _chosen(self, code: Code, node: Node, form: Choice, op: Op) -> None:
+        connect = Op.AND if form.most == (op in (Op.LT, Op.LE)) else Op.OR
+        for number, each in enumerate(form.among):
+            self._parts(code, node, each, op)
+            if number:
+                code.add(connect)
 
-    def _too_large(self, node: Value) -> None:
+    def _emit(self, code: Code, node: Node, left: Linear, op: Op, right: Linear) -> None:
+        """`left op right`, multiplied by the positive number that makes all factors whole and as small as can be."""
+        numbers = [*left.terms.values(), left.constant, *right.terms.values(), right.constant]
+        whole = lcm(*(number.denominator for number in numbers))
+        common = gcd(*(int(number * whole) for number in numbers)) or 1
+        factor = Fraction(whole, common)
+        factors, constants = 0, 0
+        for side in (left, right):
+            terms = {variable: int(each * factor) for variable, each in side.terms.items()}
+            constant = int(side.constant * factor)
+            _push(code, terms, constant)
+            factors += sum(map(abs, terms.values()))
+            constants = max(constants, abs(constant))
+        code.add(op)
+        if constants > MAX_VALUE or factors * MAX_VALUE + 2 * constants > MAX_MAGNITUDE:
+            self._too_large(node, factors)
+
+    def _too_large(self, node: Node, factors: int) -> None:
+        most = MAX_MAGNITUDE // MAX_VALUE
         self._report.add(
             codes.NUMBER_SIZE,
             node.span,
-            f"`{self._report.text(node.span)}` may be larger than what is computed with on board",
-            help="compare smaller multiples",
+            f"`{self._report.text(node.span)}` may need a number that is larger than what is computed with on board",
+            help=f"made whole together, its factors add up to {factors:,}, and at most {most} fit: use rounder ones"
+            if factors > most
+            else "compare smaller numbers",
         )
 
 
-def _constant(node: Value) -> int | None:
-    """The number that literals make, or None."""
-    if isinstance(node, Quantity):
-        return node.value
-    if isinstance(node, Arithmetic):
-        left, right = _constant(node.left), _constant(node.right)
-        if left is not None and right is not None:
-            return left + right if node.operator == "+" else left - right if node.operator == "-" else left * right
-    return None
+def _push(code: Code, terms: Mapping[Variable, int], constant: int) -> None:
+    """The sum of some terms and a constant."""
+    first = True
+    for variable, factor in terms.items():
+        code.add(Op.ARGUMENT if variable.argument else Op.SIGNAL, variable.at)
+        if factor != 1:
+            code.add(Op.SCALE, factor)
+        if not first:
+            code.add(Op.ADD)
+        first = False
+    if constant or first:
+        code.add(Op.CONST, constant)
+        if not first:
+            code.add(Op.ADD)

@@ -1,26 +1,40 @@
-"""Grown and shrunk zones, snapped to whole millimetres on the safe side.
+"""Grown and shrunk zones in whole millimetres, on the safe side.
 
 `inner(shape, margin)` never has a point that the true set lacks, `outer` lacks none that it has; a positive margin
-grows, a negative one shrinks. Convex polygons are offset in integers, all others by shapely (floats, whose corners are
-rounded); either way the result is proved in integers, with more slack where the proof fails.
+grows, a negative one shrinks. Convex polygons have their edges moved (`convex`), and the result is proved; all others
+are grown and shrunk by a polygon that lies within the disc of the margin, or around it (`convolution`), by a few mm
+less or more than what rounding may have moved. What may fall into parts or enclose holes does.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 
-from rtshcua.ground.checker.polygons import contains, counter_clockwise, crossing, doubled_area
-from rtshcua.ground.compiler import convex
+from rtshcua.ground.checker.polygons import crossing, doubled_area
+from rtshcua.ground.compiler import convex, convolution
+from rtshcua.ground.compiler.arrangement import TooManyPieces
 from rtshcua.ground.compiler.distance import Edge, apart, within
-from rtshcua.ground.compiler.shapes import Disc, Outline, Point, Shape, edges
+from rtshcua.ground.compiler.overlay import PULLED, ROUNDED, ROUNDS, Outlined, without_straight
+from rtshcua.ground.compiler.rounds import COARSE, ROUGH, around_disc, within_disc
+from rtshcua.ground.compiler.shapes import (
+    Cornered,
+    Disc,
+    Outline,
+    Point,
+    Shape,
+    contains,
+    cornered,
+    edges,
+)
+from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
-#: corners that a round corner of a quarter turn gets
-QUARTER = 4
-MITRE_LIMIT = 2.0
 #: rounding moves a corner by at most 0.71 mm, hence an edge too
 SNAP_MM = 2
+MANY_CORNERS = 128
+#: what an outline may have been moved by, and a millimetre more, mm
+_SLACKS = (ROUNDED + 1, PULLED + 1, ROUNDS * PULLED + 1)
 
 
 class Unshapely(Exception):
-    """The result is no simple polygon: `reason` is `nothing`, `parts`, `holes`, `unproved`, or `far`."""
+    """There is no such zone: `reason` is `nothing`, `unproved`, `corners`, or `far`."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -33,9 +47,17 @@ def inner(shape: Shape, margin: int) -> Shape:
         return shape
     if isinstance(shape, Disc):
         return _disc(shape, margin)
+    if _is_convex(shape):
+        return _convex_inner(shape, margin)
+    fine = _fineness(shape)
     if margin > 0:
-        return _search(shape, lambda slack: (margin - slack, "round"), lambda made: _near(made, shape, margin))
-    return _search(shape, lambda slack: (margin - slack, "mitre"), lambda made: _clear(made, shape, -margin, shape))
+        if margin <= _SLACKS[-1]:
+            return shape
+        return _made(lambda slack: convolution.grown(shape, within_disc((0, 0), margin - slack, fine)))
+    return _made(
+        lambda slack: convolution.shrunk(shape, around_disc(slack - margin, fine)),
+        lambda made: _clear(made, shape, -margin),
+    )
 
 
 def outer(shape: Shape, margin: int) -> Shape:
@@ -44,11 +66,17 @@ def outer(shape: Shape, margin: int) -> Shape:
         return shape
     if isinstance(shape, Disc):
         return _disc(shape, margin)
+    if _is_convex(shape):
+        return _convex_outer(shape, margin)
+    fine = _fineness(shape)
     if margin > 0:
-        return _search(
-            shape, lambda slack: (margin + slack, "mitre"), lambda made: _clear(shape, made, margin, made), fill=True
+        return _made(
+            lambda slack: convolution.grown(shape, around_disc(margin + slack, fine)),
+            lambda made: _clear(shape, made, margin),
         )
-    return _search(shape, lambda slack: (margin + slack, "round"), lambda made: _near(made, shape, -margin))
+    if -margin <= _SLACKS[-1]:
+        return shape
+    return _made(lambda slack: convolution.shrunk(shape, within_disc((0, 0), -margin - slack, fine)))
 
 
 def _disc(shape: Disc, margin: int) -> Disc:
@@ -58,74 +86,75 @@ def _disc(shape: Disc, margin: int) -> Disc:
     return Disc(shape.center, radius)
 
 
-def _search(
-    shape: Outline,
-    settings: Callable[[int], tuple[int, str]],
-    proved: Callable[[Outline], bool],
-    *,
-    fill: bool = False,
-) -> Outline:
-    """The first offset, of growing slack, that integers prove; GEOS simplifies its input by up to a hundredth."""
-    margin = abs(settings(0)[0])
+def _fineness(shape: Cornered) -> int:
+    """How fine the margin's disc is drawn: every corner of a zone may get an arc of it."""
+    return COARSE if sum(map(len, shape.rings)) <= MANY_CORNERS else ROUGH
+
+
+def _made(make: Callable[[int], Outlined | None], proved: Callable[[Cornered], bool] = lambda _: True) -> Cornered:
+    """The first result that was moved by less than the slack that it was made with, and is proved."""
+    for slack in _SLACKS:
+        try:
+            made = make(slack)
+        except TooManyPieces as error:
+            raise Unshapely("unproved") from error
+        if made is None or made.moved >= slack:
+            continue
+        if not made.rings:
+            raise Unshapely("nothing")
+        if len(made.rings) > MAX_RINGS or sum(map(len, made.rings)) > MAX_VERTICES:
+            raise Unshapely("corners")
+        shape = cornered(made.rings)
+        if proved(shape):
+            return shape
+    raise Unshapely("unproved")
+
+
+# --------------------------------------------------------------------------------------------------------- convex
+
+
+def _is_convex(shape: Cornered) -> bool:
+    return isinstance(shape, Outline) and convex.is_convex(shape)
+
+
+def _convex_inner(shape: Cornered, margin: int) -> Outline:
+    assert isinstance(shape, Outline)
+    if margin > 0:
+        return _search(margin, lambda far: convex.rounded(shape, far), lambda made: _near(made, shape, margin), -1)
+    return _search(-margin, lambda far: convex.shrunk(shape, far), lambda made: _clear(made, shape, -margin), 1)
+
+
+def _convex_outer(shape: Cornered, margin: int) -> Outline:
+    assert isinstance(shape, Outline)
+    if margin > 0:
+        return _search(margin, lambda far: convex.mitred(shape, far), lambda made: _clear(shape, made, margin), 1)
+    return _search(-margin, lambda far: convex.shrunk(shape, far), lambda made: _near(made, shape, -margin), -1)
+
+
+def _search(margin: int, make: Callable[[int], list[Point]], proved: Callable[[Outline], bool], sign: int) -> Outline:
+    """The first offset, of growing slack, that integers prove."""
     for slack in (SNAP_MM, SNAP_MM + margin // 64, SNAP_MM + margin // 16):
-        made = _offset(shape, *settings(slack), fill=fill)
+        kept = without_straight(make(margin + sign * slack))
+        if not kept or doubled_area(kept) == 0:
+            raise Unshapely("nothing")
+        first = kept.index(min(kept))
+        made = Outline((*kept[first:], *kept[:first]))
         if crossing(made.corners) is None and proved(made):
             return made
     raise Unshapely("unproved")
 
 
-def _offset(shape: Outline, distance: int, join: str, *, fill: bool) -> Outline:
-    """The polygon grown or shrunk by `distance`, its corners rounded to whole millimetres."""
-    if not convex.is_convex(shape):
-        return _buffered(shape, distance, join, fill=fill)
-    if distance < 0:
-        return _outline(convex.shrunk(shape, -distance))
-    return _outline(convex.rounded(shape, distance) if join == "round" else convex.mitred(shape, distance))
+# ------------------------------------------------------------------------------------------------------- proofs
 
 
-def _buffered(shape: Outline, distance: int, join: str, *, fill: bool) -> Outline:
-    """Shapely's buffer."""
-    import shapely  # noqa: PLC0415  a third of a second, for the few sources that need it
+def _clear(small: Cornered, large: Cornered, margin: int) -> bool:
+    """Whether `small` lies in `large` and their boundaries are at least `margin` apart everywhere.
 
-    made = shapely.Polygon(shape.corners).buffer(distance, quad_segs=QUARTER, join_style=join, mitre_limit=MITRE_LIMIT)
-    if made.is_empty:
-        raise Unshapely("nothing")
-    if made.geom_type != "Polygon":
-        raise Unshapely("parts")
-    if made.interiors and not fill:
-        raise Unshapely("holes")
-    return _outline([(round(x), round(y)) for x, y in made.exterior.coords[:-1]])
-
-
-def _outline(corners: Sequence[Point]) -> Outline:
-    kept = _without_straight(corners)
-    if len(kept) < 3 or doubled_area(kept) == 0:
-        raise Unshapely("nothing")
-    turned = counter_clockwise(kept)
-    first = turned.index(min(turned))
-    return Outline((*turned[first:], *turned[:first]))
-
-
-def _without_straight(corners: Sequence[Point]) -> list[Point]:
-    """The corners without repetitions, and without those on a straight line between their neighbours."""
-    kept: list[Point] = []
-    for corner in corners:
-        if not kept or kept[-1] != corner:
-            kept.append(corner)
-    while len(kept) > 1 and kept[0] == kept[-1]:
-        kept.pop()
-    if len(kept) < 3:
-        return kept
-    return [
-        b
-        for a, b, c in zip([kept[-1], *kept[:-1]], kept, [*kept[1:], kept[0]], strict=True)
-        if (b[0] - a[0]) * (c[1] - b[1]) != (b[1] - a[1]) * (c[0] - b[0])
-    ]
-
-
-def _clear(small: Outline, large: Outline, margin: int, around: Outline) -> bool:
-    """Whether `small` lies in `large` and their boundaries are at least `margin` apart everywhere."""
-    if not contains(around.corners, small.corners[0]):
+    A ring that meets no boundary of the other area is all inside of it or all outside, so one corner of each tells.
+    """
+    if not all(contains(large, ring[0]) for ring in small.rings):
+        return False
+    if any(contains(small, ring[0]) for ring in large.rings):
         return False
     return all(apart(one, other, margin) for one, other in _close_pairs(edges(small), edges(large), margin))
 

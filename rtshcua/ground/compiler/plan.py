@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.compiler.shapes import Area, parts
 from rtshcua.ground.compiler.survey import survey
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import MAX_PATH
@@ -64,11 +65,17 @@ def _covered(
     start = None if zone.entry is None else under.zones.place(zone.entry)
     points = survey(region.shape, pattern, altitude, under.policy.vehicle.position_error, start)
     if points is None:
+        shape = region.shape
+        several = len(parts(shape)) if isinstance(shape, Area) else 1
         context.report.add(
             codes.AREA_TOO_SMALL,
             step.span,
-            f"`{zone.name.text}` is too small or too bent for a `{pattern}` path",
-            help="the path keeps the vehicle's position error away from the edge; a `perimeter` needs the least room",
+            f"`{zone.name.text}` is in {several} parts, and a path lies in one"
+            if several > 1
+            else f"`{zone.name.text}` is too small or too bent for a `{pattern}` path",
+            help="declare each part as a zone, and fly over one after the other"
+            if several > 1
+            else "the path keeps the vehicle's position error away from the edge; a `perimeter` needs the least room",
             labels=[(zone.name.span, "declared here")],
         )
         return None

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.conditions import POSITION_SIGNAL
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.places import POSITION_SIGNAL
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, Type
 from rtshcua.ground.compiler.belonging import belongs
@@ -21,9 +21,10 @@ from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.ground.compiler.rules import Rules
 from rtshcua.ground.compiler.slots import Slots
 from rtshcua.ground.compiler.zones import ZoneTable
-from rtshcua.model.flat.policy import Airspace, Policy, Vehicle
-from rtshcua.model.ir.places import VehicleDecl
+from rtshcua.model.flat.policy import Airspace, Policy, Rule, Vehicle
+from rtshcua.model.ir.places import GeoJson, VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import Rule as RuleDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
 #: the signals that every decision reads, in the order of their slots: where the vehicle is, how high, how much energy
@@ -45,6 +46,9 @@ class LoweredPolicy:
     zones: ZoneTable
     contracts: Contracts
     files: Files
+    conditions: Conditions
+    slots: Slots
+    written: Mapping[Rule, RuleDecl]  # each flat rule's declaration
 
 
 def lower_policy(
@@ -64,14 +68,19 @@ def lower_policy(
     declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
     for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in WELL_KNOWN), *skills):
         table.index(part.span.file)  # all that the policy rests on is named, quoted or not
-    zones = ZoneTable(projection_at(vehicle.home.latitude, vehicle.home.longitude), declared, context.report)
+    for zone in declared:
+        read = context.data.name(zone.shape) if isinstance(zone.shape, GeoJson) else None
+        if read is not None:
+            table.index(read)
+    projection = projection_at(vehicle.home.latitude, vehicle.home.longitude)
+    zones = ZoneTable(projection, declared, context.report, vehicle, context.data)
     conditions = Conditions(context, slots, zones, table)
     flat_vehicle = _vehicle(vehicle, position, height, battery)
     numbers = {skill.name.text: number for number, skill in enumerate(skills)}
     contracts = Contracts(context, numbers, conditions, zones, table, flat_vehicle)
     roles = _roles(policy)
     lowered = [contracts.contract(skill) for skill in skills]
-    rules = Rules(context, numbers, roles, conditions, contracts, table).lowered(policy)
+    lowered_rules = Rules(context, numbers, roles, conditions, contracts, table).lowered(policy)
     contingency = contracts.chain(policy.contingency)
     airspace = _airspace(policy, zones, table)
     if len(context.report.found) > before:
@@ -87,18 +96,22 @@ def lower_policy(
         zones=zones.flat(),
         declared=len(zones.regions),
         tables=tuple(zones.tables),
-        sets=tuple(conditions.sets),
+        sets=tuple(conditions.sets.all),
         contracts=tuple(lowered),
-        rules=rules,
+        rules=tuple(rule for rule, _ in lowered_rules),
         airspace=airspace,
         contingency=contingency,
         sources=table.names,
         source_digests=table.digests,
+        monitors=tuple(conditions.monitors.all),
+        phases=tuple(conditions.sets.phases),
     )
     if not fits(context, policy, flat):
         return None
     by_name = {role: number for number, role in enumerate(roles)}
-    return LoweredPolicy(flat, policy, vehicle, numbers, by_name, zones, contracts, table)
+    return LoweredPolicy(
+        flat, policy, vehicle, numbers, by_name, zones, contracts, table, conditions, slots, dict(lowered_rules)
+    )
 
 
 def _skills(context: Context, policy: PolicyDecl, files: frozenset[str]) -> list[SkillDecl]:
@@ -153,8 +166,8 @@ def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | 
         return None
     text, source, start, end = files.place(airspace.span)
     return Airspace(
-        inside=tuple(sorted(zones.index[name.text] for name in airspace.inside)),
-        outside=tuple(sorted(zones.index[name.text] for name in airspace.outside)),
+        inside=tuple(sorted(zones.zone(name.text, 0, smaller=True, span=name.span) for name in airspace.inside)),
+        outside=tuple(sorted(zones.zone(name.text, 0, smaller=False, span=name.span) for name in airspace.outside)),
         text=text,
         source=source,
         start=start,

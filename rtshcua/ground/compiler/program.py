@@ -1,21 +1,27 @@
 """A whole program: check every declaration, lower every policy and mission, and hand out the one that was asked for."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.check import check_declarations
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.lookup import find_mission
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect
+from rtshcua.ground.checker.uses import with_uses
+from rtshcua.ground.compiler.bounds import Bounds, bounds_of, most
 from rtshcua.ground.compiler.closure import Imports, beside
 from rtshcua.ground.compiler.mission import lower_mission
-from rtshcua.ground.compiler.policy import lower_policy
+from rtshcua.ground.compiler.policy import LoweredPolicy, lower_policy
 from rtshcua.ground.compiler.proofs.prove import prove_mission, prove_policy
 from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.elaborate.elaborate import elaborate
+from rtshcua.ground.elaborate.settings import Settings
 from rtshcua.ground.language.load import Program
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -29,62 +35,115 @@ FILE_CODES = frozenset({codes.NO_SUCH_FILE, codes.NOT_TEXT, codes.TOO_LARGE, cod
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A flat policy and mission, both None where there are errors; the mission is not yet bound to the policy."""
+    """A flat policy and mission, both None where there are errors; the mission is not yet bound to the policy.
+
+    `bounds` is what the mission takes at most; `sources` are the texts that findings speak of, the program's and what
+    was given for the mission's parameters.
+    """
 
     policy: Policy | None
     mission: Mission | None
     diagnostics: tuple[Diagnostic, ...]
+    bounds: Bounds | None = None
+    sources: Mapping[str, Source] = field(default_factory=dict)
 
 
-def compile_program(program: Program, dialect: Dialect, *, mission: str | None, issued_at_us: int) -> Compiled:
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """All findings on a program, and by name what each mission takes at most, with any values of its parameters;
+    without errors also its policies, for each vehicle that it has missions for.
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    bounds: Mapping[str, Bounds]
+    policies: tuple[LoweredPolicy, ...] = ()
+
+
+def compile_program(
+    program: Program, dialect: Dialect, *, mission: str | None, issued_at_us: int, settings: Settings | None = None
+) -> Compiled:
     """Compile one mission (None: the only one of the file that was asked for) and the policy that it is under.
 
-    All declarations are checked, and all missions. Never raises for what the sources say.
+    `settings` are values for that mission's parameters. All declarations are checked, and all missions. Never raises
+    for what the sources say.
     """
-    run = _Run(program, dialect, issued_at_us)
+    settings = settings or Settings()
+    candidates = _candidates(program)
+    name = mission if mission is not None or len(candidates) != 1 else candidates[0].name.text
+    run = _Run(program, dialect, issued_at_us, name, settings)
     run.check()
     chosen = run.choose(mission)
     compiled = run.lowered(chosen)
-    policy, flat = (None, None) if compiled is None or run.report.failed() else compiled
-    return Compiled(policy, flat, run.diagnostics())
+    found = run.diagnostics()
+    if compiled is None or run.report.failed() or chosen is None:
+        return Compiled(None, None, found, None, run.report.sources)
+    return Compiled(*compiled, found, run.bounds.get(chosen.name.text), run.report.sources)
 
 
 def check_program(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
     """All findings on a program, which need not have a mission."""
+    return examine_program(program, dialect).diagnostics
+
+
+def examine_program(program: Program, dialect: Dialect) -> Checked:
+    """All findings on a program, and the bounds of its missions."""
     run = _Run(program, dialect, 0)
     run.check()
     run.lowered(None)
-    return run.diagnostics()
+    if run.report.failed():
+        return Checked(run.diagnostics(), {})
+    return Checked(run.diagnostics(), run.bounds, tuple(each.lowered for each in run.grounds()))
+
+
+def _candidates(program: Program) -> list[MissionDecl]:
+    """The missions of which one is meant where none is named: those of the first file, or else all."""
+    first = list(program.units[0].missions) if program.units else []
+    return first or [mission for unit in program.units for mission in unit.missions]
 
 
 class _Run:
     """One compilation."""
 
-    def __init__(self, program: Program, dialect: Dialect, issued_at_us: int) -> None:
+    def __init__(
+        self,
+        program: Program,
+        dialect: Dialect,
+        issued_at_us: int,
+        chosen: str | None = None,
+        settings: Settings | None = None,
+    ) -> None:
         self.program = program
         self.issued_at_us = issued_at_us
-        self.report = Report(program.sources)
+        given = settings or Settings()
+        options = {given.source.file: given.source} if given.source.text else {}
+        self.report = Report({**program.sources, **options}, program.data)
         self.report.found += program.diagnostics
-        self.context = Context(collect(program.units, program.broken), self.report, dialect)
+        self.bounds: dict[str, Bounds] = {}
+        self.whole = not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], Ground | None] = {}
+        data = DataFiles(program.data, program.data_names)
+        self.context = Context(collect(program.units, program.broken), self.report, dialect, data=data)
+        if self.whole:
+            plain = elaborate(self.context, program.units, self._imports.closure, chosen, given)
+            symbols = collect(plain.units, program.broken)
+            instances, samples = plain.instances, plain.samples
+            self.context = Context(symbols, self.report, dialect, instances=instances, samples=samples, data=data)
 
     def check(self) -> None:
         """Check all declarations; where a file is missing altogether, half of all names would be unknown."""
-        if not any(found.code in FILE_CODES for found in self.program.diagnostics):
+        if self.whole:
             check_declarations(self.context)
 
     def choose(self, name: str | None) -> MissionDecl | None:
         """The mission that was asked for; None, and reported, where there is not exactly one."""
-        missions = self.context.symbols.missions
-        if any(found.code in FILE_CODES for found in self.program.diagnostics):
+        if not self.whole:
             return None
         if name is not None:
             return find_mission(self.context, name)
-        first = self.program.units[0].missions if self.program.units else ()
-        candidates = list(first) or list(missions.values())
+        candidates = _candidates(self.program)
         if len(candidates) == 1:
-            return candidates[0]
+            return self.context.symbols.missions.get(candidates[0].name.text)
         if not self.context.symbols.broken and not (self.report.failed() and not candidates):
             names = ", ".join(f"`{each.name.text}`" for each in candidates)
             self.report.add(
@@ -100,7 +159,10 @@ class _Run:
         if self.report.failed():
             return None
         found: tuple[Policy, Mission] | None = None
-        for mission in self.context.symbols.missions.values():
+        symbols = self.context.symbols
+        for mission in symbols.missions.values():  # first, so that no finding on a policy is one on a mission's values
+            self._policy(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
+        for mission in self.context.missions():
             flat = self._mission(mission)
             if mission is chosen:
                 found = flat
@@ -116,17 +178,26 @@ class _Run:
             span = found.span
             return (-1, Span("", 0, 0)) if span is None else (order.get(span.file, len(order)), span)
 
-        return tuple(dict.fromkeys(sorted(self.report.found, key=place)))
+        merged = [with_uses(found, self.context.symbols) for found in self.report.merged()]
+        return tuple(dict.fromkeys(sorted(merged, key=place)))
+
+    def grounds(self) -> list[Ground]:
+        """The policies that were lowered."""
+        return [ground for ground in self._policies.values() if ground is not None]
 
     def _mission(self, mission: MissionDecl) -> tuple[Policy, Mission] | None:
         symbols = self.context.symbols
         under = self._policy(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
         if under is None:
             return None
-        flat = lower_mission(self.context, mission, under.lowered, self.program.stable, self.issued_at_us)
-        if flat is None:
+        lowered = lower_mission(self.context, mission, under.lowered, self.program.stable, self.issued_at_us)
+        if lowered is None:
             return None
+        under = replace(under, lowered=replace(under.lowered, files=lowered.files))
+        flat = lowered.mission
         prove_mission(under, mission, flat)
+        bounds = bounds_of(under, mission, flat)
+        self.bounds[mission.name.text] = most(bounds, self.bounds.get(mission.name.text))
         return under.lowered.policy, flat
 
     def _unused(self, policy: PolicyDecl) -> None:
@@ -144,7 +215,7 @@ class _Run:
             files = self._imports.closure(policy.span.file)
             stable = self.program.stable
             own = stable.get(policy.span.file, policy.span.file)
-            names = {file: beside(stable.get(file, file), own) for file in files}
+            names = {file: beside(stable.get(file, file), own) for file in (*files, *self.program.data)}
             lowered = lower_policy(self.context, policy, vehicle, files, names)
             self._policies[key] = None if lowered is None else prove_policy(self.context, lowered)
         return self._policies[key]

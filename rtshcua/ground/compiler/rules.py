@@ -1,16 +1,22 @@
 """The rules of a policy to the flat form, one for each layout of the arguments that it reads."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+
+from msgspec.structs import replace
 
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.checker.uses import brought_about
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.contracts import Contracts, cells_of
-from rtshcua.ground.compiler.files import Files
+from rtshcua.ground.compiler.files import Files, shortened
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import Rule, RuleKind
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.expression import Condition, Junction
+from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.policies import Delegation, PolicyDecl
 from rtshcua.model.ir.policies import Rule as RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 
@@ -34,9 +40,15 @@ class Rules:
         self._contracts = contracts
         self._files = files
 
-    def lowered(self, policy: PolicyDecl) -> tuple[Rule, ...]:
-        """All rules in source order; one whose skills keep its arguments in different cells becomes several."""
-        return tuple(flat for rule in policy.rules for flat in self._rule(rule))
+    def lowered(self, policy: PolicyDecl) -> tuple[tuple[Rule, RuleDecl], ...]:
+        """All rules in source order, with their declarations; one whose skills keep its arguments in different cells
+        becomes several.
+        """
+        found: list[tuple[Rule, RuleDecl]] = []
+        for rule in policy.rules:
+            with self._context.report.within(brought_about(rule)):
+                found += [(flat, rule) for flat in self._rule(rule)]
+        return tuple(found)
 
     def _rule(self, rule: RuleDecl) -> Iterable[Rule]:
         if not rule.skills:
@@ -59,21 +71,47 @@ class Rules:
         place = Place(
             Scope(self._context.symbols, self._context.report, arguments), cells, strict=kind is RuleKind.PERMIT
         )
-        text, source, start, end = self._files.place(rule.span)
+        _, source, start, end = self._files.place(rule.span)
         return Rule(
             kind=int(kind),
             skills=tuple(sorted({self._numbers[skill.name.text] for skill in skills})),
             roles=tuple(sorted({self._roles[role.text] for role in rule.roles})),
             sources=_sources(rule, kind),
-            when=None if rule.when is None else self._conditions.clause(rule.when, place),
+            when=None if rule.when is None else self._when(rule.when, rule, place),
             approver=-1 if rule.approver is None else self._roles[rule.approver.text],
             within_us=0 if rule.within is None else rule.within.value,
             target=None if rule.target is None else self._contracts.link(rule.target),
-            text=text,
+            text=shortened(": ".join(self._quoted(node) for node in (*rule.origin, rule))),
             source=source,
             start=start,
             end=end,
         )
+
+    def _when(self, when: Condition, rule: RuleDecl, place: Place) -> Clause:
+        """The condition of a rule; that of a delegated one is quoted with all that was added to it."""
+        clause = self._conditions.clause(when, place)
+        if not any(isinstance(node, Delegation) for node in rule.origin) or not isinstance(when, Junction):
+            return clause
+        texts = (
+            f"({text})" if _is_choice(part) else text for part in _delegated(when) for text in [self._quoted(part)]
+        )
+        return replace(clause, text=shortened(" and ".join(texts)))
+
+    def _quoted(self, node: Node) -> str:
+        return self._context.report.text(node.span)
+
+
+def _is_choice(condition: Condition) -> bool:
+    return isinstance(condition, Junction) and condition.operator == "or"
+
+
+def _delegated(when: Condition) -> Iterator[Condition]:
+    """What a permit and its delegations say, in the order in which they were put together."""
+    if isinstance(when, Junction) and when.span == when.operands[-1].span:  # made, not written
+        yield from _delegated(when.operands[0])
+        yield when.operands[-1]
+    else:
+        yield when
 
 
 def _sources(rule: RuleDecl, kind: RuleKind) -> tuple[int, ...]:

@@ -1,41 +1,66 @@
 """The zones of a policy: declared ones in the local plane, and those derived from them for its conditions.
 
-`grow(zone, margin)` works on the ground plan; floor and ceiling stay. Where a condition permits or must hold, the
-derived zone is never too large; where it forbids, never too small.
+`grow(zone, margin)` works on the ground plan; floor, ceiling and times stay. Where a condition permits or must hold,
+the derived zone is never too large; where it forbids, never too small. A band above sea is converted by the elevation
+of home. Where that is known to within an error only, the zone that a condition asks for is derived too: its band is
+narrower by the error, or wider.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import msgspec
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.polygons import counter_clockwise, crossing
+from rtshcua.ground.checker.checks.zones import entry_outside
+from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.report import Report
+from rtshcua.ground.compiler.ground_plan import GroundPlans
+from rtshcua.ground.compiler.heights import Heights
 from rtshcua.ground.compiler.offset import Unshapely, inner, outer
 from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.compiler.shapes import Disc, Outline, Point, Region, bounds
-from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Projection, Zone, project
+from rtshcua.ground.compiler.shapes import Disc, Point, Region, Shape, bounds, contains
+from rtshcua.ground.compiler.vectors import square
+from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Projection, Zone
 from rtshcua.model.ir.expression import Coordinates
-from rtshcua.model.ir.places import Circle, ZoneDecl
+from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.quantity import Dimension, display
 
 #: a zone that nothing is inside of, for it has no height, and one that everything is inside of
 NOWHERE = Zone("nowhere", CIRCLE, LOWEST, LOWEST, (0, 0, 1))
 EVERYWHERE = Zone("everywhere", CIRCLE, LOWEST, HIGHEST, (0, 0, MAX_COORDINATE * MAX_COORDINATE))
+#: stands for a zone that has no ground plan, after a finding
+_UNKNOWN = Disc((0, 0), 1)
 
 
 class ZoneTable:
     """Zones by name and index; asking for a derived one makes it."""
 
-    def __init__(self, projection: Projection, declared: Sequence[ZoneDecl], report: Report) -> None:
+    def __init__(
+        self,
+        projection: Projection,
+        declared: Sequence[ZoneDecl],
+        report: Report,
+        vehicle: VehicleDecl | None = None,
+        data: DataFiles | None = None,
+    ) -> None:
         self.projection = projection
         self._report = report
         self._declarations = tuple(declared)
         self.index: Mapping[str, int] = {zone.name.text: number for number, zone in enumerate(declared)}
-        self.regions = [self._region(zone) for zone in declared]
+        by_name = {zone.name.text: zone for zone in declared}
+        self._plans = GroundPlans(projection, by_name, data or DataFiles(), report)
+        self._heights = Heights(vehicle, report)
+        self._broken: set[int] = set()
+        self.regions = [self._region(number, zone) for number, zone in enumerate(declared)]
         self.derived: list[Zone] = []
         self.tables: list[tuple[int, ...]] = []
         self._derived: dict[tuple[int, int, bool], int] = {}
         self._tables: dict[tuple[int, bool], int] = {}
+        self._dated: dict[tuple[int, ...], int] = {}
 
     def flat(self) -> tuple[Zone, ...]:
         """All zones, the declared ones first."""
@@ -44,21 +69,12 @@ class ZoneTable:
 
     def place(self, coordinates: Coordinates) -> Point | None:
         """A place in the local plane; None, and reported, where it is too far from home."""
-        x, y = project(self.projection, coordinates.latitude, coordinates.longitude)
-        if max(abs(x), abs(y)) <= MAX_COORDINATE:
-            return x, y
-        self._report.add(
-            codes.TOO_FAR,
-            coordinates.span,
-            "this place is more than 500 km from the vehicle's home",
-            help="are latitude and longitude the right way round?",
-        )
-        return None
+        return self._plans.place(coordinates)
 
     def zone(self, name: str, margin: int, *, smaller: bool, span: Span) -> int:
         """The index of a declared zone grown by `margin` mm, or shrunk; `smaller` says which side is the safe one."""
         number = self.index[name]
-        if margin == 0:
+        if margin == 0 and self.regions[number].sure():
             return number
         key = (number, margin, smaller)
         found = self._derived.get(key)
@@ -77,59 +93,80 @@ class ZoneTable:
         return found
 
     def within(self, name: str, margin: int, *, smaller: bool, span: Span) -> tuple[int, ...]:
-        """The declared zones that lie within a zone grown by `margin`."""
-        outer_region = self.region(name, margin, smaller=smaller, span=span)
-        return self._which(lambda region: outer_region is not None and lies_within(region, outer_region))
+        """The declared zones that lie within a zone grown by `margin` while it exists: where `smaller`, those that
+        surely do, else those that may.
+        """
+        outside = self.region(name, margin, smaller=smaller, span=span)
+        if outside is None:
+            return ()
+        return self._which(lambda region: lies_within(region, outside, surely=smaller))
 
     def disjoint(self, name: str, margin: int, *, smaller: bool, span: Span) -> tuple[int, ...]:
-        """The declared zones that have no point in common with a zone grown by `margin`."""
+        """The declared zones that have no point in common with a zone grown by `margin`, even while it exists: where
+        `smaller`, those that may have none, else those that surely have none.
+        """
         other = self.region(name, margin, smaller=smaller, span=span)
-        return self._which(lambda region: other is None or have_nothing_in_common(region, other))
+        if other is None:
+            return tuple(range(len(self.regions)))
+        return self._which(lambda region: have_nothing_in_common(region, other, surely=not smaller))
 
     def region(self, name: str, margin: int, *, smaller: bool, span: Span) -> Region | None:
         """A declared zone grown by `margin`, as a region of the plane; None, and reported, where nothing is left."""
         number = self.index[name]
-        region = self.regions[number]
+        if number in self._broken:
+            return None
         try:
-            return _grown(region, margin, smaller=smaller)
+            return _grown(self.regions[number], margin, smaller=smaller)
         except Unshapely as unshapely:
             self._unshapely(unshapely, number, margin, span)
             return None
 
+    def times(self, name: str) -> Iterator[tuple[Op, int, int]]:
+        """Instructions that are true while a declared zone exists; none for one that always does."""
+        region = self.regions[self.index[name]]
+        if region.daily:
+            start, end = region.daily
+            yield Op.TIME_IN, start, end
+        if region.dates:
+            found = self._dated.get(region.dates)
+            if found is None:
+                zone = msgspec.structs.replace(EVERYWHERE, dates=region.dates)
+                found = self._dated[region.dates] = self._add(zone)
+            yield Op.POSITION_IN, found, 0
+
     def _which(self, holds: Callable[[Region], bool]) -> tuple[int, ...]:
         return tuple(number for number, region in enumerate(self.regions) if holds(region))
 
-    def _region(self, zone: ZoneDecl) -> Region:
-        shape = zone.shape
-        floor = LOWEST if zone.floor is None else zone.floor.value
-        ceiling = HIGHEST if zone.ceiling is None else zone.ceiling.value
-        if isinstance(shape, Circle):
-            center = self.place(shape.center) or (0, 0)
-            return Region(Disc(center, shape.radius.value), floor, ceiling)
-        corners = [self.place(corner) or (0, 0) for corner in shape.corners]
-        if crossing(corners) is not None and not self._report.failed():
-            self._report.add(
-                codes.BAD_POLYGON,
-                zone.name.span,
-                f"the edges of `{zone.name.text}` touch each other when its corners are rounded to millimetres",
-            )
-        return Region(Outline(tuple(counter_clockwise(corners))), floor, ceiling)
+    def _region(self, number: int, zone: ZoneDecl) -> Region:
+        shape = self._plans.of(zone)
+        if shape is None:
+            self._broken.add(number)
+            shape = _UNKNOWN
+        elif zone.entry is not None:
+            entry = self.place(zone.entry)
+            if entry is not None and not _contains(shape, entry):
+                entry_outside(self._report, zone)
+        daily = () if zone.daily is None else (zone.daily.start.value % DAY, zone.daily.end.value)
+        dates = () if zone.dates is None else (zone.dates.start_us, zone.dates.end_us)
+        return Region(shape, *self._heights.band(zone), daily=daily, dates=dates)
 
     def _derive(self, number: int, margin: int, *, smaller: bool, span: Span) -> Zone:
         name = self._declarations[number].name.text
         region = self.region(name, margin, smaller=smaller, span=span)
-        return NOWHERE if region is None else region.flat(derived_name(name, margin))
+        sure = None if region is None else region.banded(smaller=smaller)
+        return NOWHERE if sure is None else sure.flat(derived_name(name, margin, smaller=smaller))
 
     def _entry(self, number: int, margin: int, *, smaller: bool) -> int:
         """Where a zone cannot be derived, the one that fails what asks for it."""
-        if margin == 0:
+        if margin == 0 and self.regions[number].sure():
             return number
         key = (number, margin, smaller)
         found = self._derived.get(key)
         if found is None:
             try:
-                region = _grown(self.regions[number], margin, smaller=smaller)
-                zone = region.flat(derived_name(self._declarations[number].name.text, margin))
+                region = _grown(self.regions[number], margin, smaller=smaller).banded(smaller=smaller)
+                name = derived_name(self._declarations[number].name.text, margin, smaller=smaller)
+                zone = NOWHERE if region is None else region.flat(name)
             except Unshapely as unshapely:
                 zone = NOWHERE if smaller or unshapely.reason == "nothing" else EVERYWHERE
             found = self._derived[key] = self._add(zone)
@@ -149,9 +186,8 @@ class ZoneTable:
             )
             return
         words = {
-            "parts": "it falls into parts",
-            "holes": "it encloses a hole",
             "far": "it reaches further than 500 km from home",
+            "corners": "its outline has more corners than fit on board",
             "unproved": "its outline cannot be proved in whole millimetres",
         }[unshapely.reason]
         self._report.add(
@@ -163,9 +199,17 @@ class ZoneTable:
         )
 
 
-def derived_name(name: str, margin: int) -> str:
-    """How a derived zone is called."""
+def derived_name(name: str, margin: int, *, smaller: bool) -> str:
+    """How a derived zone is called; one that is derived for the band's error alone is `surely` or `possibly` there."""
+    if margin == 0:
+        return f"{'surely' if smaller else 'possibly'}({name})"
     return f"grow({name}, {display(margin, Dimension.LENGTH)})"
+
+
+def _contains(shape: Shape, point: Point) -> bool:
+    if isinstance(shape, Disc):
+        return square(point, shape.center) < shape.radius * shape.radius
+    return contains(shape, point)
 
 
 def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
@@ -173,4 +217,4 @@ def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
     shape = inner(region.shape, margin) if smaller else outer(region.shape, margin)
     if max(map(abs, bounds(shape))) > MAX_COORDINATE:
         raise Unshapely("far")
-    return Region(shape, region.floor, region.ceiling)
+    return replace(region, shape=shape)

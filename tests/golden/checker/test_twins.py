@@ -1,7 +1,8 @@
 """Each code of the checker has twins: two sources that differ in one assumption, which their first line names.
 
 The accepted one is compiled without a finding, the rejected one has findings of that code alone, and what a person
-reads then is kept beside this file. `UPDATE_GOLDENS=1` writes it anew, for a look at the difference.
+reads then is kept beside this file. `UPDATE_GOLDENS=1` writes it anew, for a look at the difference. Habits are looked
+for in their own twins only: all others import one set of skills, whatever of it they use.
 """
 
 import os
@@ -16,6 +17,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.lint.lint import lint
 from rtshcua.mavlink import dialect
 
 HERE = Path(__file__).resolve().parent
@@ -24,9 +26,21 @@ CHECKOUT = TESTS.parent
 #: skills and policies that the twins build on, kept apart from those that ship, which may change
 LIBRARY = "tests/golden/checker/library"
 
+#: how the names of twins begin that are linted
+HABITS = "e13"
+
 REJECTED = sorted(path.name for path in (TESTS / "rejected").iterdir() if path.is_file())
-#: what no small source can bring about: bytes that are no text, size, depth, many findings, a compiler's own fault
-WITHOUT_TWINS = {codes.NOT_TEXT, codes.TOO_LARGE, codes.TOO_DEEP, codes.TOO_MANY_FINDINGS, codes.REFUSED_ON_BOARD}
+#: what no small source can bring about: bytes that are no text, size, depth, many findings, a compiler's own fault; and
+#: what depends on when a mission is issued, or on an earlier policy (tests/unit/ground/versions)
+WITHOUT_TWINS = {
+    codes.NOT_TEXT,
+    codes.TOO_LARGE,
+    codes.TOO_DEEP,
+    codes.TOO_MANY_FINDINGS,
+    codes.REFUSED_ON_BOARD,
+    codes.NOT_ALWAYS_PERMITTED,
+    codes.VERSION_NOT_RAISED,
+}
 
 
 def findings(side: str, name: str) -> tuple[tuple[Diagnostic, ...], dict[str, Source]]:
@@ -45,6 +59,8 @@ def findings(side: str, name: str) -> tuple[tuple[Diagnostic, ...], dict[str, So
         found = compile_program(program, dialect.load(), mission=None, issued_at_us=0).diagnostics
     else:
         found = check_program(program, dialect.load())
+    if name.startswith(HABITS):
+        found += lint(program)
     return found, program.sources
 
 

@@ -2,10 +2,12 @@
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_arguments
+from rtshcua.ground.checker.checks.overrides import check_overrides
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.fields import one_of
+from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_policy, find_skill, find_vehicle
 from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.quantity import Dimension
 
 #: who may propose a mission; the other sources decide on board
 PROPOSERS = ("agent", "operator")
@@ -15,16 +17,17 @@ def check(context: Context) -> None:
     """Report every mission whose parts do not exist."""
     for mission in context.symbols.missions.values():
         _header(context, mission)
-        steps = [step for phase in mission.phases for step in phase.steps]
-        if not steps:
+        if not any(phase.items for phase in mission.phases):
             context.report.add(
                 codes.EMPTY_MISSION,
                 mission.name.span,
                 f"the mission `{mission.name.text}` has no step",
                 help="add a phase with a step, as in `phase recovery { return_home() }`",
             )
-        for step in steps:
-            _step(context, step)
+    for mission in context.missions():
+        for phase in mission.phases:
+            for step in phase.steps:
+                _step(context, step)
 
 
 def _header(context: Context, mission: MissionDecl) -> None:
@@ -39,6 +42,8 @@ def _header(context: Context, mission: MissionDecl) -> None:
             help=f"write `{policy.name.text}@{policy.version}`, if the mission fits the newer policy",
             labels=[(policy.name.span, "the policy is declared here")],
         )
+    quantity(context, mission.most_time, Dimension.DURATION)
+    quantity(context, mission.most_energy, Dimension.RATIO)
     if mission.source is None or mission.role is None:
         context.report.add(
             codes.NO_PROPOSER,
@@ -56,3 +61,5 @@ def _step(context: Context, step: Step) -> None:
         bound = bind_arguments(context, skill, step.arguments, step.span)
         if bound is not None:
             context.bound[id(step)] = bound
+        if step.overrides is not None:
+            check_overrides(context, skill, step.overrides)

@@ -3,8 +3,12 @@
 from collections.abc import Iterable
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.conditions import references
+from rtshcua.ground.checker.context import Context, Parametric
+from rtshcua.ground.checker.scope import PHASE
 from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.policies import TemplateDecl
+from rtshcua.model.ir.skills import SkillDecl
 
 
 def check(context: Context) -> None:
@@ -24,9 +28,10 @@ def check(context: Context) -> None:
         _distinct(context, (member.name for member in enum.members), "enumerator")
         for member in enum.members:
             _hides(context, member.name, "enumerator")
-    for skill in symbols.skills.values():
-        _distinct(context, (parameter.name for parameter in skill.parameters), "parameter")
-        for parameter in skill.parameters:
+    owners: list[SkillDecl | TemplateDecl] = [*symbols.skills.values(), *symbols.templates.values()]
+    for owner in owners:
+        _distinct(context, (parameter.name for parameter in owner.parameters), "parameter")
+        for parameter in owner.parameters:
             _hides(context, parameter.name, "parameter")
             enum_of_name = enumerators.get(parameter.name.text)
             if enum_of_name is not None:
@@ -42,6 +47,53 @@ def check(context: Context) -> None:
                 _hides(context, choice, "choice")
     for mission in symbols.missions.values():
         _distinct(context, (phase.name for phase in mission.phases), "phase")
+        _distinct(context, (parameter.name for parameter in mission.parameters), "parameter")
+        for parameter in mission.parameters:
+            _distinct(context, parameter.choices, "choice")
+            if parameter.name.text not in symbols.signals:  # no argument of a step can be a signal
+                _hides(context, parameter.name, "parameter")
+    for template in symbols.templates.values():
+        _ambiguous(context, template)
+    _called_phase(context)
+
+
+def _ambiguous(context: Context, template: TemplateDecl) -> None:
+    """Report a name in a rule that may be the template's parameter, or the rule's argument."""
+    own = {parameter.name.text: parameter for parameter in template.parameters}
+    for rule in template.rules:
+        skills = [context.symbols.skills[name.text] for name in rule.skills if name.text in context.symbols.skills]
+        for reference in () if rule.when is None else references(rule.when):
+            owner = next((skill for skill in skills if reference.name in context.arguments(skill)), None)
+            if reference.name in own and owner is not None:
+                context.report.add(
+                    codes.SHADOWED_NAME,
+                    reference.span,
+                    f"`{reference.name}` is a parameter of the template, and an argument of `{owner.name.text}`",
+                    help="give the template's parameter another name",
+                    labels=[
+                        (own[reference.name].span, "the template's"),
+                        (context.arguments(owner)[reference.name].declaration.span, f"that of `{owner.name.text}`"),
+                    ],
+                )
+
+
+def _called_phase(context: Context) -> None:
+    """Report a value called `phase`, by which conditions ask for the mission's phase."""
+    symbols = context.symbols
+    names = [signal.name for signal in symbols.signals.values()] + [zone.name for zone in symbols.zones.values()]
+    names += [member.name for enum in symbols.enums.values() for member in enum.members]
+    owners: list[Parametric] = [*symbols.skills.values(), *symbols.templates.values(), *symbols.missions.values()]
+    for owner in owners:
+        for parameter in owner.parameters:
+            names += [parameter.name, *parameter.choices]
+    for name in names:
+        if name.text == PHASE:
+            context.report.add(
+                codes.SHADOWED_NAME,
+                name.span,
+                f"`{PHASE}` is the mission's phase in a condition, so nothing that has a value is called so",
+                help="give it another name",
+            )
 
 
 def _distinct(context: Context, names: Iterable[Name], what: str) -> None:

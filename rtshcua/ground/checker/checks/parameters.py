@@ -2,28 +2,35 @@
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_value
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import Context, Parametric
 from rtshcua.ground.checker.fields import size
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
-from rtshcua.ground.checker.values import typed_range
+from rtshcua.ground.checker.values import whole_range
+from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import Parameter
+
+#: the type of a template's parameter that stands for a role
+ROLE = "role"
 
 
 def check(context: Context) -> None:
     """Report every parameter whose arguments could not be checked before the flight."""
-    for skill in context.symbols.skills.values():
-        known = context.arguments(skill)
+    symbols = context.symbols
+    owners: list[Parametric] = [*symbols.skills.values(), *symbols.templates.values(), *symbols.missions.values()]
+    for owner in owners:
+        known = context.arguments(owner)
         scope = context.scope()
-        for parameter in skill.parameters:
+        for parameter in owner.parameters:
             argument = known.get(parameter.name.text)
+            if isinstance(owner, TemplateDecl) and _of_template(context, parameter):
+                continue
             if argument is None:
                 context.report.add(
                     codes.BAD_PARAMETER,
                     parameter.type.span,
                     f"no parameter can be of the type `{parameter.type.text}`",
-                    help=suggestion(parameter.type.text, NAMED)
-                    or "the types of parameters are " + ", ".join(f"`{name}`" for name in NAMED) + " and `one of ...`",
+                    help=suggestion(parameter.type.text, NAMED) or "the types of parameters are " + _types(type(owner)),
                 )
                 continue
             if argument.declaration is not parameter:
@@ -32,8 +39,9 @@ def check(context: Context) -> None:
             if numeric != (parameter.range is not None):
                 _range(context, parameter)
             elif parameter.range is not None:
-                ends = typed_range(scope, parameter.range, argument.type)
-                if ends is not None and None in (ends[0].constant, ends[1].constant):
+                before = len(context.report.found)
+                ends = whole_range(scope, parameter.range, argument.type)
+                if ends is None and len(context.report.found) == before:
                     context.report.add(
                         codes.BAD_PARAMETER,
                         parameter.range.span,
@@ -41,10 +49,34 @@ def check(context: Context) -> None:
                         help="write numbers with their units",
                     )
                 elif ends is not None and argument.type.dimension is not None:
-                    for end, (_, constant) in zip((parameter.range.low, parameter.range.high), ends, strict=True):
-                        size(context, end, argument.type.dimension, constant or 0)
+                    for end, number in zip((parameter.range.low, parameter.range.high), ends, strict=True):
+                        size(context, end, argument.type.dimension, number)
             if parameter.default is not None:
                 bind_value(scope, argument, parameter.default)
+
+
+def _types(owner: type[Parametric]) -> str:
+    """The types that the parameters of a declaration may have."""
+    if owner is TemplateDecl:
+        return ", ".join(f"`{name}`" for name in (*NAMED, ROLE) if name != Kind.POSITION.value)
+    return ", ".join(f"`{name}`" for name in NAMED) + " and `one of ...`"
+
+
+def _of_template(context: Context, parameter: Parameter) -> bool:
+    """Whether no more is to say of a template's parameter: it is a role, or of a type that no rule can use."""
+    if parameter.type.text == ROLE and not parameter.choices:
+        if parameter.range is not None:
+            _range(context, parameter)
+        return True
+    if parameter.choices or parameter.type.text == Kind.POSITION.value:
+        context.report.add(
+            codes.BAD_PARAMETER,
+            parameter.type.span,
+            f"no parameter of a template can be {'a choice' if parameter.choices else 'a position'}",
+            help="the types of its parameters are " + _types(TemplateDecl),
+        )
+        return True
+    return False
 
 
 def _range(context: Context, parameter: Parameter) -> None:

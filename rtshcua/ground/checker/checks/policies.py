@@ -1,5 +1,7 @@
 """E0707 to E0710: the rules of a policy name what exists, and its contingency ends on the ground."""
 
+from collections.abc import Sequence
+
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.chains import check_chain, check_link
 from rtshcua.ground.checker.conditions import check_condition, references
@@ -7,6 +9,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_skill, find_zone
 from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.ground.checker.uses import brought_about
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.ir.policies import PolicyDecl, Rule
@@ -27,11 +30,14 @@ def check(context: Context) -> None:
                 help=f"at most {MAX_VALUE}",
             )
         for rule in policy.rules:
-            _rule(context, rule)
+            with context.report.within(brought_about(rule)):
+                _rule(context, rule)
         if policy.airspace is not None:
             for name in (*policy.airspace.inside, *policy.airspace.outside):
                 find_zone(context, name)
         _contingency(context, policy)
+    for rule in context.samples:
+        _rule(context, rule)
 
 
 def _contingency(context: Context, policy: PolicyDecl) -> None:
@@ -57,7 +63,7 @@ def _rule(context: Context, rule: Rule) -> None:
     if rule.target is not None:
         check_link(context, rule.target)
     if rule.when is not None and len(skills) == len(rule.skills):
-        shared = _shared(context, rule, skills)
+        shared = shared_arguments(context, rule, skills)
         if shared is not None:
             check_condition(Scope(context.symbols, context.report, shared), rule.when)
 
@@ -74,7 +80,7 @@ def _confirm(context: Context, rule: Rule) -> None:
     )
 
 
-def _shared(context: Context, rule: Rule, skills: list[SkillDecl]) -> dict[str, Argument] | None:
+def shared_arguments(context: Context, rule: Rule, skills: Sequence[SkillDecl]) -> dict[str, Argument] | None:
     """The arguments that a rule's condition may read: those that all its skills have; None after a finding."""
     assert rule.when is not None
     signatures = [context.arguments(skill) for skill in skills]

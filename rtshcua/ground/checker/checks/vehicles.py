@@ -3,7 +3,7 @@
 from rtshcua.decision.checks.vehicle import MAX_POSITION_ERROR
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.fields import on_globe, quantity
+from rtshcua.ground.checker.fields import elevation, on_globe, quantity
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.quantity import Dimension
 
@@ -26,6 +26,8 @@ def check(context: Context) -> None:
                 vehicle.reserve.span,
                 "the reserve leaves nothing to fly with: it must be below 100 %",
             )
+        elevation(context, vehicle.elevation)
+        quantity(context, vehicle.elevation_within, Dimension.LENGTH, positive=False)
         offset = vehicle.utc_offset
         if offset is not None and abs(offset.value) > MAX_OFFSET_US:
             context.report.add(codes.NUMBER_SIZE, offset.span, "local times are at most 14 h before or after UTC")

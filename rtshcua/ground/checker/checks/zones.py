@@ -1,13 +1,18 @@
-"""E0501 to E0504: a zone is a simple polygon or a circle on the globe, with its floor below its ceiling."""
+"""E0501 to E0504, E0112, E0113, E0516: a zone has a clear inside on the globe, with its floor below its ceiling."""
 
 from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.checks.made_of import circles, operands
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.fields import height, on_globe, quantity
-from rtshcua.ground.checker.polygons import Corner, contains, crossing
-from rtshcua.model.flat.zone import MAX_VERTICES
+from rtshcua.ground.checker.polygons import Corner, contained, contains, crossing, tangled
+from rtshcua.ground.checker.report import Report
+from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 from rtshcua.model.ir.expression import Coordinates
-from rtshcua.model.ir.places import Circle, Polygon, ZoneDecl
+from rtshcua.model.ir.places import Circle, Corridor, GeoJson, Polygon, ZoneDecl
 from rtshcua.model.quantity import Dimension
+
+LEAST_WIDTH = 100  # mm
 
 
 def check(context: Context) -> None:
@@ -16,73 +21,165 @@ def check(context: Context) -> None:
         height(context, zone.floor)
         height(context, zone.ceiling)
         _heights(context, zone)
-        shape = zone.shape
-        if isinstance(shape, Circle):
-            quantity(context, shape.radius, Dimension.LENGTH)
-            on_globe(context, shape.center)
-        elif all(on_globe(context, corner) for corner in shape.corners):
-            _polygon(context, zone, shape)
+        for shape in operands(context, zone):
+            match shape:
+                case Circle():
+                    quantity(context, shape.radius, Dimension.LENGTH)
+                    on_globe(context, shape.center)
+                case Polygon():
+                    _polygon(context, zone, shape)
+                case Corridor():
+                    _corridor(context, shape)
+                case GeoJson():
+                    _geojson(context, shape)
         if zone.entry is not None:
             on_globe(context, zone.entry)
+    circles(context)
 
 
 def _heights(context: Context, zone: ZoneDecl) -> None:
-    if zone.floor is not None and zone.ceiling is not None and zone.floor.value >= zone.ceiling.value:
+    floor, ceiling = zone.floor, zone.ceiling
+    if floor is None or ceiling is None or floor.datum is not ceiling.datum:
+        return  # of different datum: compared where the elevation of home is known
+    if floor.value >= ceiling.value:
         context.report.add(
             codes.FLOOR_ABOVE_CEILING,
-            zone.ceiling.span,
+            ceiling.span,
             f"the ceiling of `{zone.name.text}` is not above its floor",
-            labels=[(zone.floor.span, "the floor is here")],
+            labels=[(floor.span, "the floor is here")],
+        )
+
+
+def _geojson(context: Context, shape: GeoJson) -> None:
+    found = context.data.area(shape)
+    if isinstance(found, Refused):
+        name = context.data.name(shape)
+        context.report.add(found.code, shape.span, f"`{name}` cannot be used: {found.message}", help=found.help)
+
+
+def _corridor(context: Context, shape: Corridor) -> None:
+    before = len(context.report.found)
+    quantity(context, shape.width, Dimension.LENGTH)
+    for point in shape.points:
+        on_globe(context, point)
+    if len(context.report.found) > before:
+        return
+    if len(shape.points) < 2:
+        context.report.add(
+            codes.BAD_CORRIDOR,
+            shape.span,
+            f"the corridor has {len(shape.points)} place{'' if len(shape.points) == 1 else 's'}, and needs two",
+            help="all places within a distance of a single one are a `circle`",
+        )
+    for a, b in zip(shape.points, shape.points[1:], strict=False):
+        if _corner(a) == _corner(b):
+            context.report.add(
+                codes.BAD_CORRIDOR,
+                b.span,
+                "the corridor stays at a place",
+                help="leave out the second one",
+                labels=[(a.span, "the same place")],
+            )
+    if shape.width.value < LEAST_WIDTH:
+        context.report.add(
+            codes.BAD_CORRIDOR, shape.width.span, "the corridor is too narrow to fly in", help="at least 10 cm"
         )
 
 
 def _polygon(context: Context, zone: ZoneDecl, shape: Polygon) -> None:
+    rings = (shape.corners, *shape.holes)
+    before = len(context.report.found)
+    for ring in rings:
+        for corner in ring:
+            on_globe(context, corner)
+    if len(context.report.found) > before or not all(_ring(context, zone, shape, ring) for ring in rings):
+        return
+    count = sum(map(len, rings))
+    if count > MAX_VERTICES or len(rings) > MAX_RINGS:
+        what, most = (f"{count} corners", MAX_VERTICES) if count > MAX_VERTICES else (f"{len(rings)} rings", MAX_RINGS)
+        context.report.add(codes.TOO_MANY, shape.span, f"the polygon has {what}, and at most {most} fit on board")
+        return
+    if not _holes(context, zone, shape):
+        return
+    placed = [[_corner(each) for each in ring] for ring in rings]
+    if zone.entry is not None and zone.shape is shape and not contained(placed, _corner(zone.entry)):
+        entry_outside(context.report, zone)
+
+
+def _ring(context: Context, zone: ZoneDecl, shape: Polygon, ring: tuple[Coordinates, ...]) -> bool:
+    """Whether a ring of a polygon is simple."""
     report = context.report
-    corners = [_corner(each) for each in shape.corners]
+    corners = [_corner(each) for each in ring]
+    what, whole = ("polygon", shape.span) if ring is shape.corners else ("hole", ring[0].span)
     if len(corners) < 3:
         report.add(
             codes.BAD_POLYGON,
-            shape.span,
-            f"the polygon has {len(corners)} corner{'' if len(corners) == 1 else 's'}, and needs three",
+            whole,
+            f"the {what} has {len(corners)} corner{'' if len(corners) == 1 else 's'}, and needs three",
         )
-        return
-    if len(corners) > MAX_VERTICES:
-        report.add(
-            codes.TOO_MANY,
-            shape.span,
-            f"the polygon has {len(corners)} corners, and at most {MAX_VERTICES} fit on board",
-        )
-        return
+        return False
     if corners[0] == corners[-1]:
         report.add(
             codes.BAD_POLYGON,
-            shape.corners[-1].span,
+            ring[-1].span,
             "the last corner repeats the first one",
-            help="leave it out: a polygon is closed by itself",
-            labels=[(shape.corners[0].span, "the first corner")],
+            help=f"leave it out: a {what} is closed by itself",
+            labels=[(ring[0].span, "the first corner")],
         )
-        return
+        return False
     met = crossing(corners)
+    if met is None:
+        return True
+    i, j = met
+    report.add(
+        codes.BAD_POLYGON,
+        zone.name.span,
+        f"the edges of `{zone.name.text}` cross or touch each other",
+        help="write the corners in the order in which one walks around the zone",
+        labels=[
+            (ring[i].span, "the edge that begins here"),
+            (ring[j].span, "meets the edge that begins here"),
+        ],
+    )
+    return False
+
+
+def _holes(context: Context, zone: ZoneDecl, shape: Polygon) -> bool:
+    """Whether all holes lie in the polygon, and apart from each other."""
+    rings = (shape.corners, *shape.holes)
+    placed = [[_corner(each) for each in ring] for ring in rings]
+    met = tangled(placed)
     if met is not None:
-        i, j = met
-        report.add(
+        (one, i), (other, j) = met
+        context.report.add(
             codes.BAD_POLYGON,
             zone.name.span,
-            f"the edges of `{zone.name.text}` cross or touch each other",
-            help="write the corners in the order in which one walks around the zone",
+            f"a hole in `{zone.name.text}` crosses or touches another edge",
+            help="what reaches over the edge, or overlaps, is taken away with `difference`",
             labels=[
-                (shape.corners[i].span, "the edge that begins here"),
-                (shape.corners[j].span, "meets the edge that begins here"),
+                (rings[one][i].span, "the edge that begins here"),
+                (rings[other][j].span, "meets the edge that begins here"),
             ],
         )
-    elif zone.entry is not None and not contains(corners, _corner(zone.entry)):
-        entry_outside(context, zone)
+        return False
+    for number, hole in enumerate(shape.holes):
+        around = [each for i, each in enumerate(placed[1:]) if i != number and contains(each, _corner(hole[0]))]
+        if around or not contains(placed[0], _corner(hole[0])):
+            context.report.add(
+                codes.BAD_POLYGON,
+                hole[0].span,
+                "the hole lies in another hole" if around else "the hole lies outside of its polygon",
+                help="a hole lies within the polygon, apart from all others",
+                labels=[(zone.name.span, "the zone is declared here")],
+            )
+            return False
+    return True
 
 
-def entry_outside(context: Context, zone: ZoneDecl) -> None:
+def entry_outside(report: Report, zone: ZoneDecl) -> None:
     """Report an entry that is not strictly inside of its zone."""
     assert zone.entry is not None
-    context.report.add(
+    report.add(
         codes.ENTRY_OUTSIDE,
         zone.entry.span,
         f"the entry of `{zone.name.text}` does not lie inside of it",

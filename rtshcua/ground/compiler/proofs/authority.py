@@ -4,10 +4,8 @@ A permit's clauses over arguments and zones must be true; those over signals, th
 left for on board.
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
-from rtshcua.decision import tree
 from rtshcua.decision.authority import authority
 from rtshcua.decision.case import Case
 from rtshcua.decision.change import Changes
@@ -21,10 +19,11 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.compiler.mission import argument_span
+from rtshcua.ground.compiler.proofs.conjuncts import conjuncts
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.flat.policy import Rule, RuleKind
-from rtshcua.model.ir.expression import Condition, Junction
+from rtshcua.model.ir.expression import Condition
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.outcome import Reason
 from rtshcua.model.quantity import Dimension, display
@@ -141,7 +140,7 @@ def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation,
     changes = Changes(at, ground.prepared.tables)
     parameters = {parameter.name for parameter in contract.parameters}
     found: list[Unmet] = []
-    for clause, part in _pairs(declared, node):
+    for clause, part in conjuncts(declared, node):
         if build(part, ground.prepared.tables)(at) & TRUE:
             continue
         wanted = changes.find(part, True) or ()
@@ -153,19 +152,4 @@ def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation,
 
 def _declaration(ground: Ground, rule: Rule) -> Condition | None:
     """The condition of the rule that was lowered to this one."""
-    span = ground.span(rule)
-    return next((each.when for each in ground.lowered.declaration.rules if each.span == span), None)
-
-
-def _pairs(condition: Condition, node: tree.Node) -> Iterator[tuple[Condition, tree.Node]]:
-    """Each conjunct of a condition as it is written, with what it was lowered to."""
-    if not isinstance(condition, Junction) or condition.operator != "and":
-        yield condition, node
-        return
-    nodes: list[tree.Node] = []
-    for _ in condition.operands[1:]:
-        assert isinstance(node, tree.Both)
-        nodes.append(node.right)
-        node = node.left
-    for operand, part in zip(condition.operands, [node, *reversed(nodes)], strict=True):
-        yield from _pairs(operand, part)
+    return ground.lowered.written[rule].when

@@ -1,28 +1,29 @@
 """E0508, E0614, E0616, E0804: where a step goes from where its predecessor ended, it may go, and can in time.
 
-The start is taken to be the declared home, and every step to end where it was planned to. The leg to a step's path is
-part of it.
+The leg to a step's path is part of it, from wherever the vehicle may be then (`places`). Zones that exist at some times
+only are left for on board, where the time is known.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
-from rtshcua.decision.airspace import keeps
 from rtshcua.decision.energy import Energy
 from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.lasting import longest
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.reads import slots_read, where
+from rtshcua.decision.reads import monitored, slots_read, where
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.state import state
 from rtshcua.decision.truth import EVERYWHERE, FALSE
-from rtshcua.decision.values import point
 from rtshcua.decision.verdict import PASS
 from rtshcua.decision.volume import Volume
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.mission import argument_span
+from rtshcua.ground.compiler.proofs.anytime import may_keep
+from rtshcua.ground.compiler.proofs.places import Place, end, from_home, from_where, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.shapes import Point
-from rtshcua.ground.compiler.survey import path_length
-from rtshcua.model.flat.code import Clause
+from rtshcua.ground.compiler.ways import path_length
+from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.missions import Step
@@ -31,38 +32,21 @@ from rtshcua.model.quantity import Dimension, display
 SECOND_US = 1_000_000
 
 
-class Place(NamedTuple):
-    """Where the vehicle is between two steps: local x, y and its height, in mm."""
-
-    x: int
-    y: int
-    height: int
-
-
-AT_HOME = Place(0, 0, 0)
-
-
-def prove(ground: Ground, step: Step, invocation: PreparedInvocation, start: Place) -> Place | None:
-    """Report what no state makes possible about a step that begins at `start`; where it ends, None after a finding."""
-    before = len(ground.context.report.found)
+def prove(ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place]) -> tuple[Place, ...]:
+    """Report what no state makes possible about a step that may come at any of `starts`; where of these it may begin,
+    nowhere after a finding.
+    """
+    report = ground.context.report
+    before = len(report.found)
     _speed(ground, step, invocation)
-    if len(ground.context.report.found) == before:
-        _volume(ground, step, invocation, start)
-    if len(ground.context.report.found) == before:
+    if len(report.found) > before:
+        return ()
+    able = from_where(ground, invocation, starts, lambda start: _volume(ground, step, invocation, start))
+    for start in able:
         _duration(ground, step, invocation, start)
-    return _end(invocation, start) if len(ground.context.report.found) == before else None
-
-
-def _end(invocation: PreparedInvocation, start: Place) -> Place:
-    plan = invocation.invocation.plan
-    x, y = plan.path[-2:] if plan.path else start[:2]
-    match plan.kind:
-        case MotionKind.HOME | MotionKind.LAND:
-            return Place(x, y, 0)
-        case MotionKind.HOLD:
-            return start
-        case _:
-            return Place(x, y, plan.altitude)
+        if len(report.found) > before:
+            return ()
+    return able
 
 
 def _speed(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
@@ -85,18 +69,13 @@ def _speed(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
 
 def _volume(ground: Ground, step: Step, invocation: PreparedInvocation, start: Place) -> None:
     """The planned volume keeps the airspace and what the contract maintains; charge and clauses can suffice."""
-    known = ground.prepared.tables.known
-    case = ground.case(invocation)
-    slots = list(case.at.slots)
-    slots[known.x], slots[known.y], slots[known.height] = point(start.x), point(start.y), point(start.height)
-    at = Environment(slots, case.at.arguments, case.at.utc, case.at.error)
-    volume = invocation.planner.volume(slots, known)
+    at, volume = planned(ground, invocation, start)
     airspace = ground.prepared.airspace
-    if airspace is not None and EVERYWHERE[keeps(volume.place, airspace)] == FALSE:
+    if airspace is not None and EVERYWHERE[may_keep(volume.place, airspace)] == FALSE:
         ground.context.report.add(
             codes.PATH_OUTSIDE,
             step.span,
-            f"on its way, which begins {_from_home(start)}, the vehicle would leave the airspace",
+            f"on its way, which begins {from_home(start.x, start.y)}, the vehicle would leave the airspace",
             help="the leg to where the step begins counts, widened by the vehicle's position error; "
             "go around by further steps",
             labels=[(ground.span(airspace.airspace), "the airspace")],
@@ -116,22 +95,16 @@ def _volume(ground: Ground, step: Step, invocation: PreparedInvocation, start: P
         )
 
 
-def _from_home(place: Place) -> str:
-    """A place in words, to the nearest metre."""
-    east, north = (place.x + 500) // 1000, (place.y + 500) // 1000
-    words = [f"{abs(east)} m {'east' if east > 0 else 'west'}"] if east else []
-    words += [f"{abs(north)} m {'north' if north > 0 else 'south'}"] if north else []
-    return f"{' and '.join(words)} of home" if words else "at home"
-
-
 def _broken(ground: Ground, invocation: PreparedInvocation, at: Environment, volume: Volume) -> Clause | None:
     """A clause of the contract that cannot hold: over the planned volume, if it reads nothing else, or at all."""
-    over = ranging(at, volume, ground.prepared.tables.known.height)
     vehicle = ground.prepared.policy.vehicle
+    through = longest(invocation.invocation.contract, vehicle)
+    over = ranging(at, volume, ground.prepared.tables.known.height, through)
     fixed = set(where(vehicle))
     for clause, condition in invocation.maintain:
         truth = condition(over)
-        if set(slots_read((clause,), vehicle)) <= fixed:
+        timeless = not monitored((clause,)) and not _timed(ground, clause)
+        if timeless and set(slots_read((clause,), vehicle)) <= fixed:
             truth = EVERYWHERE[truth]
         if truth == FALSE:
             return clause
@@ -140,6 +113,17 @@ def _broken(ground: Ground, invocation: PreparedInvocation, at: Environment, vol
         broken = found[0].clause
         return broken if isinstance(broken, Clause) else None
     return None
+
+
+def _timed(ground: Ground, clause: Clause) -> bool:
+    """Whether a clause reads the time, or a zone that exists at some times only."""
+    code, tables = clause.code, ground.prepared.tables
+    for at in range(0, len(code), 3):
+        op, a, b = code[at : at + 3]
+        zones = (a,) if op == Op.POSITION_IN else tables.tables[b] if op == Op.POSITION_IN_ARGUMENT else ()
+        if op == Op.TIME_IN or any(tables.zones[zone].times is not None for zone in zones):
+            return True
+    return False
 
 
 def _never(ground: Ground, step: Step, clause: Clause) -> None:
@@ -160,21 +144,23 @@ def _duration(ground: Ground, step: Step, invocation: PreparedInvocation, start:
         return
     points: list[Point] = [(start.x, start.y), *zip(flat.plan.path[::2], flat.plan.path[1::2], strict=True)]
     speed = flat.plan.speed or vehicle.speed
-    end = _end(invocation, start)
+    there = end(invocation, start)
     needed = path_length(points) * SECOND_US // speed
-    climbing = abs(end.height - start.height) * SECOND_US // vehicle.climb
+    climbing = abs(there.height - start.height) * SECOND_US // vehicle.climb
     total = needed + climbing if flat.plan.kind == MotionKind.HOME else max(needed, climbing)
     if flat.contract.motion.time >= 0:
         total = flat.arguments[flat.contract.motion.time]
     if total <= allowed:
         return
     skill = ground.context.symbols.skills[step.skill.text]
-    assert skill.duration is not None
+    own = None if step.overrides is None else step.overrides.duration
+    limit = own or skill.duration
+    assert limit is not None
     ground.context.report.add(
         codes.PLAN_TOO_LONG,
         step.span,
         f"the step takes at least {display(total // SECOND_US * SECOND_US, Dimension.DURATION)}, and "
         f"`{skill.name.text}` lasts at most {display(allowed, Dimension.DURATION)}",
         help="fly a shorter path, or faster" if flat.plan.path else None,
-        labels=[(skill.duration.span, "declared here")],
+        labels=[(limit.span, "declared here")],
     )

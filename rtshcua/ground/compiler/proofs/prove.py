@@ -3,9 +3,23 @@
 from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
-from rtshcua.ground.compiler.proofs import authority, chains, path, timing
+from rtshcua.ground.compiler.proofs import (
+    authority,
+    between,
+    chains,
+    contradiction,
+    deferral,
+    delegations,
+    flight,
+    hours,
+    last_link,
+    observation,
+    rules,
+    timing,
+)
 from rtshcua.ground.compiler.proofs.situation import Ground, anything
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.ir.missions import MissionDecl
@@ -17,8 +31,9 @@ def prove_policy(context: Context, lowered: LoweredPolicy) -> Ground | None:
     if isinstance(prepared, Malformed):
         _refused(context, lowered, prepared)
         return None
-    ground = Ground(context, lowered, prepared, anything(lowered.policy))
-    chains.prove(ground)
+    ground = Ground(context, lowered, prepared, anything(lowered.policy), Questions(prepared))
+    for proof in (chains, last_link, deferral, observation, contradiction, delegations, rules):
+        proof.prove(ground)
     return ground
 
 
@@ -26,18 +41,24 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     """The proofs of a mission under a policy."""
     prepared: list[PreparedInvocation] = []
     for invocation in mission.invocations:
-        found = prepare_invocation(invocation, ground.prepared)
+        found = prepare_invocation(invocation, ground.prepared, mission.phases)
         if isinstance(found, Malformed):
             _refused(ground.context, ground.lowered, found)
             return
         prepared.append(found)
     steps = [step for phase in declared.phases for step in phase.steps]
-    place: path.Place | None = path.AT_HOME
-    for step, one in zip(steps, prepared, strict=True):
-        permitted = authority.prove(ground, declared, step, one)
-        # what comes after a step that cannot be flown would begin at a place that is never reached
-        place = path.prove(ground, step, one, place) if permitted and place is not None else None
+    permitted = [authority.prove(ground, declared, step, one) for step, one in zip(steps, prepared, strict=True)]
+    before = len(ground.context.report.found)
+    flight.prove(ground, declared, steps, prepared, permitted)
+    if len(ground.context.report.found) == before:
+        for step, one, good in zip(steps, prepared, permitted, strict=True):
+            if good:
+                contradiction.prove_step(ground, step, one)
+    if all(permitted):
+        between.prove(ground, declared, steps, prepared)
+        hours.prove(ground, steps, prepared)
     timing.prove(ground, steps, prepared)
+    deferral.prove_mission(ground, steps, prepared)
 
 
 def _refused(context: Context, lowered: LoweredPolicy, malformed: Malformed) -> None:

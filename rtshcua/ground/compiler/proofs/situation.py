@@ -1,12 +1,13 @@
 """What is known before the flight: all of a step's arguments, and nothing of the vehicle's state."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rtshcua.decision.case import Case
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.values import MISSING, Sets, Value, interval, maybe, members
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.model.flat.code import Clause
@@ -17,19 +18,27 @@ from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Context as Standing
 from rtshcua.model.flat.zone import MAX_COORDINATE
 
+#: us since the epoch: later than any flight
+EVER = 1 << 53
+
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A lowered policy, prepared as on board, and any state that its vehicle may be in."""
+    """A lowered policy, prepared as on board, and any state that its vehicle may be in; `questions` are asked of it.
+
+    `kept` are the ways that were found to keep its airspace (`ways`): the missions of one policy share many.
+    """
 
     context: Context
     lowered: LoweredPolicy
     prepared: PreparedPolicy
     anything: tuple[Value, ...]
+    questions: Questions
+    kept: set[tuple[object, ...]] = field(default_factory=set)
 
     def sets(self, at_us: int = 0) -> Sets:
-        """Any state, at any time within a day from a UTC time."""
-        return Sets(self.anything, (0, 0), ((at_us, at_us + DAY - 1),), (0, 0))
+        """Any state, at any time within a day from a UTC time; at any time at all where that is not known (0)."""
+        return Sets(self.anything, (0, 0), ((at_us, at_us + DAY - 1 if at_us else EVER),), (0, 0))
 
     def case(self, invocation: PreparedInvocation) -> Case:
         """A step in any state."""
@@ -40,8 +49,8 @@ class Ground:
 
     def environment(self, arguments: tuple[Value, ...]) -> Environment:
         """Known arguments in any state, for a condition."""
-        values, _, utc, error = self.sets()
-        return Environment((*values, MISSING), arguments, utc, error)
+        sets = self.sets()
+        return Environment((*sets.values, MISSING), arguments, sets.utc_us, sets.utc_error_us)
 
     def span(self, part: Clause | Rule | Link | Airspace) -> Span:
         """Where a part of the policy is written."""

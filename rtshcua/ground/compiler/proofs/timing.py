@@ -32,9 +32,11 @@ def prove(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedI
                 labels=[(skill.name.span, "declared here, without `lasts at most`")],
             )
             return
-        latest += _approval(ground, invocation) + contract.deadline_us
+        latest += approval(ground, invocation) + contract.deadline_us
         if latest > contract.validity_us:
-            assert skill.validity is not None
+            own = None if step.overrides is None else step.overrides.validity
+            validity = own or skill.validity
+            assert validity is not None
             ground.context.report.add(
                 codes.VALIDITY_TOO_SHORT,
                 step.span,
@@ -42,13 +44,13 @@ def prove(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedI
                 f"`{contract.name}` is valid for {display(contract.validity_us, Dimension.DURATION)}",
                 help=f"{display(START_WINDOW_US, Dimension.DURATION)} to the start, then all deadlines, approvals and "
                 "durations before it count; move the step forward, or shorten those before it",
-                labels=[(skill.validity.span, "declared here")],
+                labels=[(validity.span, "declared here")],
             )
             return
         latest += contract.duration_us
 
 
-def _approval(ground: Ground, invocation: PreparedInvocation) -> int:
+def approval(ground: Ground, invocation: PreparedInvocation) -> int:
     """How long a step may wait for approvals."""
     at = ground.case(invocation).at
     waits = [rule.rule.within_us for rule in invocation.candidates.confirms if rule.condition(at) & TRUE]

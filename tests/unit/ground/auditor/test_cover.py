@@ -12,7 +12,7 @@ DEGRADE = -1
 def decision(kind: int, step: int, link: int, outcome: str = "allow", until_us: int = 100) -> Decision:
     return Decision(
         "0" * 64, 0, "", None, None, RecordedContext((), 0, 0, 1, 0, 0, ""), "", kind, link, "software", outcome, "",
-        8, 1, RecordedState((), ()), step, None, -1, "decision", 0, 0, until_us,
+        8, 1, RecordedState(ages=(), values=()), step, None, -1, "decision", 0, 0, until_us,
     )  # fmt: skip
 
 

@@ -74,6 +74,46 @@ GOOD = [
     "aim inside grow(city, -10 m)",
     "aim outside school",
     "not (battery < 20 % or height > 10 m) and position inside city",
+    "obstacle.distance > wind.speed * 3 s",
+    "obstacle.distance > 1500 ms * wind.speed",
+    "obstacle.distance > pace * (3 * 2 s)",
+    "obstacle.distance / 2 m/s > wait",
+    "obstacle.distance / 4 s < wind.speed",
+    "obstacle.distance / (2 * 3 m) > 1 / 3",
+    "wait < 40 m / 4 m/s",
+    "wait < 3 * 2 s",
+    "height < up * 50 %",
+    "height <= 2 * up + 5 m / 3",
+    "battery * 2 > 50 %",
+    "battery / 2 > 20 % / 3",
+    "battery / 20 % > 3 / 2",
+    "battery * 25 % < 10 %",
+    "height / 3 < 10 m",
+    "height / 50 % < 10 m",
+    "satellites * 2 >= 12 / 1",
+    "satellites / 50 % > 12",
+    "abs(height - up) < 5 m",
+    "max(height, 20 m) < up",
+    "max(20 m, height, up) < 30 m",
+    "min(obstacle.distance, 4 m) * 2 > 3 m",
+    "abs(wind.speed - pace) in 0 m/s .. 3 m/s / 2",
+    "above.sea <= max(500 m above sea, above.sea)",
+    "height in 10 m / 3 .. up",
+    "max(3, 4) * height < 30 m",
+    "position inside grow(city, 3 m * 2)",
+    "position inside grow(area, 40 m / 4)",
+    "phase == inspection",
+    "phase != height",
+    "phase in {departure, quad}",
+    "not phase == x and battery > 5 %",
+    "battery > 30 % for the last 3 s",
+    "wind.speed < 5 m/s within the last 10 min",
+    "landed == in_air within 5 s of battery > 5 %",
+    "rising battery < 30 % or falling gps.fix >= fix_3d within the last 5 s",
+    "position outside grow(school, 20 m) for the last 3 s",
+    "(battery > 5 % for the last 1 s) within the last 5 s and up < 10 m",
+    "local time in 08:00 .. 18:00 for the last 3 s and phase == a",
+    "rising position inside city",
 ]
 
 BAD = [
@@ -127,6 +167,53 @@ BAD = [
     ("quad > 5 m", "E0204"),
     ("probe > 5 m", "E0204"),
     ("batery > 5 %", "E0201"),
+    ("wind.speed * pace < 3 m", "E0315"),
+    ("obstacle.distance > wind.speed * wait", "E0315"),
+    ("obstacle.distance * 3 s > 5 m", "E0315"),
+    ("wind.speed * 3 s < 5 m/s", "E0310"),
+    ("height < wind.speed * 3 s", "E0310"),
+    ("height / 3 m/s < 3 s", "E0315"),
+    ("height / 3 m < 3", "E0315"),
+    ("battery / 3 m/s < 3", "E0315"),
+    ("obstacle.distance / wind.speed < 3 s", "E0322"),
+    ("obstacle.distance / 0 < 3 m", "E0322"),
+    ("obstacle.distance / (2 s - 2 s) < 3 m/s", "E0322"),
+    ("wait < 3 s / 0 %", "E0322"),
+    ("satellites * height > 3 m", "E0315"),
+    ("min(height, 3 s) < 5 m", "E0310"),
+    ("min(height, above.sea) < 5 m", "E0311"),
+    ("max(height, obstacle.distance) < 5 m", "E0310"),
+    ("abs(gps.fix) < 5", "E0315"),
+    ("max(look, far) < 5", "E0201"),
+    ("min(position, 3 m) < 5 m", "E0315"),
+    ("position inside grow(city, up - up)", "E0318"),
+    ("position inside grow(city, obstacle.distance)", "E0318"),
+    ("position inside grow(city, 10 m / 3)", "E0302"),
+    ("position inside grow(city, 1000 km)", "E1003"),
+    ("position inside grow(city, nothing)", "E0201"),
+    ("phase == 3 s", "E0323"),
+    ("phase == phase", "E0323"),
+    ("phase == bridge_a.entry", "E0323"),
+    ("inspection == phase", "E0201"),
+    ("height == phase", "E0323"),
+    ("phase < inspection", "E0314"),
+    ("phase in a .. b", "E0323"),
+    ("phase + 1 < 3", "E0315"),
+    ("height in phase .. 3 m", "E0312"),
+    ("phase inside city", "E0317"),
+    ("up < 10 m for the last 3 s", "E0320"),
+    ("rising (battery > 5 % and not up < 10 m)", "E0320"),
+    ("position inside area within the last 3 s", "E0320"),
+    ("area inside city for the last 3 s", "E0320"),
+    ("phase == inspection for the last 3 s", "E0320"),
+    ("battery > 5 % within 3 s of phase in {a, b}", "E0320"),
+    ("rising position inside grow(city, 3 m)", "E0320"),
+    ("(falling position outside grow(city, 3 m)) within the last 5 s", "E0320"),
+    ("battery > 5 % for the last 0 s", "E0321"),
+    ("battery > 5 % within the last 601 s", "E0321"),
+    ("battery > 5 % within 11 min of landed == in_air", "E0321"),
+    ("battery > 5 % for the last 3 m", "E0310"),
+    ("battery > 5 m for the last 3 s", "E0310"),
 ]
 
 
@@ -145,3 +232,24 @@ def test_it_has_a_meaning(condition: str) -> None:
 @pytest.mark.parametrize(("condition", "code"), BAD)
 def test_it_has_none_and_a_finding_says_why(condition: str, code: str) -> None:
     assert set(findings(condition)) == {code}
+
+
+CALLED_PHASE = [
+    "signal phase : ratio = BATTERY_STATUS.battery_remaining  stale after 5 s",
+    "zone phase = circle(47 N, 8 E, 5 m)",
+    "enum modes { phase = 1, other = 2 }",
+    "skill s(phase: zone) { motion hold }",
+    "skill s(mode: one of phase, other) { motion hold }",
+    "template t(phase: zone) { forbid any by any when position inside phase }",
+]
+
+
+@pytest.mark.parametrize("declaration", CALLED_PHASE)
+def test_nothing_that_has_a_value_is_called_phase(declaration: str) -> None:
+    def read(path: str) -> bytes:
+        return (
+            f'import "lib:skills/signals.rts"\n{declaration}'.encode() if path == "x.rts" else Path(path).read_bytes()
+        )
+
+    found = check_program(load(["x.rts"], read, str(CHECKOUT)), dialect.load())
+    assert any(each.code.id == "E0203" and "`phase` is the mission's phase" in each.message for each in found)

@@ -32,13 +32,13 @@ skill probe(
   deadline 5 s
   valid    for 40 min
   lasts    at most 1 min
-  maintain %s
   fallback emergency_land
   energy   at most 5 %%
 }
 
 policy rules version 1 {
   permit probe by role operator
+  forbid probe by any when %s
   permit emergency_land by any
   contingency emergency_land
 }
@@ -174,10 +174,9 @@ def lowered(text: str) -> PreparedPolicy:
 def test_a_condition_means_on_board_what_it_says(condition: Meaning, worlds: list[World]) -> None:
     text, truth = condition
     prepared = lowered(text)
-    contract = next(each for each in prepared.policy.contracts if each.name == "probe")
-    conditions = [
-        build(prepared.compiler.node(clause, contract), prepared.tables) for clause in contract.maintain
-    ]  # a top-level `and` is split into clauses
+    node = next(prepared.compiler.when(rule) for rule in prepared.policy.rules if rule.when is not None)
+    assert node is not None
+    condition_on_board = build(node, prepared.tables)
     for world in worlds:
         world = {
             name: 0 if value is None and name in NUMBERS and name in ARGUMENTS else value
@@ -195,7 +194,6 @@ def test_a_condition_means_on_board_what_it_says(condition: Meaning, worlds: lis
         assert isinstance(pace, int)
         assert isinstance(look, str)
         arguments = (point(up), point(pace), point(ENUMS["look"].index(look)))
-        found = [each(Environment(slots, arguments, ((0, 0),), (0, 0))) for each in conditions]
-        ours = FALSE if FALSE in found else UNKNOWN if UNKNOWN in found else TRUE
+        ours = condition_on_board(Environment(slots, arguments, ((0, 0),), (0, 0)))
         expected = truth(world)
         assert ours == (UNKNOWN if expected is None else TRUE if expected else FALSE), (text, world)

@@ -1,16 +1,19 @@
 """What compiles can fly: in good conditions each step is allowed where its predecessor ended."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.links import link_admissible
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Approval, Context, Now, State
@@ -31,8 +34,10 @@ def flat(name: str) -> tuple[Policy, Mission]:
     return compiled.policy, bind(compiled.mission, bytes(32))
 
 
-def flown(policy: Policy, mission: Mission, conditions: dict[str, int]) -> list[Decision]:
-    """The decision on each step, the vehicle being where the step before it was planned to end."""
+def flown(policy: Policy, mission: Mission, conditions: dict[str, int], *, drained: bool = False) -> list[Decision]:
+    """The decision on each step, the vehicle being where the step before it was planned to end; `drained`: with what
+    is left of the charge when each took all that it may.
+    """
     prepared = prepare(policy)
     assert isinstance(prepared, PreparedPolicy), prepared
     steps = prepare_mission(mission, prepared)
@@ -53,6 +58,8 @@ def flown(policy: Policy, mission: Mission, conditions: dict[str, int]) -> list[
             invocation.binding, policy.vehicle.identity, policy.version, 0, 0, invocation.phase, 1_000, approvals
         )
         decisions.append(decide(step, state, prepared, context, Now(0, AT + 1, 0)))
+        if drained:
+            conditions = {**conditions, "battery": conditions["battery"] - invocation.contract.energy}
         plan = invocation.plan
         if plan.path:
             x, y = plan.path[-2:]
@@ -69,6 +76,13 @@ def test_in_good_conditions_every_step_is_allowed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MISSIONS)
+def test_with_the_least_charge_that_the_proofs_count_with_every_step_is_allowed(name: str) -> None:
+    policy, mission = flat(name)
+    decisions = flown(policy, mission, {**GOOD, "battery": FULL}, drained=True)
+    assert {each.outcome for each in decisions} == {Outcome.ALLOW}
+
+
+@pytest.mark.parametrize("name", MISSIONS)
 def test_a_low_battery_ends_every_step_in_a_link_that_the_proofs_know(name: str) -> None:
     policy, mission = flat(name)
     for decision in flown(policy, mission, {**GOOD, "battery": 2_000}):
@@ -76,3 +90,28 @@ def test_a_low_battery_ends_every_step_in_a_link_that_the_proofs_know(name: str)
         if decision.outcome is Outcome.FALLBACK:
             assert decision.target is not None
             assert policy.contracts[decision.target.skill].name == "return_home"
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_from_anywhere_on_its_way_the_vehicle_may_come_home(name: str) -> None:
+    policy, mission = flat(name)
+    prepared = prepare(policy)
+    assert isinstance(prepared, PreparedPolicy), prepared
+    x, y, height = 0, 0, 0
+    for step in prepare_mission(mission, prepared):
+        plan = step.invocation.plan
+        points = [(x, y), *zip(plan.path[::2], plan.path[1::2], strict=True)]
+        low, high = sorted((height, height if plan.kind == MotionKind.HOLD else plan.altitude))
+        homes = [link for link in (*step.chain, *prepared.contingency) if link.motion == MotionKind.HOME]
+        for (ax, ay), (bx, by) in pairwise([*points, points[-1]]):
+            for part in range(5):
+                values: list[int | None] = [None] * policy.slots
+                for signal in policy.signals:
+                    values[signal.slot] = GOOD.get(signal.name)
+                place = [ax + (bx - ax) * part // 4, ay + (by - ay) * part // 4]
+                values[policy.vehicle.position : policy.vehicle.position + 2] = place
+                values[policy.vehicle.height] = low + (high - low) * part // 4
+                state = State(tuple(values), (0,) * policy.slots)
+                assert all(link_admissible(link, state, prepared, Now(0, AT + 1, 0)) for link in homes), place
+        x, y = points[-1]
+        height = height if plan.kind == MotionKind.HOLD else plan.altitude

@@ -9,12 +9,14 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rtshcua.ground.checker.polygons import contains, counter_clockwise, crossing, doubled_area, meet
+from rtshcua.ground.checker.polygons import contains, counter_clockwise, crossing, doubled_area, meet, tangled
 from rtshcua.ground.compiler.distance import apart, far, within
 from rtshcua.ground.compiler.offset import Unshapely, inner, outer
+from rtshcua.ground.compiler.overlay import nested
 from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.compiler.shapes import Disc, Outline, Point, Region, Shape, edges
+from rtshcua.ground.compiler.shapes import Area, Disc, Outline, Point, Region, Shape, edges, parts
+from rtshcua.ground.compiler.shapes import contains as contains_area
 from rtshcua.ground.compiler.survey import LEAST_INSET, survey
 from rtshcua.model.flat.zone import SHIFT
 
@@ -42,7 +44,7 @@ def polygon(shape: Shape) -> shapely.Geometry:
     """The same region for shapely; a disc by a fine polygon."""
     if isinstance(shape, Disc):
         return shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
-    return shapely.Polygon(shape.corners)
+    return shapely.unary_union([shapely.Polygon(ring, holes) for ring, holes in parts(shape)])
 
 
 @pytest.mark.parametrize(
@@ -103,7 +105,7 @@ def made(offset: Callable[[Shape, int], Shape], shape: Shape, margin: int) -> Sh
     try:
         return offset(shape, margin)
     except Unshapely as unshapely:
-        if unshapely.reason in ("nothing", "parts"):
+        if unshapely.reason == "nothing":
             return None
         raise
 
@@ -132,9 +134,11 @@ def test_a_hole_is_never_flown_in_and_always_kept_out_of() -> None:
             (0, 60_000),
         )
     )
-    with pytest.raises(Unshapely, match="holes"):
-        inner(bay, 4_000)
-    assert isinstance(outer(bay, 4_000), Outline)
+    for offset in (inner, outer):
+        shape = offset(bay, 4_000)
+        assert isinstance(shape, Area)
+        assert not contains_area(shape, (30_000, 30_000))
+        assert contains_area(shape, (30_000, 55_000))
 
 
 SHAPES = st.one_of(
@@ -198,6 +202,58 @@ def test_a_grid_leaves_no_place_further_than_its_spacing(shape: Shape, spacing: 
     assert points is not None
     covered = shapely.LineString(points).buffer(spacing)
     assert polygon(inner(shape, -1_000)).difference(covered).area < 0.02 * polygon(shape).area
+
+
+AREAS = st.builds(
+    lambda shape, x, y, size: (shape, ((x, y), (x, y + size), (x + size, y + size), (x + size, y))),
+    STARS,
+    st.integers(-20_000, 20_000),
+    st.integers(-20_000, 20_000),
+    st.integers(500, 12_000),
+)
+
+
+@given(AREAS, st.sampled_from(["grid", "perimeter", "orbit"]), st.integers(5_000, 40_000), st.integers(0, 3_000))
+def test_a_survey_goes_around_holes(
+    area: tuple[Outline, tuple[Point, ...]], pattern: str, spacing: int, inset: int
+) -> None:
+    outline, hole = area
+    shape = Area((outline.corners, hole))
+    assume(tangled(shape.rings) is None and nested(shape.rings))
+    points = survey(shape, pattern, spacing, inset, None)
+    assume(points is not None)
+    assert points is not None
+    for a, b in pairwise(points):
+        assert contains_area(shape, a)
+        if a != b:
+            assert all(apart((a, b), edge, max(inset, LEAST_INSET) - 3) for edge in edges(shape))
+
+
+def test_a_grid_covers_both_sides_of_a_hole_and_an_orbit_goes_around_it() -> None:
+    yard = Area(
+        (
+            ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000)),
+            ((40_000, 40_000), (40_000, 60_000), (60_000, 60_000), (60_000, 40_000)),
+        )
+    )
+    grid = survey(yard, "grid", 10_000, 0, None)
+    assert grid is not None
+    covered = shapely.LineString(grid).buffer(10_000)
+    assert polygon(inner(yard, -1_000)).difference(covered).area == 0
+    orbit = survey(yard, "orbit", 10_000, 0, None)
+    assert orbit is not None
+    assert shapely.Polygon(orbit).contains(shapely.Polygon(yard.rings[1]))
+
+
+def test_an_area_in_parts_has_no_path() -> None:
+    square = ((0, 0), (90_000, 0), (90_000, 90_000), (0, 90_000))
+    assert survey(Area((square, tuple((x + 100_000, y) for x, y in square))), "grid", 10_000, 0, None) is None
+
+
+def test_an_orbit_keeps_clear_of_holes() -> None:
+    ring = ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000))
+    hole = ((95_000, 40_000), (95_000, 60_000), (97_000, 60_000), (97_000, 40_000))
+    assert survey(Area((ring, hole)), "orbit", 10_000, 0, None) is None
 
 
 def test_a_survey_begins_at_the_end_that_is_nearer() -> None:

@@ -1,0 +1,68 @@
+"""Checking a mission, with all that is proved of it: a short one is interactive, a long one costs no more a step.
+
+Measured is a whole check of a mission under the shipped policy, read from text. The long missions are more than a
+battery lasts for, which the check finds, and goes on. Exits with 1 when a limit is not met.
+"""
+
+import gc
+import sys
+from pathlib import Path
+from statistics import median
+from time import process_time_ns
+
+from rtshcua.ground.compiler.program import check_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+INTERACTIVE_MS = 300.0  # for twelve steps
+SPREAD = 1.6  # how much more a step of the longest mission may cost than one of the shortest
+SIZES = (250, 1_000, 2_000)
+SHORT = 12
+ROUNDS = 3
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def source(steps: int) -> str:
+    """A mission of so many steps."""
+    middle = (
+        f"goto(47.39{799 + number % 50:03d} N, 8.54559 E, altitude = 20 m)" if number % 2 else "hover()"
+        for number in range(steps - 2)
+    )
+    body = "\n".join(("takeoff(altitude = 20 m)", *middle, "return_home()"))
+    return (
+        'import "lib:policies/bridge_inspection.rts"\n'
+        "mission flight under bridge_inspection@7 on quad {\n"
+        f"  proposed by agent openclaw for role operator\n  phase departure {{\n{body}\n  }}\n}}\n"
+    )
+
+
+def milliseconds(text: str) -> float:
+    """The processor time of one check."""
+
+    def read(path: str) -> bytes:
+        return text.encode() if path == "flight.rts" else Path(path).read_bytes()
+
+    gc.collect()
+    start = process_time_ns()
+    check_program(load(["flight.rts"], read, str(ROOT)), dialect.load())
+    return (process_time_ns() - start) / 1e6
+
+
+def main() -> int:
+    """Measures, prints one line for the short mission and one for the growth, and says whether the limits held."""
+    milliseconds(source(SHORT))
+    short = median(milliseconds(source(SHORT)) for _ in range(ROUNDS))
+    print(f"missions: {SHORT} steps are checked in {short:.0f} ms, limit {INTERACTIVE_MS:g}, median of {ROUNDS}")
+    base = milliseconds(source(2))
+    costs = [median(milliseconds(source(size)) - base for _ in range(ROUNDS)) / size for size in SIZES]
+    growth = costs[-1] / costs[0]
+    print(
+        f"missions: a step of {SIZES[-1]:,} costs {growth:.2f} times one of {SIZES[0]}, limit {SPREAD} "
+        f"({1000 * costs[-1]:.0f} us a step)"
+    )
+    return int(short > INTERACTIVE_MS or growth > SPREAD)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

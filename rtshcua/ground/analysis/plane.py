@@ -1,0 +1,147 @@
+"""How the zones of a policy lie in the plane, and places that show it."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import accumulate
+from math import isqrt
+from typing import Protocol
+
+from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
+from rtshcua.ground.compiler.shapes import Disc, Point, Region, Ring, bounds, cornered
+from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
+
+#: how finely a zone is searched for a place before shapely is asked
+_GRID = 8
+_FAR: tuple[Point, ...] = (
+    (0, 0),
+    *((x, y) for x in (-MAX_COORDINATE, MAX_COORDINATE) for y in (-MAX_COORDINATE, MAX_COORDINATE)),
+)
+_BESIDE = tuple((x, y) for x in (0, -1, 1, -2, 2) for y in (0, -1, 1, -2, 2))
+
+
+class _Prepared(Protocol):
+    """A zone that says whether it contains a place of the plane."""
+
+    @property
+    def shape(self) -> "_Shape": ...
+
+
+class _Shape(Protocol):
+    def contains(self, x: int, y: int) -> bool: ...
+
+
+class Plane:
+    """The ground plans of a policy's zones, by index; heights and times do not count here."""
+
+    def __init__(self, zones: Sequence[Zone], prepared: Sequence[_Prepared]) -> None:
+        self._zones = zones
+        self._shapes = prepared
+        self._regions: dict[int, Region | None] = {}
+        self._within: dict[tuple[int, int], bool] = {}
+        self._apart: dict[tuple[int, int], bool] = {}
+        self._found: dict[tuple[tuple[int, bool], ...], Point | None] = {}
+
+    def zone(self, number: int) -> Zone:
+        """A zone as the policy has it."""
+        return self._zones[number]
+
+    def within(self, inner: int, outer: int) -> bool:
+        """Whether it is proved that all of one zone belongs to another."""
+        return inner == outer or self._related(self._within, inner, outer, lies_within)
+
+    def apart(self, one: int, other: int) -> bool:
+        """Whether it is proved that two zones have no place in common."""
+        return one != other and self._related(self._apart, min(one, other), max(one, other), have_nothing_in_common)
+
+    def _related(
+        self, known: dict[tuple[int, int], bool], one: int, other: int, holds: Callable[[Region, Region], bool]
+    ) -> bool:
+        found = known.get((one, other))
+        if found is None:
+            first, second = self._region(one), self._region(other)
+            found = first is not None and second is not None and holds(first, second)
+            known[one, other] = found
+        return found
+
+    def _region(self, number: int) -> Region | None:
+        if number not in self._regions:
+            self._regions[number] = _region(self._zones[number])
+        return self._regions[number]
+
+    def contains(self, zone: int, place: Point) -> bool:
+        """Whether a place is inside a zone's ground plan."""
+        return self._shapes[zone].shape.contains(*place)
+
+    def place(self, sides: Mapping[int, bool], allowed: Callable[[Point], bool]) -> Point | None:
+        """A place that is inside each zone that `sides` says True of and outside all others; None: none was found."""
+        key = tuple(sorted(sides.items()))
+        if key not in self._found:
+            self._found[key] = None
+        known = self._found[key]
+        if known is not None and allowed(known):
+            return known
+        for candidate in self._candidates([z for z, side in key if side], [z for z, side in key if not side]):
+            fits = max(map(abs, candidate)) <= MAX_COORDINATE and allowed(candidate)
+            if fits and all(self.contains(zone, candidate) == side for zone, side in key):
+                self._found[key] = candidate
+                return candidate
+        return None
+
+    def _candidates(self, inside: list[int], outside: list[int]) -> Iterator[Point]:
+        yield from _FAR
+        boxes = [_bounds(self._zones[zone]) for zone in inside]
+        if boxes:
+            west, south = max(box[0] for box in boxes), max(box[1] for box in boxes)
+            east, north = min(box[2] for box in boxes), min(box[3] for box in boxes)
+        else:
+            boxes = [_bounds(self._zones[zone]) for zone in outside] or [(0, 0, 0, 0)]
+            west, south = min(box[0] for box in boxes) - 2, min(box[1] for box in boxes) - 2
+            east, north = max(box[2] for box in boxes) + 2, max(box[3] for box in boxes) + 2
+        if west > east or south > north:
+            return
+        yield (west + east) // 2, (south + north) // 2
+        for zone in (*inside, *outside):
+            w, s, e, n = _bounds(self._zones[zone])
+            yield (w + e) // 2, (s + n) // 2
+        for i in range(_GRID + 1):
+            for j in range(_GRID + 1):
+                yield west + (east - west) * i // _GRID, south + (north - south) * j // _GRID
+        if inside:
+            for x, y in _inner(self._zones, inside, outside):
+                yield from ((x + dx, y + dy) for dx, dy in _BESIDE)
+
+
+def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iterator[Point]:
+    """Places within what is left of some zones without others, as floats tell; for the caller to verify."""
+    from rtshcua.ground.analysis.shapely_places import places  # noqa: PLC0415  shapely is slow to import
+
+    yield from places([zones[zone] for zone in inside], [zones[zone] for zone in outside])
+
+
+def _region(zone: Zone) -> Region | None:
+    """The ground plan of a zone for the exact relations; None for a circle whose radius is no whole number."""
+    if zone.shape == CIRCLE:
+        x, y, square = zone.data
+        radius = isqrt(square)
+        return Region(Disc((x, y), radius), LOWEST, HIGHEST) if radius * radius == square else None
+    return Region(cornered(rings_of(zone)), LOWEST, HIGHEST)
+
+
+def rings_of(zone: Zone) -> tuple[Ring, ...]:
+    """The rings of a zone that is no circle."""
+    counts: tuple[int, ...] = (len(zone.data) // 2,)
+    flat = zone.data
+    if zone.shape == AREA:
+        counts, flat = zone.data[1 : 1 + zone.data[0]], zone.data[1 + zone.data[0] :]
+    corners = list(zip(flat[::2], flat[1::2], strict=True))
+    ends = list(accumulate(counts))
+    return tuple(tuple(corners[end - count : end]) for count, end in zip(counts, ends, strict=True))
+
+
+def _bounds(zone: Zone) -> tuple[int, int, int, int]:
+    """West, south, east, north of a zone."""
+    region = _region(zone)
+    if region is not None:
+        return bounds(region.shape)
+    x, y, square = zone.data
+    reach = isqrt(square) + 1
+    return x - reach, y - reach, x + reach, y + reach

@@ -1,0 +1,48 @@
+"""What is asked about one policy: answers are remembered, how its zones lie, and what its missions were given."""
+
+from collections.abc import Callable, Hashable, Sequence
+
+from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.ground.analysis.plane import Plane
+from rtshcua.ground.analysis.solve import Answer, Goal, satisfiable
+from rtshcua.ground.analysis.space import Space, space_of
+
+
+class Questions:
+    """Questions about a prepared policy. `instances` are, of each mission by name, the skill and the arguments of each
+    step, for each choice of the mission's parameters so far.
+    """
+
+    def __init__(self, prepared: PreparedPolicy) -> None:
+        self._prepared = prepared
+        self._plane: Plane | None = None
+        self._spaces: dict[int, Space] = {}
+        self._answers: dict[Hashable, Answer] = {}
+        self.instances: dict[str, list[tuple[tuple[int, tuple[int, ...]], ...]]] = {}
+
+    def space(self, skill: int) -> Space:
+        """Any situation in which a skill, by its number, may be asked for."""
+        found = self._spaces.get(skill)
+        if found is None:
+            contract = self._prepared.policy.contracts[skill]
+            found = self._spaces[skill] = space_of(self._prepared, contract, self._plane)
+            self._plane = found.plane
+        return found
+
+    def ask(self, key: Hashable, goals: Callable[[], Sequence[Goal]], space: Space) -> Answer:
+        """The answer to a question; `key` says all that it depends on."""
+        found = self._answers.get(key)
+        if found is None:
+            found = self._answers[key] = satisfiable(goals(), space)
+        return found
+
+    def known(self, key: Hashable) -> Answer | None:
+        """The answer to a question, if it was asked."""
+        return self._answers.get(key)
+
+    def forget(self) -> None:
+        """As before the first question."""
+        self._plane = None
+        self._spaces.clear()
+        self._answers.clear()
+        self.instances.clear()

@@ -1,0 +1,94 @@
+"""What a situation may be: the start of every search."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rtshcua.decision.evaluate import Tables
+from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.values import MISSING, Span, Value, interval, maybe, members
+from rtshcua.ground.analysis.plane import Plane
+from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract
+from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import ENUMERATION, POSITION
+from rtshcua.model.flat.zone import MAX_COORDINATE
+from rtshcua.model.quantity import Dimension
+
+ANYWHERE = interval(-MAX_COORDINATE, MAX_COORDINATE)
+#: dimensions in which nothing is below zero, and what is the most
+_WHOLE = frozenset({Dimension.RATIO.value})
+
+
+class Space(NamedTuple):
+    """A set of situations: a value for each argument cell and state slot, UTC and its error.
+
+    `phases` are the phases that the invocation may be in, as indexes into the policy's names; -1 stands for all that
+    the policy does not name. `monitors` has a set of truths for each temporal monitor.
+    """
+
+    arguments: tuple[Value, ...]
+    slots: tuple[Value, ...]
+    utc: tuple[Span, ...]
+    error: Span
+    phases: frozenset[int]
+    monitors: tuple[int, ...]
+    tables: Tables
+    plane: Plane
+
+
+def space_of(prepared: PreparedPolicy, contract: Contract | None, plane: Plane | None = None) -> Space:
+    """Any situation that an invocation of a skill may be met in; None: of any skill, without its arguments.
+
+    Pass the `plane` of an earlier space of the policy, which remembers how its zones lie.
+    """
+    policy = prepared.policy
+    return Space(
+        arguments=() if contract is None else arguments_of(contract),
+        slots=(*signals(policy), MISSING),
+        utc=_moments(policy),
+        error=(0, 0),
+        phases=frozenset(range(-1, len(policy.phases))),
+        monitors=(7,) * len(policy.monitors),
+        tables=prepared.tables,
+        plane=plane or Plane(policy.zones, prepared.tables.zones),
+    )
+
+
+def arguments_of(contract: Contract) -> tuple[Value, ...]:
+    """The range of each argument cell."""
+    cells: dict[int, Value] = {}
+    for parameter in contract.parameters:
+        if parameter.kind == PLACE:
+            cells[parameter.cell] = cells[parameter.cell + 1] = ANYWHERE
+        elif parameter.kind in (CHOICE, ZONE):
+            cells[parameter.cell] = members(range(parameter.low, max(parameter.low, parameter.high) + 1))
+        else:
+            cells[parameter.cell] = interval(parameter.low, parameter.high)
+    return tuple(cells[cell] for cell in sorted(cells))
+
+
+def signals(policy: Policy) -> Sequence[Value]:
+    """One value a slot: whatever its signal may report, or nothing."""
+    values: list[Value] = [MISSING] * policy.slots
+    for signal in policy.signals:
+        if signal.kind == POSITION:
+            values[signal.slot] = values[signal.slot + 1] = maybe(ANYWHERE)
+        elif signal.kind == ENUMERATION:
+            values[signal.slot] = maybe(members(value for value, _ in signal.labels))
+        elif signal.dimension in _WHOLE:
+            values[signal.slot] = maybe(interval(0, FULL))
+        else:
+            values[signal.slot] = maybe(interval(-MAX_VALUE, MAX_VALUE))
+    return values
+
+
+def _moments(policy: Policy) -> tuple[Span, ...]:
+    """Moments that show all that the time can do to a condition: a day of each stretch between two dates of zones."""
+    dates = sorted(
+        {moment for zone in policy.zones for moment in (zone.dates[:1] + tuple(d + 1 for d in zone.dates[1:]))}
+    )
+    if not dates:
+        return ((0, DAY - 1),)
+    starts = [max(dates[0] - DAY, 0), *dates]
+    ends = [*(date - 1 for date in dates), dates[-1] + DAY - 1]
+    return tuple((low, min(high, low + DAY - 1)) for low, high in zip(starts, ends, strict=True) if low <= high)

@@ -1,0 +1,160 @@
+"""Sums, products, quotients, `abs`, `min` and `max`: the type of each, and the exact number of a constant one."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.dimensions import COHERENT, PRODUCTS, QUOTIENTS, product, quotient
+from rtshcua.ground.checker.fitting import declaration_labels, fit
+from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.checker.types import LENGTH, Kind, Type, Typed
+from rtshcua.model.ir.expression import Arithmetic, Function, Value
+from rtshcua.model.quantity import Dimension
+
+
+def arithmetic(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
+    """`left operator right`, of sides whose types are known; None after a finding."""
+    if not _numbers(scope, node.operator, (node.left, node.right), (left, right)):
+        return None
+    match node.operator:
+        case "*":
+            return _product(scope, node, left, right)
+        case "/":
+            return _quotient(scope, node, left, right)
+        case _:
+            return _sum(scope, node, left, right)
+
+
+def function(scope: Scope, node: Function, found: Sequence[Typed]) -> Typed | None:
+    """`abs`, `min` or `max` of operands whose types are known; a constant length takes the datum of an altitude."""
+    if not _numbers(scope, node.name, node.operands, found):
+        return None
+    leading = next((each for each in found if each.constant is None or each.type.datum is not None), found[0])
+    fitted = [
+        fit(scope, operand, each, leading.type, (node.span, f"`{node.name}` takes numbers of one dimension and datum"))
+        for operand, each in zip(node.operands, found, strict=True)
+    ]
+    values = [each.constant for each in fitted if each is not None and each.constant is not None]
+    if None in fitted:
+        return None
+    if len(values) < len(fitted):
+        return Typed(leading.type, None)
+    constant = abs(values[0]) if node.name == "abs" else min(values) if node.name == "min" else max(values)
+    return Typed(leading.type, constant)
+
+
+def _numbers(scope: Scope, word: str, nodes: Sequence[Value], found: Sequence[Typed]) -> bool:
+    for node, each in zip(nodes, found, strict=True):
+        if each.type.kind is not Kind.NUMBER:
+            scope.report.add(
+                codes.BAD_ARITHMETIC,
+                node.span,
+                f"`{word}` takes numbers, and this is {each.type.describe()}",
+                labels=declaration_labels(scope, node),
+            )
+            return False
+    return True
+
+
+def _coherent(type: Type) -> int:
+    assert type.dimension is not None
+    return COHERENT[type.dimension]
+
+
+def _product(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
+    """A product has a number that is known when it is compiled on one side."""
+    type = product(left.type, right.type)
+    if type is None:
+        scope.report.add(
+            codes.BAD_ARITHMETIC,
+            node.span,
+            f"{left.type.describe()} times {right.type.describe()} is nothing that has a unit here",
+            help=PRODUCTS,
+            labels=_sides(node, left, right),
+        )
+        return None
+    if left.constant is None and right.constant is None:
+        scope.report.add(
+            codes.BAD_ARITHMETIC,
+            node.span,
+            "one side of `*` must be known before the flight, and neither is",
+            help="write a number on one side, as in `2 * altitude` or `speed * 3 s`",
+            labels=_sides(node, left, right),
+        )
+        return None
+    if left.constant is None or right.constant is None:
+        return Typed(type, None)
+    factor = Fraction(_coherent(type), _coherent(left.type) * _coherent(right.type))
+    return Typed(type, left.constant * right.constant * factor)
+
+
+def _quotient(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
+    """What divides is known when it is compiled, and not zero."""
+    if right.constant is None or right.constant == 0:
+        unknown = right.constant is None
+        text = scope.report.text(node.right.span)
+        scope.report.add(
+            codes.BAD_DIVISION,
+            node.right.span,
+            f"`{text}` is not known before the flight, so nothing can be divided by it"
+            if unknown
+            else f"`{text}` is zero, and nothing can be divided by it",
+            help="multiply the other side of the comparison instead" if unknown else None,
+            labels=declaration_labels(scope, node.right),
+        )
+        return None
+    type = quotient(left.type, right.type)
+    if type is None:
+        scope.report.add(
+            codes.BAD_ARITHMETIC,
+            node.span,
+            f"{left.type.describe()} cannot be divided by {right.type.describe()}",
+            help=QUOTIENTS,
+            labels=_sides(node, left, right),
+        )
+        return None
+    if left.constant is None:
+        return Typed(type, None)
+    factor = Fraction(_coherent(type) * _coherent(right.type), _coherent(left.type))
+    return Typed(type, left.constant / right.constant * factor)
+
+
+def _sum(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
+    sign = 1 if node.operator == "+" else -1
+    constant = None
+    if left.constant is not None and right.constant is not None:
+        constant = left.constant + sign * right.constant
+    type = _sum_type(left.type, right.type, sign)
+    if type is not None:
+        return Typed(type, constant)
+    both_altitudes = left.type.dimension is right.type.dimension is Dimension.ALTITUDE
+    code = codes.DATUM_MISMATCH if both_altitudes and sign < 0 else codes.DIMENSION_MISMATCH
+    words = "added to" if sign > 0 else "subtracted from"
+    scope.report.add(
+        code,
+        node.span,
+        f"{right.type.describe()} cannot be {words} {left.type.describe()}",
+        help="the difference of two altitudes is a length; add a length to an altitude" if both_altitudes else None,
+        labels=_sides(node, left, right),
+    )
+    return None
+
+
+def _sides(node: Arithmetic, left: Typed, right: Typed) -> list[tuple[Span, str]]:
+    return [
+        (node.left.span, f"this is {left.type.describe()}"),
+        (node.right.span, f"this is {right.type.describe()}"),
+    ]
+
+
+def _sum_type(left: Type, right: Type, sign: int) -> Type | None:
+    """The type of a sum (`sign` 1) or difference (-1); a length moves an altitude, two altitudes differ by a length."""
+    altitudes = (left.dimension is Dimension.ALTITUDE, right.dimension is Dimension.ALTITUDE)
+    if altitudes == (True, True):
+        return LENGTH if sign < 0 and left == right else None
+    if altitudes == (True, False) and right == LENGTH:
+        return left
+    if altitudes == (False, True) and left == LENGTH and sign > 0:
+        return right
+    return left if left == right else None

@@ -1,0 +1,136 @@
+"""E0806, E0807: the times of a contract agree with each other, and with its timing class.
+
+A decision must not come, nor what it began go on, when it means nothing any more: the deadline and the longest
+duration fit into the validity, and so does the time for which an approval is awaited. A grace that is longer than the
+skill lasts would bear with anything. The class (paper symbol `cls`) bounds the deadline:
+
+| class | deadline | why |
+|---|---|---|
+| `reflex` | 200 ms | what an obstacle at 10 m and 12 m/s leaves, less the time to brake |
+| `tactical` | 30 s | what is decided on the state of now cannot wait while the battery and the wind change |
+| `semantic` | none | a person or an agent thinks it over |
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.checks.overrides import DEFAULT_GRACE_US
+from rtshcua.ground.checker.context import Context
+from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.missions import Overrides
+from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.quantity import Dimension, display
+
+#: the longest deadline of each class that has one, us
+LONGEST_DEADLINE = {"reflex": 200_000, "tactical": 30_000_000}
+
+
+class _Times(NamedTuple):
+    """What a contract says; None where it says nothing, or nothing that is a time."""
+
+    deadline: Quantity | None
+    validity: Quantity | None
+    duration: Quantity | None
+    grace: Quantity | None
+
+
+def check(context: Context) -> None:
+    """Report every contract, override and `confirm` rule whose times cannot all be meant."""
+    for skill in context.symbols.skills.values():
+        _coherent(context, _of(skill))
+        _class(context, skill)
+    for mission in context.symbols.missions.values():
+        for phase in mission.phases:
+            for step in phase.steps:
+                skill_of = context.symbols.skills.get(step.skill.text)
+                if step.overrides is not None and skill_of is not None:
+                    _coherent(context, _overridden(_of(skill_of), _of(step.overrides)), _of(step.overrides))
+    for policy in context.symbols.policies.values():
+        for rule in policy.rules:
+            if rule.kind == "confirm":
+                _approval(context, rule)
+
+
+def _of(contract: SkillDecl | Overrides) -> _Times:
+    return _Times(*map(_time, (contract.deadline, contract.validity, contract.duration, contract.grace)))
+
+
+def _time(quantity: Quantity | None) -> Quantity | None:
+    return quantity if quantity is not None and quantity.dimension is Dimension.DURATION else None
+
+
+def _overridden(skill: _Times, step: _Times) -> _Times:
+    return _Times(*(theirs if mine is None else mine for mine, theirs in zip(step, skill, strict=True)))
+
+
+def _coherent(context: Context, times: _Times, of: Iterable[Quantity | None] = ()) -> None:
+    """Report what contradicts each other; with `of`, only what one of these contributes to."""
+    own = {id(quantity) for quantity in of if quantity is not None}
+    deadline, validity, duration, grace = times
+    for short, long, words, help in (
+        (validity, deadline, "the deadline is {}, and the decision is valid for {}", "a step could begin too late"),
+        (validity, duration, "it lasts up to {}, and the decision is valid for {}", "it could go on too long"),
+        (duration, grace, "the grace is {}, and it all lasts at most {}", "a clause could be unknown all along"),
+    ):
+        if short is None or long is None or long.value <= short.value:
+            continue
+        if own and own.isdisjoint((id(short), id(long))):
+            continue
+        at, other = (long, short) if not own or id(long) in own else (short, long)
+        context.report.add(
+            codes.INCOHERENT_TIMING,
+            at.span,
+            words.format(_words(long), _words(short)),
+            help=f"{help}: at most `{_words(short)}` fits",
+            labels=[(other.span, "does not fit with this")],
+        )
+    if grace is not None or duration is None or (own and id(duration) not in own):
+        return
+    if 0 < duration.value < DEFAULT_GRACE_US:
+        context.report.add(
+            codes.INCOHERENT_TIMING,
+            duration.span,
+            f"the grace is {display(DEFAULT_GRACE_US, Dimension.DURATION)} where none is written, and it all lasts "
+            f"at most {_words(duration)}",
+            help="write a shorter `grace`",
+        )
+
+
+def _class(context: Context, skill: SkillDecl) -> None:
+    deadline = _time(skill.deadline)
+    if deadline is None or skill.timing_class is None:
+        return
+    longest = LONGEST_DEADLINE.get(skill.timing_class.text)
+    if longest is not None and deadline.value > longest:
+        most = display(longest, Dimension.DURATION)
+        slower = next((name for name, most in LONGEST_DEADLINE.items() if deadline.value <= most), "semantic")
+        context.report.add(
+            codes.CLASS_TIMING,
+            deadline.span,
+            f"a `{skill.timing_class.text}` skill is decided within {most}, and this deadline is {_words(deadline)}",
+            help=f"write at most `{most}`, or make the skill `{slower}`",
+            labels=[(skill.timing_class.span, "its class")],
+            fix=(deadline.span, most, f"write `{most}`"),
+        )
+
+
+def _approval(context: Context, rule: Rule) -> None:
+    within = _time(rule.within)
+    for name in rule.skills:
+        skill = context.symbols.skills.get(name.text)
+        validity = None if skill is None else _time(skill.validity)
+        if within is not None and validity is not None and within.value > validity.value:
+            context.report.add(
+                codes.INCOHERENT_TIMING,
+                within.span,
+                f"an approval is awaited for {_words(within)}, and a decision on `{name.text}` is valid for "
+                f"{_words(validity)}",
+                help=f"at most `{_words(validity)}` fits",
+                labels=[(validity.span, "does not fit with this")],
+            )
+
+
+def _words(quantity: Quantity) -> str:
+    return display(quantity.value, Dimension.DURATION)

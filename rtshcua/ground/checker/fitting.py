@@ -1,0 +1,107 @@
+"""Whether a value is of the type that is asked for, and what would be, in units and datum."""
+
+from fractions import Fraction
+from math import floor
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.ground.checker.types import COUNT, EXAMPLES, LENGTH, Kind, Type, Typed
+from rtshcua.ground.language.exact import CANONICAL
+from rtshcua.model.ir.expression import Quantity, Reference, Value
+from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.signals import SignalDecl
+from rtshcua.model.quantity import UNITS, Datum, Dimension, display
+
+
+def fit(scope: Scope, node: Value, found: Typed, expected: Type, asked: tuple[Span, str] | None = None) -> Typed | None:
+    """`found` as a value of type `expected`; a constant length is an altitude above home where one is asked."""
+    if found.type == expected:
+        return found
+    asked_altitude = expected.dimension is Dimension.ALTITUDE
+    if asked_altitude and found.type == LENGTH and found.constant is not None and expected.datum is Datum.HOME:
+        return Typed(expected, found.constant)
+    datum = asked_altitude and (
+        found.type.dimension is Dimension.ALTITUDE or (found.type == LENGTH and found.constant is not None)
+    )
+    if datum:
+        here = "above home" if found.type == LENGTH else f"above {found.type.datum.value}"  # type: ignore[union-attr]
+        message = f"`{scope.report.text(node.span)}` is {here}, where {expected.describe()} is asked"
+    else:
+        message = f"{expected.describe()} is asked, and `{scope.report.text(node.span)}` is {found.type.describe()}"
+    replacement = _corrected(scope, node, found, expected)
+    scope.report.add(
+        codes.DATUM_MISMATCH
+        if datum
+        else codes.DIMENSION_MISMATCH
+        if _numbers(found.type, expected)
+        else codes.WRONG_TYPE,
+        node.span,
+        message,
+        help=_accepted(expected, replacement),
+        labels=[*declaration_labels(scope, node), *(() if asked is None else (asked,))],
+        fix=None if replacement is None else (node.span, replacement, f"write `{replacement}`"),
+    )
+    return None
+
+
+def stored(scope: Scope, node: Value, type: Type, constant: Fraction) -> int | None:
+    """A constant as the whole number in which it is kept on board; None, and reported (E0302), where it is none."""
+    if constant.denominator == 1:
+        return constant.numerator
+    assert type.dimension is not None
+    unit = CANONICAL[Dimension.LENGTH if type.dimension is Dimension.ALTITUDE else type.dimension]
+    below = floor(constant)
+    near = " and ".join(f"`{display(each, type.dimension)}`" for each in (below, below + 1))
+    kept = "it is a plain number" if type.dimension is Dimension.COUNT else f"{type.describe()} is kept in whole {unit}"
+    scope.report.add(
+        codes.NOT_EXACT,
+        node.span,
+        f"`{scope.report.text(node.span)}` is not a whole number" + (f" of {unit}" if unit else ""),
+        help=f"{kept}; the nearest are {near}",
+    )
+    return None
+
+
+def _numbers(left: Type, right: Type) -> bool:
+    return left.kind is Kind.NUMBER and right.kind is Kind.NUMBER
+
+
+def _accepted(expected: Type, replacement: str | None) -> str:
+    if replacement is not None:
+        return f"write `{replacement}`, if that is what you mean"
+    if expected.kind is Kind.NUMBER and expected.dimension is not None:
+        example = EXAMPLES[expected.dimension] + (" above sea" if expected.datum is Datum.SEA else "")
+        return f"write {expected.describe()}, such as `{example}`"
+    if expected.enumeration is not None:
+        return "its values are " + ", ".join(f"`{member}`" for member in expected.enumeration.members)
+    return f"write {expected.describe()}"
+
+
+def _corrected(scope: Scope, node: Value, found: Typed, expected: Type) -> str | None:
+    """The literal with the unit or the datum that was asked, where that is likely what was meant."""
+    if not isinstance(node, Quantity) or expected.kind is not Kind.NUMBER or expected.dimension is None:
+        return None
+    written = scope.report.text(node.span)
+    if found.type == LENGTH and expected.dimension is Dimension.ALTITUDE:
+        return f"{written} above {Datum.SEA.value}"
+    if found.type == COUNT:
+        return f"{written} {EXAMPLES[expected.dimension].split()[-1]}"
+    if found.type == LENGTH and expected.dimension is Dimension.SPEED:
+        unit = next((name for name in sorted(UNITS, key=len, reverse=True) if written.endswith(name)), "")
+        return f"{written}/s" if f"{unit}/s" in UNITS else None
+    return None
+
+
+def declaration_labels(scope: Scope, node: Value) -> list[tuple[Span, str]]:
+    """A label that points at the declaration of a name, for a value that is just a name."""
+    if not isinstance(node, Reference):
+        return []
+    found = scope.find(node.name)
+    if isinstance(found, Argument):
+        return [(found.declaration.span, f"`{node.name}` is declared here")]
+    if isinstance(found, SignalDecl):
+        return [(found.name.span, f"`{node.name}` is declared here")]
+    if isinstance(found, ZoneDecl):
+        return [(found.name.span, f"`{node.name}` is declared here")]
+    return []

@@ -1,0 +1,228 @@
+"""Areas from GeoJSON (RFC 7946): one Polygon or MultiPolygon, of a file that holds it alone or among features.
+
+Read strictly, for a zone is what the policy's signer saw: no key twice, no NaN, no ring that is not closed. Numbers are
+decimal digits until they are whole 1e-7 degrees (rounded to the nearest, half to even: at most 6 mm on the ground), so
+that no float decides on which side of a fence a place lies.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Decimal, localcontext
+from itertools import pairwise
+from typing import Any
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.features import Refused, chosen
+from rtshcua.ground.checker.polygons import Corner, crossing
+from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
+
+#: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
+MAX_DEPTH = 32
+#: characters of a number: a double needs no more than 24
+MAX_NUMBER = 64
+MAX_EXPONENT = 3  # digits; that of a double has no more
+#: a local projection has no use nearer to a pole
+MAX_LATITUDE, MAX_LONGITUDE = 85, 180
+_DEGREE = Decimal(10_000_000)
+_BRACKETS = re.compile(r'"(?:[^"\\]++|\\.)*+"|[\[\]{}]', re.DOTALL)
+
+#: corners of one ring as (longitude, latitude) in 1e-7 degree, not closed by a repeated corner
+GeoRing = tuple[Corner, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GeoPolygon:
+    """An outer ring and the holes in it."""
+
+    outer: GeoRing
+    holes: tuple[GeoRing, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number as it is written."""
+
+    text: str
+
+
+def _not_json(message: str) -> Refused:
+    return Refused(codes.NOT_GEOJSON, message)
+
+
+def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
+    """The polygons of the one area in a file, or of the feature with that id or name; raises `Refused`."""
+    geometry, pointer = chosen(_json(data), feature)
+    return _polygons(geometry, pointer)
+
+
+# ------------------------------------------------------------------------------------------------------------ JSON
+
+
+def _json(data: bytes) -> Any:
+    """The value of a text; numbers stay as they are written."""
+    try:
+        text = data.decode("utf-8-sig")  # RFC 8259, 8.1: a parser may ignore a byte order mark
+    except UnicodeDecodeError as error:
+        raise _not_json(f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8") from error
+    if _depth(text) > MAX_DEPTH:
+        raise _not_json(f"it is nested more than {MAX_DEPTH} deep")
+    try:
+        return json.loads(
+            text, parse_float=_number, parse_int=_number, parse_constant=_constant, object_pairs_hook=_object
+        )
+    except json.JSONDecodeError as error:
+        message = error.msg[0].lower() + error.msg[1:]
+        raise _not_json(f"line {error.lineno}, column {error.colno}: {message}") from error
+
+
+def _depth(text: str) -> int:
+    """How deep brackets are nested outside of strings."""
+    depth = most = 0
+    for found in _BRACKETS.finditer(text):
+        if found[0] in "[{":
+            depth += 1
+            most = max(most, depth)
+        elif found[0] in "]}":
+            depth -= 1
+    return most
+
+
+def _number(text: str) -> Number:
+    if len(text) > MAX_NUMBER:
+        raise _not_json(f"the number `{text[:20]}...` has more than {MAX_NUMBER} characters")
+    if len(text.lower().partition("e")[2].lstrip("+-")) > MAX_EXPONENT:
+        raise _not_json(f"the exponent of `{text}` has more than {MAX_EXPONENT} digits")
+    return Number(text)
+
+
+def _constant(text: str) -> None:
+    raise _not_json(f"`{text}` is not a number in JSON")  # RFC 8259, 6
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in made:  # RFC 7493, 2.3: names must be unique; RFC 8259 leaves open what else they mean
+            raise _not_json(f"the key `{key}` is written twice in one object")
+        made[key] = value
+    return made
+
+
+# ------------------------------------------------------------------------------------------------------- geometries
+
+
+def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
+    """The polygons of a Polygon (RFC 7946, 3.1.6) or a MultiPolygon (3.1.7)."""
+    pointer = f"{pointer}/coordinates"
+    coordinates = _array(geometry.get("coordinates"), pointer)
+    count = _count(coordinates)
+    if count > MAX_VERTICES + MAX_RINGS:  # what is really too much is known in the local plane
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"the area at `{pointer}` has {count:,} positions, and at most {MAX_VERTICES:,} corners fit on board",
+            "simplify it to what matters for a flight",
+        )
+    if geometry["type"] == "Polygon":
+        return (_polygon(coordinates, pointer),)
+    found = tuple(_polygon(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(coordinates))
+    if not found:
+        raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` has no polygon")
+    return found
+
+
+def _count(value: Any) -> int:
+    """The number of positions."""
+    if not isinstance(value, list):
+        return 0
+    return sum(map(_count, value)) if value and isinstance(value[0], list) else 1
+
+
+def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:
+    """RFC 7946, 3.1.6: the first ring is the exterior one, all others are holes."""
+    made = [_ring(_array(ring, f"{pointer}/{i}"), f"{pointer}/{i}") for i, ring in enumerate(rings)]
+    if not made:
+        raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` has no ring")
+    return GeoPolygon(made[0], tuple(made[1:]))
+
+
+def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
+    """RFC 7946, 3.1.6: a closed line of four or more positions, whose first and last ones are identical. It goes around
+    either way: parsers should not reject polygons that do not follow the right-hand rule.
+    """
+    if len(positions) < 4:
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"the ring at `{pointer}` has too few positions: {len(positions)}, and it needs four",
+            "a ring ends with the position that it begins with (RFC 7946, 3.1.6)",
+        )
+    corners = [_position(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(positions)]
+    if corners[0] != corners[-1]:
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"the ring at `{pointer}` is not closed",
+            "a ring ends with the position that it begins with (RFC 7946, 3.1.6)",
+        )
+    for i, (a, b) in enumerate(pairwise(corners)):
+        if abs(a[0] - b[0]) > MAX_LONGITUDE * int(_DEGREE):
+            raise Refused(
+                codes.GEOJSON_SHAPE,
+                f"the ring at `{pointer}` crosses the antimeridian after its position {i}",
+                "cut the area at longitude 180 (RFC 7946, 3.1.9), and declare either part as a zone of its own",
+            )
+    ring = [a for a, b in pairwise(corners) if a != b]
+    if len(ring) < 3:
+        raise Refused(codes.GEOJSON_SHAPE, f"the ring at `{pointer}` encloses nothing")
+    met = crossing(ring)
+    if met is not None:
+        one, other = (_written(ring[i]) for i in met)
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"the ring at `{pointer}` crosses or touches itself: its edge from {one} meets the one from {other}",
+        )
+    return tuple(ring)
+
+
+def _position(numbers: Sequence[Any], pointer: str) -> Corner:
+    """RFC 7946, 3.1.1: longitude, latitude, and perhaps an altitude, which is not read: a zone has its floor and its
+    ceiling in the source. WGS 84 by section 4.
+    """
+    if len(numbers) < 2 or not all(isinstance(each, Number) for each in numbers):
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"`{pointer}` is not a position",
+            "a position is a longitude and a latitude, as in `[8.5456, 47.3977]` (RFC 7946, 3.1.1)",
+        )
+    longitude, latitude = (Decimal(each.text) for each in numbers[:2])
+    north, east = latitude.copy_abs(), longitude.copy_abs()  # exact; `abs` rounds
+    if north > MAX_LATITUDE or east > MAX_LONGITUDE:
+        swapped = east <= MAX_LATITUDE and north <= MAX_LONGITUDE
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"`{pointer}` is {longitude}, {latitude}, which is not a place that can be flown to",
+            "the longitude comes first (RFC 7946, 3.1.1)"
+            if swapped
+            else "longitudes go from -180 to 180, latitudes from -85 to 85",
+        )
+    return _whole(longitude), _whole(latitude)
+
+
+def _whole(degrees: Decimal) -> int:
+    """In 1e-7 degree, rounded to the nearest, half to even; exact, for no number has more digits than the context."""
+    with localcontext(prec=4 * MAX_NUMBER, rounding=ROUND_HALF_EVEN):
+        if degrees.adjusted() < -MAX_NUMBER:
+            return 0
+        return int((degrees * _DEGREE).to_integral_value())
+
+
+def _array(value: Any, pointer: str) -> Sequence[Any]:
+    if isinstance(value, list):
+        return value
+    raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` is not an array")
+
+
+def _written(corner: Corner) -> str:
+    """A position as it stands in a file."""
+    longitude, latitude = (Decimal(each) / _DEGREE for each in corner)
+    return f"[{longitude}, {latitude}]"

@@ -1,0 +1,165 @@
+"""E0809 to E0811: what a mission takes at most, in steps, time and energy, and whether that is within what it says.
+
+Time runs from the issue to the end: the start window, each step's approval, deadline and duration, and the longest
+chain that may follow one of them. Energy is what the contracts of all steps may take, the most that a chain takes, and
+the way home from the farthest planned place. It is a sum of bounds, so it may exceed a full charge where a flight would
+not; then what is skipped or degraded on board for want of charge is what keeps the flight within one.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from math import isqrt
+from typing import NamedTuple
+
+from rtshcua.decision.lasting import longest
+from rtshcua.decision.prepare import Malformed, prepare_invocation
+from rtshcua.decision.truth import TRUE
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US
+from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.limits import FULL
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.quantity import Dimension, display
+
+SECOND_US = 1_000_000
+
+#: so many of the largest contributions are shown
+SHOWN = 3
+
+
+class Bounds(NamedTuple):
+    """At most so many invocations, so long from the issue to the end (us), and so much energy (1/10000)."""
+
+    invocations: int
+    time_us: int
+    energy: int
+
+
+def most(one: Bounds, other: Bounds | None) -> Bounds:
+    """What is within both."""
+    return one if other is None else Bounds(*map(max, one, other))
+
+
+def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission) -> Bounds:
+    """The bounds of a mission; reports where they exceed what it says."""
+    policy = ground.prepared.policy
+    steps = [step for phase in declared.phases for step in phase.steps]
+    times = [_time(ground, mission, invocation) for invocation in mission.invocations]
+    energies = [invocation.contract.energy for invocation in mission.invocations]
+    chains = {id(chain): chain for chain in (policy.contingency, *(i.contract.fallback for i in mission.invocations))}
+    found = Bounds(
+        len(mission.invocations),
+        START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains.values()),
+        sum(energies) + max(_chain_energy(chain, policy) for chain in chains.values()) + _way_home(mission, policy),
+    )
+    _count(ground, declared, found.invocations)
+    _within(ground, declared, found, steps, times, energies)
+    return found
+
+
+def _time(ground: Ground, mission: Mission, invocation: Invocation) -> int:
+    """How long a step takes from its turn to its end, in us."""
+    contract, vehicle = invocation.contract, ground.prepared.policy.vehicle
+    return _approval(ground, mission, invocation) + contract.deadline_us + longest(contract, vehicle)
+
+
+def _approval(ground: Ground, mission: Mission, invocation: Invocation) -> int:
+    """How long a step may wait for an approval."""
+    confirms = [rule for rule in ground.prepared.policy.rules if rule.kind == RuleKind.CONFIRM]
+    if not any(not rule.skills or invocation.skill in rule.skills for rule in confirms):
+        return 0
+    prepared = prepare_invocation(invocation, ground.prepared, mission.phases)
+    if isinstance(prepared, Malformed):
+        return 0  # reported by the proofs
+    at = ground.case(prepared).at
+    return max((each.rule.within_us for each in prepared.candidates.confirms if each.condition(at) & TRUE), default=0)
+
+
+def _chain_time(chain: Iterable[Link], policy: Policy) -> int:
+    return sum(longest(policy.contracts[link.skill], policy.vehicle, link.limit_us) for link in chain)
+
+
+def _chain_energy(chain: Iterable[Link], policy: Policy) -> int:
+    return sum(policy.contracts[link.skill].energy for link in chain)
+
+
+def _way_home(mission: Mission, policy: Policy) -> int:
+    """The energy of the way home from the farthest planned place, rounded up."""
+    squares = (
+        x * x + y * y
+        for invocation in mission.invocations
+        for x, y in zip(invocation.plan.path[::2], invocation.plan.path[1::2], strict=True)
+    )
+    distance = isqrt(max(squares, default=0)) + 1 + policy.vehicle.position_error
+    return -(-distance * SECOND_US * FULL // (policy.vehicle.speed * policy.vehicle.endurance_us))
+
+
+def _count(ground: Ground, declared: MissionDecl, steps: int) -> None:
+    if declared.most_steps is None or steps <= declared.most_steps:
+        return
+    ground.context.report.add(
+        codes.MISSION_STEPS,
+        declared.name.span,
+        f"the mission `{declared.name.text}` has {steps} steps, and says that it has at most {declared.most_steps}",
+        help=f"leave steps out, or write `steps at most {steps}`",
+        labels=[(phase.name.span, f"these are {len(phase.steps)}") for phase in declared.phases if phase.steps][:SHOWN],
+    )
+
+
+def _within(
+    ground: Ground,
+    declared: MissionDecl,
+    found: Bounds,
+    steps: Sequence[Step],
+    times: Sequence[int],
+    energies: Sequence[int],
+) -> None:
+    report = ground.context.report
+    start = display(START_WINDOW_US, Dimension.DURATION)
+    if declared.most_time is not None and found.time_us > declared.most_time.value:
+        report.add(
+            codes.MISSION_TIME,
+            declared.most_time.span,
+            f"the mission may last {rounded_time(found.time_us)} from its issue, and says that it lasts at most "
+            f"{display(declared.most_time.value, Dimension.DURATION)}",
+            help=f"{start} to the start, {rounded_time(sum(times))} for the approvals, deadlines and durations of all "
+            f"steps, and {rounded_time(found.time_us - START_WINDOW_US - sum(times))} for the longest chain; give "
+            "steps shorter times of their own, or the mission more",
+            labels=_largest(steps, times, rounded_time),
+        )
+    if declared.most_energy is not None and found.energy > declared.most_energy.value:
+        report.add(
+            codes.MISSION_ENERGY,
+            declared.most_energy.span,
+            f"the mission may need {rounded_energy(found.energy)} of a full charge, and says that it needs at most "
+            f"{display(declared.most_energy.value, Dimension.RATIO)}",
+            help=f"{rounded_energy(sum(energies))} for all steps, as their contracts allow, and "
+            f"{rounded_energy(found.energy - sum(energies))} for the chain that needs most and the way home",
+            labels=_largest(steps, energies, rounded_energy),
+        )
+
+
+def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int], str]) -> list[tuple[Span, str]]:
+    """The places that contribute most, those of a repeated step together."""
+    sums: dict[Span, list[int]] = {}
+    for step, amount in zip(steps, amounts, strict=True):
+        sums.setdefault(step.span, []).append(amount)
+    largest = sorted(sums.items(), key=lambda item: (-sum(item[1]), item[0]))[:SHOWN]
+    return [
+        (span, f"up to {words(sum(parts))}" + (f", {len(parts)} times {words(parts[0])}" if len(parts) > 1 else ""))
+        for span, parts in largest
+    ]
+
+
+def rounded_time(us: int) -> str:
+    """A time for a person, rounded up to the second."""
+    minutes, seconds = divmod(-(-us // SECOND_US), 60)
+    return (f"{minutes} min" + (f" {seconds} s" if seconds else "")) if minutes else f"{seconds} s"
+
+
+def rounded_energy(energy: int) -> str:
+    """A part of a full charge for a person, rounded up to the percent."""
+    return f"{-(-energy // (FULL // 100))} %"

@@ -1,0 +1,96 @@
+"""E0721, E0723: degrade rules that another always comes before.
+
+The first `degrade` that matches and whose target may fly is the one that flies. Two rules with the same condition are
+so a chain. But a narrower rule after a wider one is not what its author means: where it matches, the wider one flies.
+If nothing can keep the wider one's target from flying, the narrower one never does.
+"""
+
+from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.solve import No, Yes
+from rtshcua.ground.analysis.words import words
+from rtshcua.ground.compiler.proofs.ruleset import Group, Ruleset
+from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.policy import RuleKind
+
+
+def prove(rules: Ruleset, alive: list[Group]) -> None:
+    """Report each degrade rule that comes after a wider one to another target."""
+    degrades = [group for group in alive if group.kind == RuleKind.DEGRADE]
+    for at, later in enumerate(degrades):
+        for earlier in degrades[:at]:
+            if _after_wider(rules, earlier, later):
+                break
+
+
+def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
+    """Whether one rule matches wherever another, which is narrower, does; reports it."""
+    witness: tuple[Yes, int] | None = None
+    target = rules.rule(earlier.rules[0]).target
+    assert target is not None
+    always = not rules.policy.contracts[target.skill].require
+    for number in later.rules:
+        for skill in rules.skills(number):
+            if skill == _target(rules, number):
+                continue  # a rule is not about what it flies itself
+            if any(skill == _target(rules, candidate) for candidate in earlier.rules):
+                always = False
+                continue
+            before = _before(rules, earlier, number, skill)
+            if before is None:
+                return False
+            wider = rules.ask([(before, TRUE), (number, FALSE | UNKNOWN)], skill)
+            if isinstance(wider, Yes) and witness is None:
+                both = rules.ask([(number, TRUE)], skill)
+                witness = (both, skill) if isinstance(both, Yes) else None
+    if witness is None:
+        return False
+    policy = rules.policy
+    name = policy.contracts[target.skill].name
+    situation = words(witness[0].witness, policy, policy.contracts[witness[1]])
+    rules.ground.context.report.add(
+        codes.SHADOWED_RULE if always else codes.CONFLICTING_RULES,
+        later.span,
+        "this `degrade` never decides: wherever it matches, an earlier one does too"
+        if always
+        else f"at {situation} an earlier `degrade` matches too, and it is the one that decides",
+        help=f"write the narrower rule first; at {situation} `{name}` flies"
+        if always
+        else f"write the narrower rule first; now `{name}` flies there, if it may",
+        labels=[(earlier.span, "this comes first")],
+    )
+    return True
+
+
+def _target(rules: Ruleset, number: int) -> int:
+    target = rules.rule(number).target
+    assert target is not None
+    return target.skill
+
+
+def _before(rules: Ruleset, earlier: Group, number: int, skill: int) -> int | None:
+    """The flat rule of an earlier one that matches wherever another does, for a skill, and flies something else."""
+    later, matching = rules.rule(number), rules.ask([(number, TRUE)], skill)
+    for candidate in earlier.rules:
+        rule = rules.rule(candidate)
+        if rule.target is None or later.target is None or _same(rule.target, later.target):
+            continue
+        if skill not in rules.skills(candidate):
+            continue
+        if not _covers(rule.roles, later.roles) or not _covers(rule.sources, later.sources):
+            continue
+        condition = rules.ground.prepared.compiler.condition(rule, candidate)
+        if isinstance(matching, Yes) and condition(matching.witness.at) != TRUE:
+            continue
+        if isinstance(rules.ask([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill), No):
+            return candidate
+    return None
+
+
+def _same(one: Link, other: Link) -> bool:
+    return (one.skill, one.arguments) == (other.skill, other.arguments)
+
+
+def _covers(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
+    """Whether a list of roles or sources, where none means any, has all of another."""
+    return not wider or (bool(narrower) and set(narrower) <= set(wider))

@@ -1,0 +1,53 @@
+"""The proofs that follow the vehicle from step to step: where it goes, what it finds there, and how it comes home."""
+
+from collections.abc import Sequence
+
+from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.diagnostics import codes
+from rtshcua.ground.compiler.proofs import chaining, charge, last_link, path
+from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after
+from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.compiler.proofs.ways import Ways
+from rtshcua.model.ir.missions import MissionDecl, Step
+
+
+def prove(
+    ground: Ground,
+    mission: MissionDecl,
+    steps: Sequence[Step],
+    invocations: Sequence[PreparedInvocation],
+    permitted: Sequence[bool],
+) -> None:
+    """Report what is wrong with the way of a mission, up to the first step that cannot be flown.
+
+    What comes after such a step would begin at a place that is never reached.
+    """
+    ways = Ways(ground)
+    starts: list[tuple[Place, ...]] = []
+    places: tuple[Place, ...] = (AT_HOME,)
+    decided = True
+    for number, (step, one) in enumerate(zip(steps, invocations, strict=True)):
+        able = path.prove(ground, step, one, places) if permitted[number] else ()
+        able = chaining.prove(ground, step, one, able, steps[:number]) if able else ()
+        if not able:
+            return
+        ways.prove(step, one, able)
+        starts.append(able)
+        places = after(one, places, able)
+        if len(places) > MOST_PLACES:
+            places = places[:MOST_PLACES]
+            if decided:
+                decided = False
+                _undecided(ground, step)
+    chaining.ending(ground, mission, steps[-1], places)
+    charge.prove(ground, steps, invocations, starts)
+    last_link.prove_height(ground, steps, invocations)
+
+
+def _undecided(ground: Ground, step: Step) -> None:
+    ground.context.report.add(
+        codes.UNDECIDED,
+        step.span,
+        f"after this step the vehicle may be at more than {MOST_PLACES} places, for so many steps may be skipped",
+        help="the ways from some of them are left for on board; let a step between them `abort` or `hold`",
+    )

@@ -1,0 +1,58 @@
+"""E0718: a step may come at a time of day, or on a date, at which it is not permitted.
+
+A step comes no sooner after the mission's issue than those before it take at least, and no later than they take at
+most. Without a time of issue nothing is said: authority itself asks whether there is a time that will do.
+"""
+
+from collections.abc import Sequence
+
+from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.values import point
+from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.words import clock
+from rtshcua.ground.compiler.proofs.hopeful import refused
+from rtshcua.ground.compiler.proofs.ruleset import timed
+from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US, approval
+from rtshcua.model.ir.missions import Step
+
+
+def prove(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
+    """Report the first step that may come at such a time."""
+    earliest, latest = 0, START_WINDOW_US
+    for step, invocation in zip(steps, invocations, strict=True):
+        flat = invocation.invocation
+        if not flat.issued_at_us:
+            return
+        latest += approval(ground, invocation) + flat.contract.deadline_us
+        if _refused(ground, step, invocation, (flat.issued_at_us + earliest, flat.issued_at_us + latest)):
+            return
+        latest += flat.contract.duration_us
+        time = flat.contract.motion.time
+        earliest += flat.arguments[time] if time >= 0 else 0
+
+
+def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, window: tuple[int, int]) -> bool:
+    flat, zones = invocation.invocation, ground.prepared.policy.zones
+    rules = (each.rule for each in (*invocation.candidates.permits, *invocation.candidates.forbids))
+    if not any(rule.when is not None and timed(rule.when.code, zones) for rule in rules):
+        return False
+    space = ground.questions.space(flat.skill)._replace(
+        arguments=tuple(map(point, flat.arguments)), utc=(window,), phases=frozenset((invocation.phase,))
+    )
+    for witness, forbid in refused(ground, invocation, space):
+        offset = ground.prepared.policy.vehicle.utc_offset_us
+        at, first, last = (clock(moment, offset) for moment in (witness.at.utc[0][0], *window))
+        told = [each.rule for each in invocation.candidates.permits] if forbid is None else [forbid]
+        ground.context.report.add(
+            codes.NOT_ALWAYS_PERMITTED,
+            step.span,
+            f"at {at} this step is not permitted, and it may come from {first} to {last}, local time",
+            help="issue the mission at another time, or move the step",
+            labels=[
+                (ground.span(rule), "this does not permit it then" if forbid is None else "this forbids it then")
+                for rule in told
+            ],
+        )
+        return True
+    return False

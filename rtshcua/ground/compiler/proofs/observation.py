@@ -1,0 +1,160 @@
+"""E1201, E1203, E0808: what a running skill is watched by can be seen, in time for something to come of it.
+
+A signal that `assume`, `maintain`, a `degrade` rule or a temporal monitor reads must be reported by vehicles, at least
+as often as it goes stale. A `maintain` clause must read something that can change. And a breach, as well as a signal
+that is lost, must be noticed while the skill still runs: from one report to the next (or until the signal is stale and
+the grace is over), then the decision, then one round trip of the command that begins the fallback.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from rtshcua.decision.reads import slots_read
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.compiler.proofs.rates import RATES, arrives, interval, signal_of
+from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.policy import MonitorKind, RuleKind
+from rtshcua.model.flat.signal import Signal
+from rtshcua.model.quantity import Dimension, display
+
+#: `L_rem` as it is assumed on board until it was measured (a test compares them), us
+DECIDE_US = 20_000
+#: one round trip of a command, after which the adapters send it again (a test compares them), us
+ACTUATE_US = 1_000_000
+#: a lost signal is noticed within this time at least, however long the skill lasts, us
+BLIND_US = 30_000_000
+
+_CHANGING = frozenset({
+    Op.SIGNAL, Op.SIGNAL_IN, Op.POSITION_IN, Op.POSITION_IN_ARGUMENT, Op.TIME_IN, Op.MONITOR,
+})  # fmt: skip
+
+
+class Watched(NamedTuple):
+    """A signal and the first condition that is watched by it in flight."""
+
+    signal: Signal
+    span: Span
+
+
+def prove(ground: Ground) -> None:
+    """Report every signal, window and clause of a policy that nothing comes of, and contracts that react too late."""
+    policy = ground.prepared.policy
+    intervals = RATES.intervals(policy)
+    found: dict[str, Watched] = {}
+    for clause in _watched(ground):
+        for signal in _signals(ground, clause):
+            found.setdefault(signal.name, Watched(signal, ground.span(clause)))
+    for watched in found.values():
+        _observable(ground, watched, intervals)
+    _windows(ground, intervals)
+    for contract in policy.contracts:
+        for clause in contract.maintain:
+            if _CHANGING.isdisjoint(clause.code[::3]):
+                _unwatched(ground, clause)
+        _reaction(ground, contract, intervals)
+
+
+def _watched(ground: Ground) -> Iterator[Clause]:
+    """What is evaluated again and again in flight."""
+    policy = ground.prepared.policy
+    for contract in policy.contracts:
+        yield from contract.assume
+        yield from contract.maintain
+    for rule in policy.rules:
+        if rule.kind == RuleKind.DEGRADE and rule.when is not None:
+            yield rule.when
+    for monitor in policy.monitors:
+        yield monitor.when
+
+
+def _signals(ground: Ground, *clauses: Clause) -> Iterator[Signal]:
+    policy = ground.prepared.policy
+    slots = slots_read(clauses, policy.vehicle, policy.monitors)
+    yield from {signal.name: signal for slot in slots for signal in (signal_of(policy, slot),)}.values()
+
+
+def _observable(ground: Ground, watched: Watched, intervals: Mapping[str, int]) -> None:
+    signal, span = watched
+    declared = ground.context.symbols.signals[signal.name]
+    if not arrives(signal):
+        ground.context.report.add(
+            codes.UNOBSERVABLE,
+            declared.sources[0].message.span,
+            f"`{signal.name}` is read from `{signal.sources[0].message}`, which vehicles are sent and never report",
+            help="read it from a message that the vehicle reports",
+            labels=[(span, "this watches it in flight")],
+        )
+        return
+    often = interval(signal, intervals)
+    if signal.stale_us < often:
+        ground.context.report.add(
+            codes.UNOBSERVABLE,
+            declared.stale_after.span,
+            f"`{signal.name}` is stale after {_time(signal.stale_us)}, and `{signal.sources[0].message}` comes every "
+            f"{_time(often)} at best, so it is unknown most of the time",
+            help=f"let it be stale after {_time(2 * often)} or more",
+            labels=[(span, "this watches it in flight")],
+        )
+
+
+def _windows(ground: Ground, intervals: Mapping[str, int]) -> None:
+    """A window that no two reports fit into says nothing that the last report does not say."""
+    for monitor in ground.prepared.policy.monitors:
+        signals = [signal for signal in _signals(ground, monitor.when) if arrives(signal)]
+        if monitor.kind not in (MonitorKind.FOR_LAST, MonitorKind.WITHIN_LAST) or not signals:
+            continue
+        often = min(interval(signal, intervals) for signal in signals)
+        if monitor.window_us < often:
+            names = ", ".join(f"`{signal.name}`" for signal in signals)
+            ground.context.report.add(
+                codes.UNOBSERVABLE,
+                ground.span(monitor.when),
+                f"this is looked at over {_time(monitor.window_us)}, and {names} comes every {_time(often)} at best",
+                help="take a longer window, or ask for the present value alone",
+            )
+
+
+def _unwatched(ground: Ground, clause: Clause) -> None:
+    ground.context.report.add(
+        codes.UNWATCHED,
+        ground.span(clause),
+        f"`{clause.text}` reads nothing that can change while the skill runs",
+        help="write it under `require`, or compare a signal, as in `maintain height <= altitude + 5 m`",
+    )
+
+
+def _reaction(ground: Ground, contract: Contract, intervals: Mapping[str, int]) -> None:
+    """Whether a breach and the loss of a signal can both be answered while the skill runs."""
+    signals = [signal for signal in _signals(ground, *contract.assume, *contract.maintain) if arrives(signal)]
+    lasts = contract.duration_us
+    if not signals or not lasts:
+        return
+    seldom = max(signals, key=lambda signal: interval(signal, intervals))
+    late = max(signals, key=lambda signal: signal.stale_us)
+    breach = interval(seldom, intervals) + DECIDE_US + ACTUATE_US
+    lost = late.stale_us + contract.grace_us + DECIDE_US + ACTUATE_US
+    if breach > lasts:
+        signal, takes, what = seldom, breach, f"{_time(interval(seldom, intervals))} until `{seldom.name}` tells"
+    elif lost > max(lasts, BLIND_US):
+        signal, takes = late, lost
+        what = f"{_time(late.stale_us)} until `{late.name}` is stale, {_time(contract.grace_us)} of grace"
+    else:
+        return
+    skill, vehicle = ground.context.symbols.skills[contract.name], ground.prepared.policy.vehicle
+    assert skill.duration is not None
+    metres = display(takes * vehicle.speed // 1_000_000 // 1_000 * 1_000, Dimension.LENGTH)
+    ground.context.report.add(
+        codes.SLOW_REACTION,
+        skill.duration.span,
+        f"`{contract.name}` lasts at most {_time(lasts)}, and a fallback may begin only {_time(takes)} after its cause",
+        help=f"that is {what}, {_time(DECIDE_US)} to decide and {_time(ACTUATE_US)} for the command; at top speed "
+        f"`{vehicle.name}` flies {metres} meanwhile",
+        labels=[(ground.context.symbols.signals[signal.name].stale_after.span, "this signal is the last to tell")],
+    )
+
+
+def _time(us: int) -> str:
+    return display(us, Dimension.DURATION)

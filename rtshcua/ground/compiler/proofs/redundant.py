@@ -1,0 +1,112 @@
+"""E0721, E0722: rules that decide nothing, for others always outweigh them or always say the same.
+
+A permit never decides where some forbid is true wherever it is. A permit says nothing further where some other permit
+is true wherever it is; a forbid, where some other forbid is, and where wherever it is unknown another is true or
+unknown. Of rules that make each other redundant the last one is reported.
+"""
+
+from collections.abc import Set as AbstractSet
+
+from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.analysis.solve import No, Undecided
+from rtshcua.ground.compiler.proofs.ruleset import Group, Ruleset
+from rtshcua.model.flat.policy import RuleKind
+
+
+def prove(rules: Ruleset, alive: list[Group]) -> None:
+    """Report the permits that forbids outweigh, and then the permits and forbids that others make redundant."""
+    gone: set[int] = set()
+    for group in alive:
+        if group.kind == RuleKind.PERMIT and _shadowed(rules, group):
+            gone.update(group.rules)
+    for group in reversed(alive):
+        if group.kind in (RuleKind.PERMIT, RuleKind.FORBID) and not gone.intersection(group.rules):
+            gone.update(group.rules)
+            covering = _redundant(rules, group, gone)
+            if covering is None:
+                gone.difference_update(group.rules)
+            else:
+                _report(rules, group, covering)
+
+
+def _shadowed(rules: Ruleset, group: Group) -> bool:
+    question = ((TRUE, FALSE | UNKNOWN),)
+    covering = _covered(rules, group, RuleKind.FORBID, frozenset(), question, "is ever not outweighed by a `forbid`")
+    if covering is None:
+        return False
+    rules.ground.context.report.add(
+        codes.SHADOWED_RULE,
+        group.span,
+        "this `permit` never decides: wherever it matches, a `forbid` does too",
+        help="narrow the `forbid`, or delete this rule",
+        labels=[(span, "this outweighs it") for span in covering],
+    )
+    return True
+
+
+def _redundant(rules: Ruleset, group: Group, gone: AbstractSet[int]) -> tuple[Span, ...] | None:
+    """Where the rules are written that say all that a rule says; `gone` has its own numbers and those of rules that
+    were already reported.
+    """
+    kind = RuleKind(group.kind)
+    questions: tuple[tuple[Truth, Truth], ...] = ((TRUE, FALSE | UNKNOWN),)
+    if kind is RuleKind.FORBID:
+        questions = (*questions, (UNKNOWN, FALSE))
+    return _covered(rules, group, kind, gone, questions, "says anything that others do not say")
+
+
+def _covered(
+    rules: Ruleset,
+    group: Group,
+    kind: RuleKind,
+    but: AbstractSet[int],
+    questions: tuple[tuple[Truth, Truth], ...],
+    what: str,
+) -> tuple[Span, ...] | None:
+    """Where the rules are written that together leave a rule nothing; None where they leave something.
+
+    Each question is a truth of the rule's condition, and the truths of the others that leave it something.
+    """
+    found: dict[Span, None] = {}
+    open_: str | None = None
+    for number in group.rules:
+        for key in rules.keys(number):
+            others = rules.others(key, kind)
+            for wanted, escape in questions:
+                answer, used = rules.escapes(number, wanted, others, but, escape, key.skill)
+                if isinstance(answer, Undecided):
+                    open_ = answer.why
+                elif not isinstance(answer, No) or _clock_matters(rules, number, used):
+                    return None
+                found.update(dict.fromkeys(rules.ground.span(rules.rule(each)) for each in used))
+    if open_ is not None:
+        rules.undecided(group, what, open_)
+        return None
+    return tuple(found)
+
+
+def _clock_matters(rules: Ruleset, number: int, used: tuple[int, ...]) -> bool:
+    """Whether several rules share the times of one: with an inexact clock there is then a moment that none has."""
+    return len(used) > 1 and rules.timed(number)
+
+
+def _report(rules: Ruleset, group: Group, covering: tuple[Span, ...]) -> None:
+    kind = group.declared.kind
+    copies = [span for span in covering if _same(rules, group, rules.at[span])]
+    rules.ground.context.report.add(
+        codes.REDUNDANT_RULE,
+        group.span,
+        f"this `{kind}` says nothing that " + ("another does" if len(covering) == 1 else "others do") + " not say",
+        help="delete it, or change what it is about",
+        labels=[
+            (span, "this says it already" if len(covering) == 1 else "this says a part of it") for span in covering
+        ],
+        fix=(group.span, "", "delete this rule") if copies else None,
+    )
+
+
+def _same(rules: Ruleset, one: Group, other: Group) -> bool:
+    """Whether two rules have the same conditions."""
+    return {rules.code(number) for number in one.rules} == {rules.code(number) for number in other.rules}

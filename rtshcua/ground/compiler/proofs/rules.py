@@ -1,0 +1,15 @@
+"""E0720 to E0723: rules that are dead, shadowed, redundant or in the way of each other."""
+
+from rtshcua.ground.compiler.proofs import conflicting, redundant
+from rtshcua.ground.compiler.proofs.dead import dead
+from rtshcua.ground.compiler.proofs.ruleset import Ruleset
+from rtshcua.ground.compiler.proofs.situation import Ground
+
+
+def prove(ground: Ground) -> None:
+    """Report what no rule should be; a dead rule is reported as that alone."""
+    rules = Ruleset(ground)
+    alive = [group for group in rules.groups if not dead(rules, group)]
+    alive = [group for group in alive if group.span not in rules.open]
+    redundant.prove(rules, alive)
+    conflicting.prove(rules, alive)

@@ -1,0 +1,182 @@
+"""E0713, E0714: `delegate goto by role operator to role trainee`: what one role may is permitted to another too.
+
+Each permit that names the grantor is one to the grantee, for the delegated skills, through no other source and under
+the delegation's condition as well; each `forbid` that names the grantor is one to the grantee. A delegation is made
+after those by which its grantor has what it passes on, so that a chain of them narrows with every link.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.checks.policies import SOURCES, shared_arguments
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.fields import one_of
+from rtshcua.ground.checker.lookup import find_skill
+from rtshcua.ground.checker.report import Report
+from rtshcua.model.flat.limits import MAX_RULES
+from rtshcua.model.ir.expression import Condition, Junction
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule
+from rtshcua.model.ir.skills import SkillDecl
+
+#: who speaks for a role where a permit does not say
+OWN_SOURCE = "operator"
+
+
+def delegated(context: Context, policy: PolicyDecl, rules: Sequence[Rule], *, whole: bool) -> tuple[Rule, ...]:
+    """The rules of a policy with those that its delegations make of them; `whole` where no rule is missing."""
+    found = list(rules)
+    for delegation in _ordered(context.report, policy.delegations):
+        found += _made(context, delegation, found, whole=whole)
+        if len(found) > MAX_RULES:
+            context.report.add(
+                codes.TOO_MANY,
+                delegation.span,
+                f"with its delegations the policy has more than {MAX_RULES} rules, which do not fit on board",
+                help="delegate fewer skills, or along fewer ways",
+            )
+            break
+    return tuple(found)
+
+
+def _ordered(report: Report, delegations: Sequence[Delegation]) -> Iterator[Delegation]:
+    """The delegations, each after those to its grantor; those of a circle are reported and left out."""
+    waiting = list(delegations)
+    while waiting:
+        grantees = {each.grantee.text for each in waiting}
+        ready = [each for each in waiting if each.grantor.text not in grantees]
+        yield from ready
+        if not ready:
+            ready = _circle(waiting)
+            _report_circle(report, ready)
+        made = set(map(id, ready))
+        waiting = [each for each in waiting if id(each) not in made]
+
+
+def _circle(waiting: Sequence[Delegation]) -> list[Delegation]:
+    """A circle among delegations of which each has one to its grantor."""
+    path: list[Delegation] = [waiting[0]]
+    while True:
+        before = next(each for each in waiting if each.grantee.text == path[-1].grantor.text)
+        for number, each in enumerate(path):
+            if each is before:
+                return path[number:]
+        path.append(before)
+
+
+def _report_circle(report: Report, circle: Sequence[Delegation]) -> None:
+    last = max(circle, key=lambda each: each.span)
+    own = last.grantor.text == last.grantee.text
+    report.add(
+        codes.DELEGATION_CYCLE,
+        last.span,
+        f"the role `{last.grantor.text}` delegates to itself"
+        if own
+        else f"the role `{last.grantee.text}` is delegated what it has passed on itself",
+        help="leave it out: a role has what it is permitted anyway" if own else "delegate in one direction only",
+        labels=[
+            (each.span, f"`{each.grantor.text}` delegates to `{each.grantee.text}` here")
+            for each in circle
+            if each is not last
+        ],
+    )
+
+
+def _made(context: Context, delegation: Delegation, rules: Sequence[Rule], *, whole: bool) -> list[Rule]:
+    """The rules that one delegation makes of those before it."""
+    known = [find_skill(context, name) for name in delegation.skills]
+    sources = [one_of(context, codes.UNKNOWN_SOURCE, name, SOURCES, "source") for name in delegation.through]
+    skills = [skill for skill in known if skill is not None]
+    if len(skills) < len(known) or not all(sources) or not _readable(context, delegation, skills):
+        return []
+    grantor = delegation.grantor.text
+    permits = [rule for rule in rules if rule.kind == "permit" and (not rule.roles or _names(rule.roles, grantor))]
+    named = [rule for rule in permits if rule.roles]
+    made = [permit for rule in named if (permit := _permit(delegation, rule)) is not None]
+    if whole:
+        _nothing(context, delegation, permits, made)
+    forbids = (rule for rule in rules if rule.kind == "forbid" and _names(rule.roles, grantor))
+    return made + [forbid for rule in forbids if (forbid := _forbid(delegation, rule)) is not None]
+
+
+def _readable(context: Context, delegation: Delegation, skills: Sequence[SkillDecl]) -> bool:
+    """Whether the condition reads what all the delegated skills have."""
+    if delegation.when is None:
+        return True
+    as_rule = Rule(
+        span=delegation.span, kind="permit", skills=delegation.skills, roles=(delegation.grantee,), through=(),
+        when=delegation.when, approver=None, within=None, target=None,
+    )  # fmt: skip
+    return shared_arguments(context, as_rule, skills) is not None
+
+
+def _permit(delegation: Delegation, permit: Rule) -> Rule | None:
+    """What a permit of the grantor is to the grantee; None where that is nothing."""
+    skills = _shared(delegation, permit)
+    through = _through(delegation, permit)
+    if skills is None or through is None:
+        return None
+    changes = {"skills": skills, "through": through, "when": _both(permit.when, delegation.when)}
+    return _for_grantee(delegation, permit).model_copy(update=changes)
+
+
+def _forbid(delegation: Delegation, forbid: Rule) -> Rule | None:
+    skills = _shared(delegation, forbid)
+    if skills is None or _names(forbid.roles, delegation.grantee.text):
+        return None
+    return _for_grantee(delegation, forbid).model_copy(update={"skills": skills})
+
+
+def _for_grantee(delegation: Delegation, rule: Rule) -> Rule:
+    return rule.model_copy(update={"roles": (delegation.grantee,), "origin": (delegation, *rule.origin)})
+
+
+def _shared(delegation: Delegation, rule: Rule) -> tuple[Name, ...] | None:
+    """The skills of a rule that are delegated, empty for any; None where there are none."""
+    if not delegation.skills:
+        return rule.skills
+    if not rule.skills:
+        return delegation.skills
+    return tuple(name for name in rule.skills if _names(delegation.skills, name.text)) or None
+
+
+def _through(delegation: Delegation, permit: Rule) -> tuple[Name, ...] | None:
+    """The sources through which both speak; None where there are none."""
+    if not delegation.through:
+        return permit.through
+    own = {name.text for name in permit.through} or {OWN_SOURCE}
+    return tuple(name for name in delegation.through if name.text in own) or None
+
+
+def _both(one: Condition | None, other: Condition | None) -> Condition | None:
+    if one is None or other is None:
+        return one or other
+    return Junction(span=other.span, operator="and", operands=(one, other))
+
+
+def _names(names: Iterable[Name], text: str) -> bool:
+    return any(name.text == text for name in names)
+
+
+def _nothing(context: Context, delegation: Delegation, permits: Sequence[Rule], made: Sequence[Rule]) -> None:
+    """Report every delegated skill that the grantor is not permitted. What anybody may needs no delegation."""
+    if not delegation.skills and not made:
+        _report_nothing(context, delegation, delegation.grantor, "anything of its own", permits)
+    for name in delegation.skills:
+        about = [rule for rule in permits if not rule.skills or _names(rule.skills, name.text)]
+        if any(not rule.roles for rule in about):
+            continue
+        if not any(not rule.skills or _names(rule.skills, name.text) for rule in made):
+            _report_nothing(context, delegation, name, f"`{name.text}`", about)
+
+
+def _report_nothing(context: Context, delegation: Delegation, at: Name, what: str, about: Sequence[Rule]) -> None:
+    named = [rule for rule in about if rule.roles]
+    through = " or ".join(f"`{name.text}`" for name in delegation.through)
+    context.report.add(
+        codes.NOTHING_DELEGATED,
+        at.span,
+        f"the role `{delegation.grantor.text}` is not permitted {what}" + (f" through {through}" if named else ""),
+        help="a role passes on what it has; permit it first, or leave this out",
+        labels=[(rule.span, "permitted here, through other sources") for rule in named[:3]],
+    )

@@ -1,0 +1,203 @@
+"""A mission with parameters: the one that is compiled, with the values that are given, and those that are checked.
+
+A mission is checked for every zone and every choice that its parameters may have, and for both ends of every range:
+at most `MAX_INSTANCES` of these, the defaults first, then each parameter changed alone, then together.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice, product
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.conditions import references
+from rtshcua.ground.checker.context import Context, Instance
+from rtshcua.ground.checker.scope import ENTRY, Argument
+from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.types import Kind
+from rtshcua.ground.elaborate.settings import Settings
+from rtshcua.ground.elaborate.substitute import names_in, substitute
+from rtshcua.ground.elaborate.values import bound_value, value_of
+from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, Value
+from rtshcua.model.ir.missions import MissionDecl, Phase
+from rtshcua.model.quantity import display
+
+#: for how many combinations of values a mission is checked
+MAX_INSTANCES = 64
+
+
+def assigned(context: Context, mission: MissionDecl, settings: Settings) -> Instance | None:
+    """The mission with the values that are given and its defaults; None after a finding."""
+    before = len(context.report.found)
+    given = _given(context, mission, settings)
+    known = context.arguments(mission)
+    values: dict[str, Value] = {}
+    missing: list[str] = []
+    for parameter in mission.parameters:
+        name = parameter.name.text
+        written = given.get(name, parameter.default)
+        if name not in known:
+            return None  # its own declaration is wrong, and reported there
+        value = None if written is None else bound_value(context, known[name], written, heard=name in given)
+        if value is not None:
+            values[name] = value
+        elif written is None and name not in {each.text for each, _ in settings.values}:
+            missing.append(name)
+    for name in missing:
+        declared = known[name].declaration
+        context.report.add(
+            codes.MISSING_ARGUMENT,
+            declared.span,
+            f"the mission `{mission.name.text}` is compiled without a value for `{name}`",
+            help=f"compile it with `--set {name}=...`, or declare a default",
+        )
+    if len(context.report.found) > before or len(values) < len(known):
+        return None
+    return _instance(mission, values)
+
+
+def _given(context: Context, mission: MissionDecl, settings: Settings) -> Mapping[str, Value]:
+    context.report.found += settings.diagnostics
+    known = {parameter.name.text for parameter in mission.parameters}
+    for name, _ in settings.values:
+        if name.text not in known:
+            takes = "its parameters are " + ", ".join(f"`{each}`" for each in known) if known else "it has none"
+            context.report.add(
+                codes.UNKNOWN_ARGUMENT,
+                name.span,
+                f"the mission `{mission.name.text}` has no parameter `{name.text}`",
+                help=suggestion(name.text, known) or takes,
+                labels=[(mission.name.span, "declared here")],
+            )
+    return {name.text: value for name, value in settings.values if name.text in known}
+
+
+def instances(context: Context, mission: MissionDecl, files: frozenset[str]) -> Iterator[Instance]:
+    """The mission for the values that it is checked with; `files` are those of its policy, of which the zones are.
+
+    None where nothing is known of a parameter but that it is some place: that is noted.
+    """
+    ranges: list[tuple[str, list[Value]]] = []
+    known = context.arguments(mission)
+    for name, argument in known.items():
+        found = _candidates(context, mission, argument, files)
+        if not found:
+            if argument.type.kind is Kind.POSITION:
+                context.report.found.append(
+                    Diagnostic(
+                        codes.UNDECIDED,
+                        f"the mission `{mission.name.text}` is not checked, for nothing is known of `{name}`",
+                        argument.declaration.span,
+                        "declare a default place, with which it is checked",
+                    )
+                )
+            return
+        ranges.append((name, found))
+    if len(known) < len(mission.parameters):
+        return
+    names = [name for name, _ in ranges]
+    for numbers in islice(_combinations([found for _, found in ranges]), MAX_INSTANCES):
+        values = {name: found[number] for number, (name, found) in zip(numbers, ranges, strict=True)}
+        yield _instance(mission, {name: values[name] for name in names})
+
+
+def _combinations(ranges: Sequence[Sequence[Value]]) -> Iterator[tuple[int, ...]]:
+    """Which value of each parameter: all first ones, one changed at a time, the last ones, then all; each once."""
+    seen: set[tuple[int, ...]] = set()
+    for each in _repeating([len(found) for found in ranges]):
+        if each not in seen:
+            seen.add(each)
+            yield each
+
+
+def _repeating(sizes: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    first = (0,) * len(sizes)
+    yield first
+    for place, size in enumerate(sizes):
+        for number in range(1, size):
+            yield (*first[:place], number, *first[place + 1 :])
+    yield tuple(size - 1 for size in sizes)
+    yield from product(*map(range, sizes))
+
+
+def ambiguous(context: Context, mission: MissionDecl) -> bool:
+    """Whether a clause of a step reads a name that may be the mission's parameter, or something else; reports it."""
+    own = {parameter.name.text: parameter for parameter in mission.parameters}
+    before = len(context.report.found)
+    for step in (step for phase in mission.phases for step in phase.steps if step.overrides is not None):
+        assert step.overrides is not None
+        skill = context.symbols.skills.get(step.skill.text)
+        arguments = {} if skill is None else context.arguments(skill)
+        for clause in (*step.overrides.require, *step.overrides.assume, *step.overrides.maintain):
+            for reference in references(clause.condition):
+                name = reference.name
+                if name in own and (name in arguments or name in context.symbols.signals):
+                    other = f"an argument of `{step.skill.text}`" if name in arguments else "a signal"
+                    context.report.add(
+                        codes.SHADOWED_NAME,
+                        reference.span,
+                        f"`{name}` is a parameter of the mission, and {other}",
+                        help="give the mission's parameter another name",
+                        labels=[(own[name].span, "the mission's")],
+                    )
+    return len(context.report.found) > before
+
+
+def _candidates(context: Context, mission: MissionDecl, argument: Argument, files: frozenset[str]) -> list[Value]:
+    """The values with which a parameter is checked, its default first; each is written as the default, or its type."""
+    parameter = argument.declaration
+    default = parameter.default
+    found: list[Value] = []
+    if default is not None:
+        value = bound_value(context, argument, default, heard=False)
+        found += [] if value is None else [value]
+    at = parameter.span
+    if argument.type.kind is Kind.NUMBER and argument.low is not None and argument.high is not None:
+        found += [value_of(end, argument, at) for end in (argument.low, argument.high)]
+    elif argument.type.kind is Kind.ENUMERATION:
+        found += [value_of(ordinal, argument, at) for ordinal in range(len(parameter.choices))]
+    elif argument.type.kind is Kind.ZONE:
+        entered = parameter.name.text + ENTRY in names_in(mission)
+        for zone in context.symbols.zones.values():
+            if zone.span.file in files and (zone.entry is not None or not entered):
+                found.append(value_of(zone, argument, at))
+    return list({_key(value): value for value in reversed(found)}.values())[::-1] if found else []
+
+
+def _key(value: Value) -> tuple[object, ...]:
+    if isinstance(value, Quantity):
+        return (value.value,)
+    if isinstance(value, Coordinates):
+        return (value.latitude, value.longitude)
+    assert isinstance(value, Reference)
+    return (value.name,)
+
+
+def _instance(mission: MissionDecl, values: Mapping[str, Value]) -> Instance:
+    phases: tuple[Phase, ...] = tuple(substitute(phase, values) for phase in mission.phases)
+    labels: list[tuple[Span, str]] = []
+    for parameter in mission.parameters:
+        value = values[parameter.name.text]
+        labels.append((parameter.span, f"with `{parameter.name.text} = {_words(value)}`"))
+    return Instance(mission.model_copy(update={"phases": phases}), tuple(labels))
+
+
+def _words(value: Value) -> str:
+    if isinstance(value, Quantity):
+        return display(value.value, value.dimension)
+    if isinstance(value, Reference):
+        return value.name
+    assert isinstance(value, Coordinates)
+    return _place(value)
+
+
+def _place(place: Coordinates) -> str:
+    latitude, longitude = place.latitude, place.longitude
+    north, east = "N" if latitude >= 0 else "S", "E" if longitude >= 0 else "W"
+    return f"{_degrees(latitude)} {north}, {_degrees(longitude)} {east}"
+
+
+def _degrees(value: int) -> str:
+    whole, rest = divmod(abs(value), 10_000_000)
+    fraction = str(rest).zfill(7).rstrip("0")
+    return f"{whole}.{fraction}" if fraction else str(whole)

@@ -1,0 +1,116 @@
+"""`use low_flight(bridge_a, top = 20 m)`: the rules of a template, with these values in the place of its parameters."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.arguments import pair
+from rtshcua.ground.checker.checks.parameters import ROLE
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.lookup import find_template
+from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.types import Kind
+from rtshcua.ground.elaborate.substitute import names_in, substitute, substitute_roles
+from rtshcua.ground.elaborate.values import bound_value, value_of
+from rtshcua.model.ir.expression import Reference, Value
+from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.policies import Rule, TemplateDecl, Use
+from rtshcua.model.ir.skills import Parameter
+
+#: the role that stands for any, where a template is checked that nothing uses
+ANY_ROLE = "operator"
+
+
+class Given(NamedTuple):
+    """The values of a template's parameters, and the roles."""
+
+    values: dict[str, Value]
+    roles: dict[str, str]
+
+
+def used(context: Context, use: Use) -> tuple[Rule, ...] | None:
+    """The rules that a `use` stands for; None after a finding."""
+    template = find_template(context, use.template)
+    given = None if template is None else _given(context, template, use)
+    return None if template is None or given is None else tuple(_rules(template, given, (use,)))
+
+
+def sample(context: Context, template: TemplateDecl) -> tuple[Rule, ...]:
+    """The rules of a template that nothing uses, with values that its parameters may have: its names and types are
+    checked with them. Without those that read a parameter which may have none.
+    """
+    given = Given({}, {})
+    known = context.arguments(template)
+    for parameter in template.parameters:
+        name = parameter.name.text
+        argument = known.get(name)
+        if parameter.type.text == ROLE:
+            given.roles[name] = ANY_ROLE
+        elif argument is not None:
+            value = _possible(context, argument)
+            if value is not None:
+                given.values[name] = value
+    without = {parameter.name.text for parameter in template.parameters} - {*given.values, *given.roles}
+    expanded = zip(template.rules, _rules(template, given, ()), strict=True)
+    return tuple(put for rule, put in expanded if without.isdisjoint(names_in(rule)))
+
+
+def _possible(context: Context, argument: Argument) -> Value | None:
+    """A value that a parameter may have: its default, or one of its type."""
+    parameter = argument.declaration
+    if parameter.default is not None:
+        return bound_value(context, argument, parameter.default, heard=False)
+    if argument.type.kind is Kind.NUMBER and argument.low is not None:
+        return value_of(argument.low, argument, parameter.span)
+    zones = sorted(context.symbols.zones.values(), key=lambda zone: zone.entry is None)  # those with an entry first
+    return value_of(zones[0], argument, parameter.span) if argument.type.kind is Kind.ZONE and zones else None
+
+
+def _given(context: Context, template: TemplateDecl, use: Use) -> Given | None:
+    pairs = pair(context, template, use.arguments, use.span)
+    if pairs is None:
+        return None
+    given = Given({}, {})
+    known = context.arguments(template)
+    good = True
+    for parameter in template.parameters:
+        name = parameter.name.text
+        argument = known.get(name)
+        written = pairs.get(name, parameter.default)
+        if written is None:
+            return None
+        if parameter.type.text == ROLE:
+            role = _role(context, parameter, written)
+            good = good and role is not None
+            given.roles[name] = role or ""
+            continue
+        if argument is None:  # reported where the parameter is declared
+            return None
+        value = bound_value(context, argument, written, heard=name in pairs)
+        good = good and value is not None
+        if value is not None:
+            given.values[name] = value
+    return given if good else None
+
+
+def _role(context: Context, parameter: Parameter, written: Value) -> str | None:
+    kind = "no name"
+    if isinstance(written, Reference) and "." not in written.name:
+        declared = context.symbols.kind_of(written.name)
+        if declared is None:
+            return written.name
+        kind = declared
+    context.report.add(
+        codes.WRONG_TYPE,
+        written.span,
+        f"`{context.report.text(written.span)}` is {kind}, where a role is asked",
+        help="write the name of a role, such as `operator`",
+        labels=[(parameter.span, f"`{parameter.name.text}` is declared here")],
+    )
+    return None
+
+
+def _rules(template: TemplateDecl, given: Given, origin: tuple[Node, ...]) -> Iterator[Rule]:
+    for rule in template.rules:
+        put = substitute_roles(substitute(rule, given.values), given.roles)
+        yield put.model_copy(update={"origin": origin})

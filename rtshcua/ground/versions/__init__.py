@@ -1,0 +1,1 @@
+"""A policy against an earlier one of its name: what it means, what differs, and whether its version says so."""

@@ -1,0 +1,198 @@
+"""What a flat policy means, without what only says where and how it was written.
+
+Names stand where the flat form has indexes, so that a declaration put in between changes nothing but itself. Files,
+offsets, digests and quoted texts are left out; so is what follows from the rest: slots, sets, tables, derived zones.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.contract import PLACE, ZONE, Contract, Link, Parameter
+from rtshcua.model.flat.policy import Policy, Rule
+from rtshcua.model.flat.signal import POSITION
+
+Part = object
+Fields = Mapping[str, Part]
+
+
+class Written(NamedTuple):
+    """What a rule means, and its text."""
+
+    meaning: tuple[Part, ...]
+    kind: int
+    skills: frozenset[str]
+    text: str
+
+
+class Meaning:
+    """The parts of a policy by name; `zones` are the declared zones that count as members of sets.
+
+    `moved` leaves out local coordinates, for they count from home.
+    """
+
+    def __init__(self, policy: Policy, zones: frozenset[str], *, moved: bool) -> None:
+        self._policy = policy
+        self._common = zones
+        self._moved = moved
+        self._slots: dict[int, str] = {}
+        for signal in policy.signals:
+            self._slots[signal.slot] = signal.name
+            if signal.kind == POSITION:
+                self._slots[signal.slot + 1] = f"{signal.name}.y"
+
+    def vehicle(self) -> Fields:
+        """The vehicle by field, and its home."""
+        vehicle, projection = self._policy.vehicle, self._policy.projection
+        return {
+            "name": vehicle.name,
+            "identity": vehicle.identity,
+            "home": (projection.latitude, projection.longitude, projection.east, projection.north, vehicle.home_within),
+            "speed": vehicle.speed,
+            "climb": vehicle.climb,
+            "position error": vehicle.position_error,
+            "energy": vehicle.endurance_us,
+            "reserve": vehicle.reserve,
+            "local time": vehicle.utc_offset_us,
+        }
+
+    def zones(self) -> Mapping[str, Fields]:
+        """The declared zones."""
+        return {
+            zone.name: {
+                "shape": (zone.shape, () if self._moved else zone.data),
+                "floor": zone.floor,
+                "ceiling": zone.ceiling,
+                "active": (zone.daily, zone.dates),
+            }
+            for zone in self._policy.zones[: self._policy.declared]
+        }
+
+    def signals(self) -> Mapping[str, Fields]:
+        """The signals that are read."""
+        return {
+            signal.name: {
+                "type": (signal.kind, signal.dimension, tuple(sorted(signal.labels))),
+                "stale": signal.stale_us,
+                "source": signal.sources,
+            }
+            for signal in self._policy.signals
+        }
+
+    def skills(self) -> Mapping[str, Fields]:
+        """The contracts."""
+        return {contract.name: self._contract(contract) for contract in self._policy.contracts}
+
+    def rules(self) -> tuple[Written, ...]:
+        """The rules in their order."""
+        return tuple(map(self._rule, self._policy.rules))
+
+    def airspace(self) -> Part:
+        """The zones to be inside and outside of."""
+        airspace = self._policy.airspace
+        return None if airspace is None else (self._names(airspace.inside), self._names(airspace.outside))
+
+    def contingency(self) -> Part:
+        """The links that fly when a step is denied in the air."""
+        return self._chain(self._policy.contingency)
+
+    def _contract(self, contract: Contract) -> Fields:
+        own = contract.parameters
+        return {
+            "parameters": tuple(map(_parameter, own)),
+            "motion": contract.motion,
+            "class": contract.timing_class,
+            "deadline": contract.deadline_us,
+            "valid": (contract.validity_us, frozenset(contract.phases)),
+            "lasts": contract.duration_us,
+            "grace": contract.grace_us,
+            "require": self._clauses(contract.require, own),
+            "assume": self._clauses(contract.assume, own),
+            "maintain": self._clauses(contract.maintain, own),
+            "fallback": self._chain(contract.fallback),
+            "energy": contract.energy,
+            "record": frozenset(contract.record),
+        }
+
+    def _rule(self, rule: Rule) -> Written:
+        policy = self._policy
+        skills = frozenset(policy.contracts[number].name for number in rule.skills)
+        parameters = policy.contracts[rule.skills[0]].parameters if rule.skills else ()
+        meaning = (
+            rule.kind,
+            skills,
+            frozenset(policy.roles[number] for number in rule.roles),
+            frozenset(rule.sources),
+            None if rule.when is None else self._code(rule.when, parameters),
+            "" if rule.approver == -1 else policy.roles[rule.approver],
+            rule.within_us,
+            None if rule.target is None else self._link(rule.target),
+        )
+        return Written(meaning, rule.kind, skills, rule.text)
+
+    def _chain(self, links: Iterable[Link]) -> Part:
+        return tuple(map(self._link, links))
+
+    def _link(self, link: Link) -> Part:
+        contract = self._policy.contracts[link.skill]
+        given = tuple(self._argument(parameter, link.arguments) for parameter in contract.parameters)
+        return contract.name, given, link.limit_us
+
+    def _argument(self, parameter: Parameter, cells: tuple[int, ...]) -> Part:
+        value = cells[parameter.cell]
+        if parameter.kind == ZONE:
+            return self._zone(value)
+        if parameter.kind == PLACE:
+            return None if self._moved else (value, cells[parameter.cell + 1])
+        return value
+
+    def _clauses(self, clauses: Iterable[Clause], parameters: tuple[Parameter, ...]) -> Part:
+        return tuple(self._code(clause, parameters) for clause in clauses)
+
+    def _code(self, clause: Clause, parameters: tuple[Parameter, ...]) -> Part:
+        code = clause.code
+        zones = frozenset(parameter.cell for parameter in parameters if parameter.kind == ZONE)
+        return tuple(
+            (op, *self._operands(op, a, b, zones)) for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True)
+        )
+
+    def _operands(self, op: int, a: int, b: int, zones: frozenset[int]) -> tuple[Part, ...]:
+        policy = self._policy
+        match op:
+            case Op.SIGNAL:
+                return (self._slots[a],)
+            case Op.SIGNAL_IN:
+                return self._slots[a], policy.sets[b]
+            case Op.ARGUMENT_IN if a in zones:
+                return a, self._names(policy.sets[b]) & self._common
+            case Op.ARGUMENT_IN:
+                return a, policy.sets[b]
+            case Op.POSITION_IN:
+                return (self._zone(a),)
+            case Op.POSITION_IN_ARGUMENT:
+                return a, frozenset(
+                    (self._zone(n), self._zone(to))
+                    for n, to in enumerate(policy.tables[b])
+                    if self._zone(n) in self._common
+                )
+            case Op.ARGUMENT_POINT_IN:
+                return a, self._zone(b)
+            case Op.PHASE_IN:
+                return (frozenset(policy.phases[number] for number in policy.sets[b]),)
+            case Op.MONITOR:
+                monitor = policy.monitors[a]
+                return monitor.kind, monitor.window_us, self._code(monitor.when, ())
+            case _:
+                return a, b
+
+    def _zone(self, number: int) -> str:
+        return self._policy.zones[number].name
+
+    def _names(self, zones: Iterable[int]) -> frozenset[str]:
+        return frozenset(map(self._zone, zones))
+
+
+def _parameter(parameter: Parameter) -> Part:
+    """A parameter; one that is a zone may be any, so how many there are says nothing of it."""
+    ends = None if parameter.kind == ZONE else (parameter.low, parameter.high)
+    return parameter.name, parameter.kind, parameter.dimension, parameter.cell, ends, parameter.labels

@@ -1,0 +1,111 @@
+"""What an agent's step is held to beyond its skill: as in the language, and findings point into the JSON."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jsonschema
+import pytest
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.agent.schema import schema
+from rtshcua.ground.compiler.program import Compiled
+
+Compile = Callable[[str | bytes], tuple[Compiled, tuple[Diagnostic, ...]]]
+Dump = Callable[[Any], str]
+
+ALL = {
+    "deadline": "2 s",
+    "valid_for": "10 min",
+    "during": ["inspection"],
+    "lasts_at_most": "110 s",
+    "grace": "500 ms",
+    "energy_at_most": "13 %",
+    "require": ["battery > 40 % and wind.speed < 8 m/s"],
+    "assume": ["link.quality > 10 %"],
+    "maintain": ["height <= 30 m", "altitude <= 20 m"],
+    "record": ["effect"],
+}
+AT = "/phases/1/steps/1/overrides"
+
+
+def with_overrides(good: dict[str, Any], overrides: Any) -> dict[str, Any]:
+    good["phases"][1]["steps"][1]["overrides"] = overrides
+    return good
+
+
+def test_a_step_may_be_held_to_more(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
+    spec = with_overrides(good, ALL)
+    jsonschema.validate(spec, schema())
+    compiled, found = compile_text(dumped(spec))
+    assert found == ()
+    assert compiled.mission is not None
+    assert compiled.policy is not None
+    contract = compiled.mission.invocations[2].contract
+    skills = compiled.policy.contracts[compiled.mission.invocations[2].skill]
+    assert (contract.deadline_us, contract.validity_us, contract.grace_us) == (2_000_000, 600_000_000, 500_000)
+    assert (contract.duration_us, contract.energy) == (110_000_000, 1_300)
+    own = [
+        [clause.text for clause in mine[len(theirs) :]]
+        for mine, theirs in (
+            (contract.require, skills.require),
+            (contract.assume, skills.assume),
+            (contract.maintain, skills.maintain),
+        )
+    ]
+    assert own == [
+        ["battery > 40 %", "wind.speed < 8 m/s"],
+        ["link.quality > 10 %"],
+        ["height <= 30 m", "altitude <= 20 m"],
+    ]
+
+
+def test_none_is_none(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
+    plain, _ = compile_text(dumped(good))
+    for overrides in ({}, None, {"deadline": None, "require": []}):
+        compiled, found = compile_text(dumped(with_overrides(good, overrides)))
+        assert found == ()
+        assert compiled.mission is not None
+        assert plain.mission is not None
+        assert compiled.mission.invocations[2].contract == plain.mission.invocations[2].contract
+
+
+@pytest.mark.parametrize(
+    ("overrides", "code", "at", "under"),
+    [
+        ({"deadline": "2 min"}, "E0617", "/deadline", "2 min"),
+        ({"deadline": "2 parsecs"}, "E0301", "/deadline", "2 parsecs"),
+        ({"deadline": "2 m"}, "E0310", "/deadline", "2 m"),
+        ({"deadline": 2}, "E0902", "/deadline", "2"),
+        ({"deadline": "2 s grace 1 s"}, "E0902", "/deadline", "2 s grace 1 s"),
+        ({"deadline": "2 s } hover() {"}, "E0902", "/deadline", None),
+        ({"deadline": "2 s // }"}, None, "", None),
+        ({"dedline": "2 s"}, "E0902", "/dedline", '"dedline"'),
+        ({"energy_at_most": "1 %"}, "E0617", "/energy_at_most", "1 %"),
+        ({"during": ["recovery"]}, "E0617", "/during/0", '"recovery"'),
+        ({"require": "battery > 20 %"}, "E0902", "/require", '"battery > 20 %"'),
+        ({"require": ["battery > 20 m"]}, "E0310", "/require/0", "20 m"),
+        ({"maintain": ["height <= 30 m", "batery > 20 %"]}, "E0201", "/maintain/1", "batery"),
+        ({"maintain": ["position inside grow(city, -17 m)"]}, "E0622", "/maintain/0", None),
+        ({"maintain": ["height <= 30 m maintain height <= 31 m"]}, "E0106", "/maintain/0", None),
+        ({"maintain": ["height <= 30 m record effect"]}, "E0902", "/maintain/0", None),
+        ({"maintain": [""]}, "E0101", "/maintain/0", None),
+        ({"record": ["nothing"]}, "E0610", "/record/0", '"nothing"'),
+    ],
+)
+def test_findings_point_at_what_is_wrong(
+    good: dict[str, Any],
+    compile_text: Compile,
+    dumped: Dump,
+    overrides: dict[str, Any],
+    code: str | None,
+    at: str,
+    under: str | None,
+) -> None:
+    text = dumped(with_overrides(good, overrides))
+    _, found = compile_text(text)
+    assert [each.code.id for each in found] == ([] if code is None else [code])
+    if code is not None:
+        assert found[0].pointer == AT + at
+        assert found[0].span is not None
+        if under is not None:
+            assert text[found[0].span.start : found[0].span.end] == under

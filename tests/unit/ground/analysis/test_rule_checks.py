@@ -1,0 +1,201 @@
+"""Findings on the rules of a policy and on what a skill asks for, beyond the twins of each code."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.compiler.program import check_program, compile_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+LIBRARY = str(CHECKOUT / "tests/golden/checker/library")
+HEAD = "".join(
+    f'import "lib:{path}.rts"\n'
+    for path in (
+        "policies/site",
+        "skills/signals",
+        *(f"skills/{each}" for each in ("takeoff", "hover", "goto", "inspect_area", "return_home", "emergency_land")),
+    )
+)
+POLICY = """
+zone east_part = circle(47.39779 N, 8.54599 E, 90 m)
+zone by_day = circle(47.39779 N, 8.54559 E, 30 m) active 08:00 .. 18:00
+policy rules version 1 {{
+  permit  hover, return_home, emergency_land by any
+  {}
+  contingency return_home, emergency_land
+}}
+"""
+
+
+def read(text: str) -> tuple[Diagnostic, ...]:
+    """All findings on a text with the library's skills and site."""
+    return check_program(program(text), dialect.load())
+
+
+def program(text: str):  # type: ignore[no-untyped-def]
+    """The text, loaded."""
+    source = (HEAD + text).encode()
+    return load(["x.rts"], lambda path: source if path == "x.rts" else Path(path).read_bytes(), LIBRARY)
+
+
+def found(rules: str) -> list[tuple[str, str]]:
+    """Code and quoted text of each finding on a policy with these rules."""
+    text = HEAD + POLICY.format(rules)
+    return [(each.code.id, text[each.span.start : each.span.end]) for each in read(POLICY.format(rules)) if each.span]
+
+
+GOTO = "permit goto by role operator"
+CASES = {
+    # alive, though each looks suspicious
+    "different roles": (f"{GOTO} when altitude < 20 m\npermit goto by role trainee when altitude < 20 m", []),
+    "different sources": (f"{GOTO} when altitude < 20 m\n{GOTO} through agent when altitude < 20 m", []),
+    "no single one": (
+        f"{GOTO} when altitude < 20 m\n{GOTO} when altitude > 15 m\n{GOTO} when altitude in 10 m .. 30 m",
+        [("E0722", f"{GOTO} when altitude in 10 m .. 30 m")],
+    ),
+    "a gap is left": (
+        f"{GOTO} when altitude < 20 m\n{GOTO} when altitude > 20 m\n{GOTO} when altitude in 10 m .. 30 m",
+        [],
+    ),
+    "a signal may be missing": (
+        f"{GOTO} when battery < 50 %\n{GOTO} when battery >= 50 %\n{GOTO} when altitude < 20 m",
+        [],
+    ),
+    "a clock is never exact": (
+        f"{GOTO} when local time in 08:00 .. 12:00\n{GOTO} when local time in 12:00 .. 16:00\n"
+        f"{GOTO} when local time in 09:00 .. 15:00",
+        [],
+    ),
+    "one window holds another": (
+        f"{GOTO} when local time in 08:00 .. 16:00\n{GOTO} when local time in 09:00 .. 15:00",
+        [("E0722", f"{GOTO} when local time in 09:00 .. 15:00")],
+    ),
+    "over midnight": (f"{GOTO} when local time in 22:00 .. 06:00 and local time in 07:00 .. 21:00", ["E0720"]),
+    "each because of the other": (
+        f"{GOTO} when altitude < 20 m\n{GOTO} when altitude < 20 m",
+        [("E0722", f"{GOTO} when altitude < 20 m")],
+    ),
+    "a forbid also acts unknown": ("forbid goto by any when battery < 20 % and battery > 30 %\n" + GOTO, []),
+    "a forbid is dead": ("forbid goto by any when altitude < 10 m and altitude > 20 m\n" + GOTO, ["E0720"]),
+    "a forbid says a part": (
+        f"forbid goto by any when battery < 30 %\nforbid goto by any when battery < 20 %\n{GOTO}",
+        [("E0722", "forbid goto by any when battery < 20 %")],
+    ),
+    "a forbid is unknown more often": (
+        f"forbid goto by any when battery < 30 %\n"
+        f"forbid goto by any when battery < 20 % and wind.speed < 900 m/s\n{GOTO}",
+        [("E0722", "forbid goto by any when battery < 20 % and wind.speed < 900 m/s")],
+    ),
+    "a forbid is unknown elsewhere": (
+        f"forbid goto by any when battery < 30 %\n"
+        f"forbid goto by any when battery < 20 % or wind.speed < -1 m/s\n{GOTO}",
+        [],
+    ),
+    "two forbids outweigh": (
+        f"{GOTO} when altitude > 10 m\nforbid goto by any when altitude > 30 m\n"
+        f"forbid goto by any when altitude <= 30 m",
+        [("E0721", f"{GOTO} when altitude > 10 m")],
+    ),
+    "one skill of two is dead": ("permit goto, takeoff by role operator when altitude < 5 m", []),
+    "sums": (f"{GOTO} when height < altitude and altitude + 5 m < height", ["E0720"]),
+    "zones apart": (f"{GOTO} when target inside bridge_a and target inside bridge_b", ["E0720"]),
+    "heights apart": (f"{GOTO} when position inside bridge_a and height > 60 m", ["E0720"]),
+    "a zone at its time": (f"{GOTO} when target inside by_day and local time in 19:00 .. 23:00", ["E0720"]),
+    "a zone out of its time": (f"{GOTO} when target inside meadow and local time in 19:00 .. 23:00", []),
+    "phases": (f"{GOTO} when phase == inspection and phase == departure", ["E0720"]),
+    "windows are free": (
+        f"{GOTO} when battery < 20 % for the last 3 s and battery > 30 % within the last 5 s",
+        [],
+    ),
+    "the same twice": (
+        "degrade any when battery < 20 % to return_home\ndegrade any when battery < 20 % to emergency_land",
+        [],
+    ),
+    "priorities": (
+        "degrade any when battery < 20 % to return_home\ndegrade any when wind.speed > 9 m/s to emergency_land",
+        [],
+    ),
+    "never reached": (
+        "degrade hover when battery < 20 % to emergency_land\ndegrade hover when battery < 10 % to return_home",
+        [("E0721", "degrade hover when battery < 10 % to return_home")],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_rules_are_told_apart(name: str) -> None:
+    rules, expected = CASES[name]
+    got = found(rules)
+    assert got == expected or [code for code, _ in got] == expected, got
+
+
+SKILL = """
+skill look(top: altitude in 5 m .. 20 m) {{
+  motion   hold
+  class    tactical
+  deadline 5 s
+  valid    for 40 min
+  lasts    at most 1 min
+  {}
+  fallback return_home, emergency_land
+  energy   at most 5 %
+}}
+"""
+
+
+def test_the_smallest_contradiction_is_told() -> None:
+    clauses = "require height > top + 10 m and battery > 50 %\n  assume wind.speed < 5 m/s\n  maintain height < top"
+    diagnostics = read(SKILL.format(clauses) + POLICY.format("permit look by role operator"))
+    assert [each.code.id for each in diagnostics] == ["E1101"]
+    assert [label.text for label in diagnostics[0].labels] == ["this is required", "the skill"]
+
+
+def test_a_skill_contradicts_the_airspace() -> None:
+    policy = POLICY.format("permit look by role operator").replace(
+        "contingency", "airspace inside city outside bridge_b\n  contingency"
+    )
+    diagnostics = read(SKILL.format("maintain position inside bridge_b") + policy)
+    assert [each.code.id for each in diagnostics] == ["E1101"]
+    assert [label.text for label in diagnostics[0].labels] == ["this is the airspace", "the skill"]
+    assert read(SKILL.format("maintain position inside bridge_a") + policy) == ()
+
+
+def test_a_step_contradicts_itself_with_its_arguments() -> None:
+    """The skill alone does not, for other arguments would do."""
+    mission = """
+mission m under rules@1 on quad {
+  proposed by operator x for role operator
+  phase departure { takeoff(altitude = 10 m) look(top = 20 m) return_home() }
+}
+"""
+    skill = SKILL.format("require wind.speed > 5 m/s\n  assume wind.speed < 4 m/s or top < 10 m")
+    policy = POLICY.format("permit look, takeoff by role operator")
+    assert [each.code.id for each in read(skill + policy + mission)] == ["E1101"]
+    assert read(skill + policy + mission.replace("20 m", "8 m")) == ()
+
+
+HOURS = """
+mission m under rules@1 on quad {
+  proposed by operator x for role operator
+  phase departure { takeoff(altitude = 10 m) return_home() }
+}
+"""
+EIGHT = 1_800_000_000 * 1_000_000 - 1_800_000_000 * 1_000_000 % 86_400_000_000 + 8 * 3_600_000_000
+
+
+@pytest.mark.parametrize(("minutes", "codes"), [(0, []), (53, []), (56, ["E0718"]), (59, ["E0718"])])
+def test_a_step_may_come_too_late_in_the_day(minutes: int, codes: list[str]) -> None:
+    text = POLICY.format("permit takeoff by role operator when local time in 08:00 .. 09:00") + HOURS
+    issued = EIGHT + minutes * 60_000_000
+    compiled = compile_program(program(text), dialect.load(), mission=None, issued_at_us=issued)
+    assert [each.code.id for each in compiled.diagnostics] == codes
+
+
+def test_a_parameter_has_values_that_are_not_permitted_between_those_that_are() -> None:
+    mission = HOURS.replace("mission m", "mission m(height: altitude in 5 m .. 40 m = 5 m)").replace("10 m", "height")
+    rules = "permit takeoff by role operator when altitude < 15 m or altitude > 25 m"
+    assert [each.code.id for each in read(POLICY.format(rules) + mission)] == ["E0703"]
+    assert [each.code.id for each in read(POLICY.format(rules.replace("25", "14")) + mission)] == []

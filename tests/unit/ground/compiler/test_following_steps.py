@@ -1,0 +1,140 @@
+"""E0619 to E0621: the vehicle is followed from step to step, by where each leaves it and by what charge is left."""
+
+import pytest
+
+from reference.sources import found, mission, policy, program, skill
+
+UP = "takeoff(altitude = 20 m)"
+HOME = "return_home()"
+GOTO = "goto(47.39799 N, 8.54559 E, altitude = 20 m)"
+SKIP = " on inadmissible skip"
+
+
+def codes(*steps: str, skills: str = "") -> list[str]:
+    return [code for code, _ in found(program(skills, policy(), mission(*steps)))]
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [
+        ((UP, HOME), []),
+        ((UP, GOTO, HOME), []),
+        ((UP, "emergency_land()"), []),
+        ((HOME,), []),  # on the ground, coming home is nothing
+        ((GOTO, HOME), ["E0619"]),
+        (("hover()", UP, HOME), ["E0619"]),
+        ((UP, HOME, GOTO, HOME), ["E0619"]),
+        ((UP, HOME, UP, HOME), []),  # landed in between
+        ((UP, UP, HOME), ["E0619"]),  # `takeoff` requires to be on the ground
+        ((UP, GOTO), ["E0621"]),
+        ((UP, HOME + SKIP), ["E0621"]),
+        ((UP + SKIP, HOME), []),
+        ((UP + SKIP, GOTO, HOME), ["E0619"]),
+        ((UP, HOME + SKIP, UP, HOME), ["E0619"]),
+    ],
+)
+def test_steps_follow_each_other(steps: tuple[str, ...], expected: list[str]) -> None:
+    assert codes(*steps) == expected
+
+
+@pytest.mark.parametrize(
+    ("clause", "expected"),
+    [
+        ("height >= 20 m", []),
+        ("height > 20 m", ["E0619"]),
+        ("position inside meadow", []),
+        ("position inside school", ["E0619"]),
+        ("position inside school or battery > 50 %", []),  # who knows
+        ("landed == in_air", []),
+        ("landed in {on_ground, landing}", ["E0619"]),
+    ],
+)
+@pytest.mark.parametrize("kind", ["require", "assume"])
+def test_clauses_over_what_motions_determine_must_be_able_to_hold(clause: str, expected: list[str], kind: str) -> None:
+    assert codes(UP, "probe()", HOME, skills=skill("probe()", **{kind: clause})) == expected
+
+
+def test_the_message_tells_what_may_be_skipped() -> None:
+    higher = f"goto(47.39799 N, 8.54559 E, 30 m){SKIP}"
+    probe = skill("probe()", require="height > 25 m")
+    [(code, message)] = found(program(policy(), probe, mission(UP, higher, "probe()", HOME)))
+    assert code == "E0619"
+    assert message == "it needs `height > 25 m`, and when this step begins the vehicle may be 20 m up, at home"
+
+
+def test_skipping_is_a_choice_as_long_as_the_step_is_possible_somewhere() -> None:
+    higher = f"goto(47.39799 N, 8.54559 E, 30 m){SKIP}"
+    probe = skill("probe()", require="height > 25 m")
+    assert codes(UP, higher, "probe()" + SKIP, HOME, skills=probe) == []
+    assert codes(UP, "probe()" + SKIP, HOME, skills=probe) == ["E0619"]
+    assert codes(UP + SKIP, GOTO + SKIP, HOME) == ["E0619"]  # nothing on board refuses to fly from the ground
+
+
+def test_a_way_that_leads_out_from_one_of_several_places_is_what_skip_is_for() -> None:
+    around = [f"goto({place}, altitude = 20 m){SKIP}" for place in ("47.39840 N, 8.54820 E", "47.39860 N, 8.54970 E")]
+    rules = policy("airspace inside city outside school", contingency="emergency_land")
+    east = skill(
+        "east(up: altitude in 5 m .. 30 m, aim: position)", motion="fly to aim at up", fallback="emergency_land"
+    )
+    beyond = "east(20 m, 47.39740 N, 8.55000 E)"
+    last = "emergency_land()"
+    assert [code for code, _ in found(program(east, rules, mission(UP, *around, beyond + SKIP, last)))] == []
+    assert [code for code, _ in found(program(east, rules, mission(UP, *around, beyond, last)))] == ["E0508"]
+
+
+def test_the_way_from_where_a_skipped_step_would_have_begun_is_looked_at_too() -> None:
+    around = [f"goto({place}, altitude = 20 m)" for place in ("47.39840 N, 8.54820 E", "47.39860 N, 8.54970 E")]
+    city = policy("airspace inside city outside school")
+    south = "goto(47.39700 N, 8.54980 E, altitude = 20 m)"
+    assert [code for code, _ in found(program(city, mission(UP, *around, HOME)))] == []
+    [(code, message)] = found(program(city, mission(UP, around[0] + SKIP, around[1] + SKIP, south, HOME)))
+    assert (code, message.split(",")[1].strip()) == ("E0508", "which begins at home")
+
+
+@pytest.mark.parametrize(("energy", "times", "expected"), [(10, 5, []), (10, 9, ["E0620"]), (0, 200, [])])
+def test_charge_is_counted_down_step_by_step(energy: int, times: int, expected: list[str]) -> None:
+    skills = skill("probe()", energy=f"at most {energy} %", lasts="at most 1 s", deadline="1 s", grace="100 ms")
+    assert codes(UP, *["probe()"] * times, HOME, skills=skills) == expected
+
+
+@pytest.mark.parametrize(
+    ("rule", "expected"),
+    [
+        ("degrade any when battery < 25 % to return_home", []),
+        ("degrade any when battery < 27 % to return_home", ["E0620"]),
+        ("degrade any when battery < 27 % and wind.speed > 5 m/s to return_home", []),  # the wind may be calm
+        ("forbid hover by any when battery < 27 %", ["E0620"]),
+        ("forbid hover by any when battery > 99 %", []),  # that is no want of charge
+    ],
+)
+def test_rules_about_the_battery_count(rule: str, expected: list[str]) -> None:
+    text = program(
+        policy(rule), skill("probe()", energy="at most 70 %"), mission(UP, "probe()", "hover(1 s)", HOME)
+    )  # fmt: skip
+    assert [code for code, _ in found(text) if code == "E0620"] == expected
+
+
+def test_a_permit_that_the_charge_takes_away() -> None:
+    rules = """policy rules version 1 {
+  permit any by any through agent, operator, onboard, reflex when battery > 50 %
+  permit return_home, emergency_land by any
+  contingency return_home, emergency_land
+}
+"""
+    text = program(rules, skill("probe()", energy="at most 50 %"), mission(UP, "probe()", "hover(1 s)", HOME))
+    assert [each for each in found(text) if each[0] == "E0620"] == [
+        ("E0620", "46 % of the charge may be left when this step begins, and no rule then permits it")
+    ]
+
+
+def test_a_step_that_may_be_skipped_is_not_gained_and_not_refused() -> None:
+    skills = skill("probe()", energy="at most 70 %")
+    assert codes(UP, "probe()" + SKIP, GOTO, HOME, skills=skills) == ["E0620"]
+    assert codes(UP, "probe()", GOTO + SKIP, HOME, skills=skills) == []
+    assert codes(UP, "probe()", GOTO + " on inadmissible hold", HOME, skills=skills) == ["E0620"]
+
+
+def test_more_places_than_are_followed_are_left_undecided() -> None:
+    gotos = [f"goto(47.397{number} N, 8.54559 E, altitude = 20 m){SKIP}" for number in range(60, 80)]
+    assert codes(UP, *gotos[:10], HOME) == []
+    assert "E1103" in codes(UP, *gotos, HOME)

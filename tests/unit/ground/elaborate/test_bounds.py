@@ -1,0 +1,119 @@
+"""What a mission takes at most, by hand."""
+
+from collections.abc import Callable
+
+import pytest
+
+from rtshcua.cli.bounds import bounds_told
+from rtshcua.ground.compiler.bounds import Bounds, most, rounded_energy, rounded_time
+from rtshcua.ground.compiler.program import Checked, Compiled
+
+Compile = Callable[..., Compiled]
+Check = Callable[[str], Checked]
+
+SECOND = 1_000_000
+
+
+def mission(header: str = "", steps: str = "hover(5 s)", confirm: str = "") -> str:
+    return f"""
+policy p version 1 {{
+  permit takeoff by role operator through agent
+  permit hover, return_home, emergency_land by any
+  {confirm}
+  contingency hover for 10 s, return_home, emergency_land
+}}
+mission m under p@1 on quad {{
+  proposed by agent openclaw for role operator
+  {header}
+  phase departure {{ takeoff(altitude = 10 m)  {steps}  return_home() }}
+}}
+"""
+
+
+def chain_us(compiled: Compiled) -> int:
+    assert compiled.policy is not None
+    contracts = compiled.policy.contracts
+    chains = [compiled.policy.contingency, *(contract.fallback for contract in contracts)]
+    return max(sum(link.limit_us or contracts[link.skill].duration_us for link in chain) for chain in chains)
+
+
+def chain_energy(compiled: Compiled) -> int:
+    assert compiled.policy is not None
+    contracts = compiled.policy.contracts
+    chains = [compiled.policy.contingency, *(contract.fallback for contract in contracts)]
+    return max(sum(contracts[link.skill].energy for link in chain) for chain in chains)
+
+
+@pytest.mark.parametrize("waits", [0, 30])
+def test_they_are_the_sums_of_all_that_may_be(compile_text: Compile, site: str, waits: int) -> None:
+    confirm = f"confirm hover when height > 2 m by role operator within {waits} s" if waits else ""
+    compiled = compile_text(site + mission(confirm=confirm))
+    assert compiled.mission is not None, compiled.diagnostics
+    steps = [step.contract for step in compiled.mission.invocations]
+    time = 300 * SECOND + sum(step.deadline_us + step.duration_us for step in steps) + waits * SECOND
+    assert compiled.bounds is not None
+    assert compiled.bounds.invocations == 3
+    assert compiled.bounds.time_us == time + chain_us(compiled)
+    # from 3 m of position error, and 1 mm of rounding, at 12 m/s with 18 min of charge: 2.4, rounded up
+    way = -(-3_001 * SECOND * 10_000 // (12_000 * 18 * 60 * SECOND))
+    assert compiled.bounds.energy == sum(step.energy for step in steps) + chain_energy(compiled) + way
+
+
+def test_a_step_of_its_own_counts_with_what_it_says(compile_text: Compile, site: str) -> None:
+    plain = compile_text(site + mission()).bounds
+    own = compile_text(
+        site + mission(steps="hover(5 s) { deadline 1 s  lasts at most 10 s  energy at most 6 % }")
+    ).bounds
+    assert plain is not None
+    assert own is not None
+    assert plain.time_us - own.time_us == (4 + 25) * SECOND
+    assert own.energy - plain.energy == 200
+
+
+@pytest.mark.parametrize(
+    ("header", "codes"),
+    [
+        ("steps at most 3  lasts at most 1 h  energy at most 100 %", []),
+        ("steps at most 2", ["E0810"]),
+        ("lasts at most 5 min", ["E0809"]),
+        ("energy at most 1 %", ["E0811"]),
+        ("lasts at most 5 m", ["E0310"]),
+        ("energy at most 5 m", ["E0310"]),
+        ("lasts at most 0 s", ["E0319"]),
+    ],
+)
+def test_they_are_held_against_what_the_mission_says(
+    check_text: Check, site: str, header: str, codes: list[str]
+) -> None:
+    assert [each.code.id for each in check_text(site + mission(header)).diagnostics] == codes
+
+
+def test_exactly_what_it_says_is_within(compile_text: Compile, check_text: Check, site: str) -> None:
+    bounds = compile_text(site + mission()).bounds
+    assert bounds is not None
+    for less, codes in ((0, []), (1, ["E0809"])):
+        header = f"lasts at most {bounds.time_us - less} us"
+        assert [each.code.id for each in check_text(site + mission(header)).diagnostics] == codes
+
+
+def test_the_largest_steps_are_shown_a_repeated_one_once(check_text: Check, site: str) -> None:
+    text = site + mission("energy at most 1 %", steps="repeat 4 { hover(5 s) }")
+    found = check_text(text).diagnostics[0]
+    assert [(text[label.span.start : label.span.end], label.text) for label in found.labels] == [
+        ("hover(5 s)", "up to 16 %, 4 times 4 %"),
+        ("return_home()", "up to 12 %"),
+        ("takeoff(altitude = 10 m)", "up to 4 %"),
+    ]
+
+
+def test_of_a_mission_with_parameters_they_are_the_largest() -> None:
+    assert most(Bounds(3, 5, 9), None) == (3, 5, 9)
+    assert most(Bounds(3, 5, 9), Bounds(4, 4, 10)) == (4, 5, 10)
+
+
+def test_they_are_told_in_one_line() -> None:
+    assert (
+        bounds_told(Bounds(1, 59 * SECOND + 1, 101)) == "at most 1 step, 1 min from issue to end, 2 % of a full charge"
+    )
+    assert [rounded_time(us) for us in (0, 1, 61 * SECOND)] == ["0 s", "1 s", "1 min 1 s"]
+    assert [rounded_energy(energy) for energy in (0, 1, 100, 12_345)] == ["0 %", "1 %", "1 %", "124 %"]

@@ -1,0 +1,302 @@
+"""The rules of habit: what they find, and above all what they leave alone."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.render import render
+from rtshcua.ground.compiler.program import check_program
+from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.lint.lint import Linted, agreed, lint
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+SHIPPED = sorted(
+    path.relative_to(CHECKOUT)
+    for name in ("skills", "policies", "missions")
+    for path in (CHECKOUT / name).glob("*.rts")
+)
+TWINS = sorted(path.name for path in (CHECKOUT / "tests" / "accepted").glob("e0[1-8]*1_*.rts"))
+
+HEAD = """
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+import "lib:policies/site.rts"
+"""
+TAIL = "permit return_home, emergency_land by any contingency return_home, emergency_land"
+POLICY = f"policy p version 1 {{ {TAIL} }}"
+RISE = """
+skill rise(top: altitude in 5 m .. 50 m, tag: one of a, b = a) {
+  motion climb to top class tactical deadline 5 s valid for 40 min lasts at most 1 min
+  fallback return_home, emergency_land energy at most 5 % record intent, decision, state, authorization, effect
+}
+"""
+
+
+def program(files: Mapping[str, str], first: str = "main.rts") -> Program:
+    def read(path: str) -> bytes:
+        name = Path(path).name
+        return files[name].encode() if name in files else (CHECKOUT / path).read_bytes()
+
+    return load([first], read, str(CHECKOUT))
+
+
+def found(text: str, **others: str) -> list[tuple[str, str]]:
+    """The code and the underlined text of each finding."""
+    one = program({"main.rts": text} | {f"{name}.rts": other for name, other in others.items()})
+    return [(each.code.id, _text(one, each)) for each in lint(one)]
+
+
+def _text(one: Program, each: Diagnostic) -> str:
+    assert each.span is not None
+    return one.sources[each.span.file].slice(each.span)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=str)
+def test_nothing_that_ships_has_a_finding(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(CHECKOUT)
+    one = load([str(path)], lambda file: Path(file).read_bytes(), str(CHECKOUT))
+    assert not lint(one), render(lint(one), one.sources)
+
+
+def test_a_program_with_an_error_is_left_alone() -> None:
+    assert found("zone Broken = circle(") == []
+    assert found('import "lib:nowhere.rts"\nzone Loud = circle(47 N, 8 E, 10 m)') == []
+
+
+# ---------------------------------------------------------------------------------------------------- E1301
+
+
+@pytest.mark.parametrize(
+    "declaration",
+    [
+        "enum mode = GPS_FIX_TYPE { none = 0 }",
+        "signal rate : speed = VFR_HUD.climb stale after 2 s",
+        "template low(top: altitude) { permit return_home by any when height <= top }",
+    ],
+)
+def test_what_a_policy_declares_and_nothing_uses(declaration: str) -> None:
+    name = declaration.split("(")[0].split()[1]
+    assert found(f"{HEAD}{declaration}\n{POLICY}") == [("E1301", name)]
+
+
+def test_a_skill_that_no_rule_names() -> None:
+    skill = RISE.replace(", tag: one of a, b = a", "")
+    assert found(HEAD + skill + POLICY) == [("E1301", "rise")]
+    assert found(HEAD + skill + POLICY.replace("permit ret", "permit rise by role operator permit ret")) == []
+    degraded = POLICY.replace("emergency_land }", "emergency_land degrade any when battery < 20 % to rise }")
+    assert found(HEAD + skill + degraded) == []
+    assert [
+        code for code, _ in found(HEAD + skill + POLICY.replace("permit ret", "permit any by role a permit ret"))
+    ] == ["E1303"]
+
+
+def test_a_file_without_a_mission_or_a_policy_is_there_to_be_imported() -> None:
+    assert found("zone a = circle(47 N, 8 E, 10 m)\nenum mode = GPS_FIX_TYPE { none = 0 }") == []
+    assert found(HEAD + RISE) == []
+
+
+def test_what_a_policy_offers_to_missions_elsewhere() -> None:
+    zone = "zone yard = circle(47.3977 N, 8.5456 E, 10 m)\n"
+    mission = "mission m under p@1 on quad { proposed by agent x for role operator phase a { return_home() } }"
+    assert found(HEAD + zone + POLICY) == []
+    assert found(HEAD + zone + POLICY + mission) == [("E1301", "yard")]
+    anywhere = mission.replace("mission m", "mission m(where: zone = yard)")
+    assert found(HEAD + zone + "zone pad = circle(47.3977 N, 8.5456 E, 10 m)" + POLICY + anywhere) == [
+        ("E1301", "where")
+    ]
+
+
+def test_parameters() -> None:
+    rise = "permit rise by role operator"
+    assert found(HEAD + RISE + POLICY.replace("permit ret", f"{rise} permit ret")) == [("E1301", "tag")]
+    assert found(HEAD + RISE + POLICY.replace("permit ret", f"{rise} when tag == b permit ret")) == []
+    template = (
+        "template low(top: altitude, who: role, altitude: altitude) { permit rise by role who when top <= height }"
+    )
+    used = POLICY.replace("permit ret", "use low(20 m, operator, 3 m) permit ret")
+    assert found(HEAD + RISE.replace(", tag: one of a, b = a", "") + template + used) == [("E1301", "altitude")]
+
+
+def test_only_what_was_asked_for() -> None:
+    other = HEAD + "enum mode = GPS_FIX_TYPE { none = 0 }\nzone Loud = circle(47 N, 8 E, 1 m)\n" + POLICY
+    steps = "{ proposed by agent x for role operator phase a { return_home() } }"
+    mission = f'import "policy.rts"\nmission m under p@1 on quad {steps}'
+    assert found(mission, policy=other) == []
+    one = program({"main.rts": mission, "policy.rts": other})
+    both = lint(one, [unit.file for unit in one.units])
+    assert {each.code.id for each in both} == {"E1301", "E1302"}
+
+
+def test_programs_that_share_a_file_agree_or_say_nothing() -> None:
+    policy = HEAD + "template low(top: altitude) { permit return_home by any when height <= top }\n" + POLICY
+    user = (
+        'import "policy.rts"\n'
+        + HEAD
+        + POLICY.replace("policy p", "policy q").replace("permit ret", "use low(9 m) permit ret")
+    )
+    files = {"main.rts": policy, "user.rts": user, "policy.rts": policy}
+    alone, used = program(files, "policy.rts"), program(files, "user.rts")
+    results = [
+        Linted(frozenset(unit.file for unit in each.units), lint(each, ["policy.rts"])) for each in (alone, used)
+    ]
+    assert [len(each.found) for each in results] == [1, 0]
+    assert agreed(results) == ()
+    assert agreed(results[:1]) == results[0].found
+
+
+# ---------------------------------------------------------------------------------------------------- E1302
+
+
+@pytest.mark.parametrize(
+    ("name", "better"),
+    [
+        ("BridgeA", "bridge_a"),
+        ("bridge_", "bridge"),
+        ("_a", "a"),
+        ("NORTH", "north"),
+        ("GPSZone", "gps_zone"),
+        ("a__b", "a_b"),
+    ],
+)
+def test_names(name: str, better: str) -> None:
+    one = program({"main.rts": f"zone {name} = circle(47 N, 8 E, 10 m)"})
+    (finding,) = lint(one)
+    assert (finding.code.id, finding.help) == ("E1302", f"write it as `{better}`")
+    assert lint(program({"main.rts": f"zone {better} = circle(47 N, 8 E, 10 m)"})) == ()
+
+
+def test_the_parts_of_a_signals_name() -> None:
+    assert found("signal gps.Fix : count = GPS_RAW_INT.fix_type stale after 2 s") == [("E1302", "gps.Fix")]
+    assert found("signal gps.fix_type : count = GPS_RAW_INT.fix_type stale after 2 s") == []
+
+
+def test_names_of_things_outside_stay_as_they_are() -> None:
+    assert found("enum fix = GPS_FIX_TYPE { NO_GPS = 0, NoFix = 1 }") == [("E1302", "NoFix")]
+    mission = "mission m under p@1 on quad { proposed by agent OpenClaw for role Chief phase a { return_home() } }"
+    assert found(HEAD + POLICY.replace("permit ret", "permit return_home by role Chief permit ret") + mission) == []
+
+
+# ---------------------------------------------------------------------------------------------------- E1303
+
+
+def test_broad_authority() -> None:
+    skill = RISE.replace(", tag: one of a, b = a", "")
+
+    def permitted(rule: str) -> list[tuple[str, str]]:
+        return found(HEAD + skill + POLICY.replace("permit ret", f"{rule} permit ret"))
+
+    assert permitted("permit rise by any") == [("E1303", "rise")]
+    assert permitted("permit rise by any through operator") == [("E1303", "rise")]
+    assert permitted("permit any by role operator") == [("E1303", "permit any by role operator")]
+    for rule in (
+        "permit rise by role a",
+        "permit rise by any when top <= 9 m",
+        "forbid rise by any",
+    ):
+        assert permitted(rule) == [], rule
+
+
+def test_a_link_must_be_permitted_to_whoever_needs_it() -> None:
+    skill = RISE.replace("top: altitude in 5 m .. 50 m, tag: one of a, b = a", "top: altitude in 5 m .. 50 m = 9 m")
+    rule = POLICY.replace("permit ret", "permit rise by any permit ret")
+    assert found(HEAD + skill + rule) == [("E1303", "rise")]
+    assert found(HEAD + skill + rule.replace("contingency", "contingency rise for 20 s,")) == []
+    assert (
+        found(HEAD + skill + rule.replace("contingency", "degrade any when battery < 20 % to rise contingency")) == []
+    )
+
+
+# ---------------------------------------------------------------------------------------------------- E1304
+
+
+def test_repeated_numbers() -> None:
+    def when(*conditions: str) -> list[tuple[str, str]]:
+        rules = " ".join(f"forbid return_home by any when {each}" for each in conditions)
+        return found(HEAD + 'import "lib:skills/signals.rts"\n' + POLICY.replace("permit ret", f"{rules} permit ret"))
+
+    three = ("battery < 25 %", "25 % >= battery and height > 3 m", "battery in 10 % .. 25 %")
+    assert when(*three) == [("E1304", "25 %")]
+    assert when(*three[:2]) == []
+    assert when(*three[:2], "battery < 25 % or battery > 25 %") == [("E1304", "25 %")]
+    assert when(*three[:2], "battery < 26 %") == []
+    assert when("height < 12 m", "wind.speed < 12 m/s", "obstacle.distance < 12 m") == []
+    assert when("height > 0 m", "height >= 0 m", "not height == 0 m") == []
+    assert when(*(f"position inside grow(school, 20 m) and battery < {n} %" for n in (10, 20, 30))) == [
+        ("E1304", "20 m")
+    ]
+    assert when("height < 12 m", "height < 1200 cm", "height > 12 m") == [("E1304", "12 m")]
+
+
+def test_repeated_numbers_of_a_skill_and_of_a_template() -> None:
+    skill = RISE.replace(
+        "fallback", "require battery > 30 % and height < 9 m assume battery > 30 % maintain battery > 30 % fallback"
+    )
+    skill = skill.replace("top: altitude in 5 m .. 50 m, tag: one of a, b = a", "top: altitude in 5 m .. 50 m")
+    one = program({"main.rts": HEAD + skill})
+    assert [each.help for each in lint(one)] == [
+        "give the skill a parameter with `30 %` as its default, so that it is written once"
+    ]
+
+
+# ---------------------------------------------------------------------------------------------------- E1305
+
+
+def test_imports() -> None:
+    assert found(HEAD + 'import "lib:skills/hover.rts"\n' + POLICY) == [("E1305", 'import "lib:skills/hover.rts"')]
+    assert found(HEAD + 'import "lib:policies/site.rts"\n' + POLICY) == [("E1305", 'import "lib:policies/site.rts"')]
+
+
+def test_an_import_is_used_for_what_it_brings_along() -> None:
+    gathered = "// gathers others\n" + HEAD
+    assert found('import "all.rts"\n' + POLICY, all=gathered) == []
+    assert found('import "all.rts"\n' + HEAD + POLICY, all=gathered) == [("E1305", 'import "all.rts"')]
+    assert found(gathered) == []
+    assert found(HEAD + 'import "none.rts"\n' + POLICY, none="// nothing yet") == [("E1305", 'import "none.rts"')]
+
+
+def test_a_library_may_bring_things_along_for_those_who_import_it() -> None:
+    site = "zone pad = circle(47.3977 N, 8.5456 E, 10 m)"
+    assert found('import "lib:skills/signals.rts"\n' + site) == []
+    assert found('import "lib:skills/signals.rts"\nimport "lib:skills/goto.rts"\n' + site) == [
+        ("E1305", 'import "lib:skills/signals.rts"')
+    ]
+
+
+def test_a_policy_needs_what_it_does_not_mention() -> None:
+    """Its missions may fly to any of its zones, and every decision reads the well-known signals."""
+    zones = "zone pad = circle(47.3977 N, 8.5456 E, 10 m)"
+    assert found(HEAD + 'import "zones.rts"\n' + POLICY, zones=zones) == []
+    assert found(HEAD + 'import "lib:skills/signals.rts"\n' + POLICY) == []
+    every = POLICY.replace("permit ret", "permit any by role operator permit ret")
+    assert [code for code, _ in found(HEAD + 'import "lib:skills/hover.rts"\n' + every)] == ["E1303"]
+
+
+def test_the_fix_deletes_the_line() -> None:
+    text = HEAD + '  import "lib:skills/hover.rts"   // for later\n' + POLICY
+    one = program({"main.rts": text})
+    (fix,) = (fix for each in lint(one) for fix in each.fixes)
+    assert text[: fix.span.start] + fix.replacement + text[fix.span.end :] == HEAD + POLICY
+    text = HEAD + 'import "lib:skills/hover.rts" ' + POLICY
+    one = program({"main.rts": text})
+    (fix,) = (fix for each in lint(one) for fix in each.fixes)
+    assert text[: fix.span.start] + text[fix.span.end :] == HEAD + " " + POLICY
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_without_its_unused_imports_a_source_means_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other twins import more than they need, so each shows whether what is called unused can go."""
+    monkeypatch.chdir(CHECKOUT)
+    path, library = f"tests/accepted/{name}", "tests/golden/checker/library"
+    kept: dict[str, bytes] = {}
+    before = load([path], lambda file: Path(file).read_bytes(), library)
+    text = before.sources[path].text
+    fixes = [fix for each in lint(before) for fix in each.fixes]
+    for fix in reversed(fixes):
+        text = text[: fix.span.start] + text[fix.span.end :]
+    kept[path] = text.encode()
+    after = load([path], lambda file: kept.get(file) or Path(file).read_bytes(), library)
+    assert check_program(after, dialect.load()) == ()
+    assert "E1305" not in {each.code.id for each in lint(after)}

@@ -1,0 +1,75 @@
+"""Every example of docs/language.md is compiled, and nothing is found in it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.render import render
+from rtshcua.ground.compiler.program import check_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[3]
+PAGE = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
+SOURCES = re.findall(r"^```rts\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+CONDITIONS = [
+    line
+    for block in re.findall(r"^```condition\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+    for line in block.splitlines()
+]
+
+AROUND = """
+import "lib:policies/site.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+
+skill example() {
+  motion   hold
+  class    tactical
+  deadline 5 s
+  valid    for 40 min
+  lasts    at most 35 s
+  grace    1 s
+  require  CONDITION
+  fallback return_home, emergency_land
+  energy   at most 4 %
+  record   intent, decision, state, authorization, effect
+}
+
+policy examples version 1 {
+  permit example by role operator
+  permit hover, return_home, emergency_land by any
+  airspace inside city outside school
+  contingency hover for 10 s, return_home, emergency_land
+}
+"""
+
+
+def findings(text: str) -> str:
+    """What a person reads when the text is checked."""
+
+    def read(path: str) -> bytes:
+        return text.encode() if path == "example.rts" else Path(path).read_bytes()
+
+    program = load(["example.rts"], read, str(CHECKOUT))
+    return render(check_program(program, dialect.load()), program.sources)
+
+
+def test_there_are_examples_of_everything() -> None:
+    assert len(SOURCES) >= 7
+    assert len(CONDITIONS) >= 15
+    words = "\n".join([*SOURCES, *CONDITIONS])
+    for word in ("import", "signal", "zone", "vehicle", "skill", "template", "policy", "mission", "rising", "abs("):
+        assert word in words, word
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_source_is_compiled_without_a_finding(source: str) -> None:
+    assert findings(source) == ""
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_condition_is_compiled_without_a_finding(condition: str) -> None:
+    assert findings(AROUND.replace("CONDITION", condition)) == ""

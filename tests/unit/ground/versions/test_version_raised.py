@@ -1,0 +1,245 @@
+"""E0716: what counts as a difference between two versions of a policy, what does not, and what is said of it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.compiler.program import examine_program
+from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.versions.differences import differences
+from rtshcua.ground.versions.raised import Compared, compare
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+
+SKILLS = """
+skill rise(top: altitude in 5 m .. 50 m = 10 m, pace: one of slow, quick = slow) {
+  motion climb to top class tactical deadline 5 s valid for 40 min lasts at most 1 min
+  require battery > 30 %
+  fallback home, down energy at most 5 % record intent, decision, state, authorization, effect
+}
+skill look(area: zone, at: altitude in 5 m .. 50 m) {
+  motion cover area at at class tactical deadline 5 s valid for 40 min during work lasts at most 5 min
+  assume gps.fix >= fix_3d for the last 3 s
+  maintain position inside grow(area, 30 m)
+  fallback home, down energy at most 9 % record intent, decision, state, authorization, effect
+}
+skill home() {
+  motion home class tactical deadline 5 s valid for 1 h lasts at most 3 min
+  fallback down energy at most 9 % record intent, decision, state, authorization, effect
+}
+skill down() {
+  motion land class tactical deadline 5 s valid for 1 h lasts at most 2 min
+  energy at most 5 % record intent, decision, state, authorization, effect
+}
+"""
+SITE = """
+vehicle quad {
+  identity "quad-07" home 47.39774 N, 8.54559 E within 20 m speed at most 12 m/s climb at most 3 m/s
+  position error 3 m energy 100 % = 18 min hover reserve 15 %
+}
+zone field  = circle(47.39774 N, 8.54559 E, 400 m) ceiling 120 m above home
+zone school = circle(47.39729 N, 8.54999 E, 40 m)
+zone roof   = circle(47.39850 N, 8.54600 E, 40 m) ceiling 60 m
+"""
+POLICY = """
+policy yard version 3 {
+  permit rise by role operator, trainee through agent, operator when top <= 20 m and pace == slow
+  permit look by role operator through agent when area inside field and at <= 30 m
+  permit home, down by any
+  forbid look by any when phase == landing or local time in 22:00 .. 06:00
+  confirm look when at < 10 m by role chief within 30 s
+  degrade any when battery < 25 % to home
+  degrade any when position inside grow(school, 20 m) to down
+  airspace inside field outside school
+  contingency home, down
+}
+"""
+TEXT = 'import "lib:skills/signals.rts"\n' + SKILLS + SITE + POLICY
+
+
+def load_text(text: str) -> Program:
+    def read(path: str) -> bytes:
+        return text.encode() if path == "yard.rts" else Path(path).read_bytes()
+
+    return load(["yard.rts"], read, str(CHECKOUT))
+
+
+def lowered(text: str) -> LoweredPolicy:
+    checked = examine_program(load_text(text), dialect.load())
+    assert not checked.diagnostics, checked.diagnostics
+    (policy,) = checked.policies
+    return policy
+
+
+@pytest.fixture(scope="module")
+def before() -> LoweredPolicy:
+    return lowered(TEXT)
+
+
+def changed(changes: Mapping[str, str]) -> str:
+    text = TEXT
+    for old, new in changes.items():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("policy yard", "// a comment\npolicy   yard"),
+        ("top <= 20 m and", "top <= 2000 cm and"),
+        ("zone school", "zone aside = circle(47.39900 N, 8.54500 E, 5 m)\nzone school"),  # then below: only the zone
+        ("by role operator, trainee", "by role trainee, operator"),
+        ("through agent, operator", "through operator, agent"),
+        ("deadline 5 s valid for 40 min lasts", "valid for 2400 s  deadline 5000 ms lasts"),
+        (
+            "record intent, decision, state, authorization, effect\n}\nskill look",
+            "record effect, state, intent, decision, authorization\n}\nskill look",
+        ),
+    ],
+)
+def test_what_only_looks_different(before: LoweredPolicy, old: str, new: str) -> None:
+    words = differences(before.policy, lowered(changed({old: new})).policy)
+    assert words == (("the new zone `aside`",) if "aside" in new else ())
+
+
+def test_declarations_in_another_order_mean_the_same(before: LoweredPolicy) -> None:
+    school, roof = (line for line in SITE.splitlines() if line.startswith(("zone school", "zone roof")))
+    text = (
+        TEXT.replace(school, "").replace(roof, f"{roof}\n{school}").replace(POLICY, "").replace(SKILLS, POLICY + SKILLS)
+    )
+    assert differences(before.policy, lowered(text).policy) == ()
+
+
+def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: LoweredPolicy) -> None:
+    lines = POLICY.splitlines()
+    lines[2:4] = lines[3], lines[2]
+    assert differences(before.policy, lowered(TEXT.replace(POLICY, "\n".join(lines))).policy) == ()
+    lines[7:9] = lines[8], lines[7]
+    after = lowered(TEXT.replace(POLICY, "\n".join(lines))).policy
+    assert differences(before.policy, after) == ("the order of its `degrade` rules",)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("top <= 20 m", "top <= 21 m", "the rule `permit rise by role operator, trainee through agent, oper...`"),
+        ("pace == slow", "pace == quick", "the rule `permit rise by role operator, trainee through agent, oper...`"),
+        ("operator, trainee", "operator", "the rule `permit rise by role operator through agent, operator when...`"),
+        ("permit home, down by any", "permit home, down by any permit look by role chief when at <= 9 m",
+         "the new rule `permit look by role chief when at <= 9 m`"),
+        ("degrade any when battery < 25 % to home\n", "",
+         "the rule `degrade any when battery < 25 % to home`, which is gone"),
+        ("phase == landing", "phase == hover", "the rule `forbid look by any when phase == hover or"),
+        ("22:00 .. 06:00", "21:00 .. 06:00", "the rule `forbid look by any when phase == landing or"),
+        ("within 30 s", "within 31 s", "the rule `confirm look when at < 10 m by role chief within 31 s`"),
+        ("role chief", "role boss", "the rule `confirm look when at < 10 m by role boss within 30 s`"),
+        ("grow(school, 20 m) to", "grow(school, 21 m) to",
+         "the rule `degrade any when position inside grow(school, 21 m) to down`"),
+        ("inside field outside school", "inside field", "the airspace"),
+        ("contingency home, down", "contingency home for 2 min, down", "the contingency"),
+        ("reserve 15 %", "reserve 16 %", "the vehicle (reserve)"),
+        ("position error 3 m energy 100 % = 18 min", "position error 4 m energy 100 % = 19 min",
+         "the vehicle (position error, energy)"),
+        ("47.39774 N, 8.54559 E within", "47.39775 N, 8.54559 E within", "the vehicle (home)"),
+        ("E, 40 m) ceiling 60 m", "E, 41 m) ceiling 61 m", "the zone `roof` (shape, ceiling)"),
+        ("ceiling 60 m\n", "ceiling 60 m active 08:00 .. 18:00\n", "the zone `roof` (active)"),
+        ("require battery > 30 %", "require battery > 31 %", "the skill `rise` (require)"),
+        ("for the last 3 s", "for the last 4 s", "the skill `look` (assume)"),
+        ("grow(area, 30 m)", "grow(area, 31 m)", "the skill `look` (maintain)"),
+        ("during work", "during landing", "the skill `look` (valid)"),
+        ("fallback down energy", "grace 1 s fallback down energy", "the skill `home` (grace)"),
+    ],
+)  # fmt: skip
+def test_what_differs(before: LoweredPolicy, old: str, new: str, words: str) -> None:
+    (found,) = differences(before.policy, lowered(changed({old: new})).policy)
+    assert found.startswith(words)
+
+
+def test_a_zone_that_lies_elsewhere_in_the_list_is_not_another(before: LoweredPolicy) -> None:
+    """Sets and tables have more members then; what they say of the zones that were there is the same."""
+    inside = "zone shed = circle(47.39780 N, 8.54500 E, 5 m)\nzone field"
+    after = lowered(changed({"zone field": inside})).policy
+    assert after.sets != before.policy.sets
+    assert differences(before.policy, after) == ("the new zone `shed`",)
+    assert differences(after, before.policy) == ("the zone `shed`, which is gone",)
+
+
+def compared(before: LoweredPolicy, text: str) -> Compared:
+    program = load_text(text)
+    checked = examine_program(program, dialect.load())
+    (found,) = compare(checked.policies, [before.policy], "old.bundle", program.sources)
+    return found
+
+
+def finding(before: LoweredPolicy, text: str) -> tuple[Diagnostic, str, str]:
+    """The finding, what it underlines, and the text with its fix."""
+    found = compared(before, text).finding
+    assert found is not None
+    assert found.code.id == "E0716"
+    assert found.span is not None
+    (fix,) = found.fixes
+    return found, text[slice(*found.span[1:])], text[: fix.span.start] + fix.replacement + text[fix.span.end :]
+
+
+def test_a_change_without_a_higher_version(before: LoweredPolicy) -> None:
+    text = changed({"top <= 20 m": "top <= 21 m", "reserve 15 %": "reserve 16 %", "ceiling 60 m": "ceiling 61 m",
+                    "battery > 30 %": "battery > 31 %"})  # fmt: skip
+    found, underlined, fixed = finding(before, text)
+    assert underlined == "3"
+    assert found.message == "`yard` differs from the one in `old.bundle`, and both have version 3"
+    assert found.help == (
+        "raise it to version 4, here and in the missions under it; it differs in the rule `permit rise by role "
+        "operator, trainee through agent, oper...`, the vehicle (reserve), the zone `roof` (ceiling), and 1 more"
+    )
+    assert compared(before, fixed).finding is None
+
+
+def test_a_lower_version_with_and_without_a_change(before: LoweredPolicy) -> None:
+    lower = changed({"version 3": "/* as\nversion 9 */ version // 8\n 2"})
+    found, underlined, fixed = finding(before, lower)
+    assert underlined == "2"
+    assert found.message == "`yard` has version 2, and version 3 in `old.bundle`"
+    assert found.help == "a version never goes back: write version 3"
+    assert compared(before, fixed).finding is None
+    found, _, fixed = finding(before, lower.replace("top <= 20 m", "top <= 21 m"))
+    assert (found.help or "").startswith(
+        "a version never goes back: write version 4; it differs in the rule `permit rise"
+    )
+    assert compared(before, fixed).finding is None
+
+
+@pytest.mark.parametrize("change", [{}, {"version 3": "version 4"}, {"version 3": "version 9", "20 m and": "21 m and"}])
+def test_what_is_fine(before: LoweredPolicy, change: dict[str, str]) -> None:
+    assert compared(before, changed(change)).finding is None
+
+
+def test_a_policy_of_another_name_or_for_another_vehicle_is_another(before: LoweredPolicy) -> None:
+    for change in ({"policy yard": "policy field_trip"}, {"quad-07": "hexa-01", "vehicle quad": "vehicle hexa"}):
+        program = load_text(changed(change | {"version 3": "version 1"}))
+        checked = examine_program(program, dialect.load())
+        assert checked.policies
+        assert compare(checked.policies, [before.policy], "old", program.sources) == ()
+    renamed, _, _ = finding(before, changed({"quad-07": "quad-08"}))
+    assert "the vehicle (identity)" in (renamed.help or "")
+
+
+def test_the_newest_of_several_earlier_ones_counts(before: LoweredPolicy) -> None:
+    older, other = (
+        lowered(changed({"version 3": "version 2"})).policy,
+        lowered(changed({"reserve 15 %": "reserve 16 %"})).policy,
+    )
+    program = load_text(TEXT)
+    policies = examine_program(program, dialect.load()).policies
+    for earlier in ([older, before.policy], [before.policy, older], [other, before.policy], [before.policy, other]):
+        (found,) = compare(policies, earlier, "old", program.sources)
+        assert (found.earlier, found.finding) == (3, None)
+
+
+def test_a_program_with_errors_has_no_policies_to_compare() -> None:
+    assert examine_program(load_text(TEXT + "zone z = nowhere"), dialect.load()).policies == ()

@@ -1,4 +1,4 @@
-"""Where the shipped library is: the language's grammar, and what ships written in the language.
+"""Where the shipped library is: the grammar, what ships written in the language, and a page for each code.
 
 A wheel carries it inside the package (`rtshcua/_library/`, see the build section of pyproject.toml); a checkout, and
 an editable install of it, has it beside the package. Only `rtshcua.cli` calls this; other layers are given a path.
@@ -8,7 +8,7 @@ from errno import ENOENT
 from functools import cache
 from pathlib import Path
 
-FOLDERS = ("grammar", "skills", "policies", "missions")
+FOLDERS = ("grammar", "skills", "policies", "missions", "docs/codes")
 
 
 @cache

@@ -15,6 +15,9 @@ from rtshcua.cli.faults import barrier, fail, say
 from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.diagnostics.exits import ExitCode
 
+#: the commands whose `--json` is that of `Findings`
+_REPORTING = ("check", "compile")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and gives its exit code back, for `sys.exit`; nothing but SystemExit rises from it."""
@@ -54,22 +57,29 @@ def _call(row: Row, words: list[str]) -> int:
 
     command = get_command(import_module(row.module).app)
     try:
-        with command.make_context(f"rtshcua {row.name}", words, help_option_names=["-h", "--help"]) as context:
+        with command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context:
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
     except typer.Exit as end:
         return end.exit_code
     except (typer.Abort, EOFError):  # Ctrl-C, or the end of the input, at a question
         return fail(ExitCode.INTERRUPTED, "stopped at a question that was not answered")
     except typer.TyperException as error:
-        return _misused(row, error)
+        return _misused(row, error, words)
 
 
-def _misused(row: Row, error: Exception) -> ExitCode:
-    """Says what is wrong with the command line as every other error is said."""
+def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
+    """Says what is wrong with the command line as every other error is said; with `--json` as JSON, where the command
+    reports findings.
+    """
     words = cast("str", error.format_message()).rstrip(".")  # type: ignore[attr-defined]
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"rtshcua {row.name}"
-    code = fail(ExitCode.USAGE, words[:1].lower() + words[1:])
+    words = words[:1].lower() + words[1:]
+    if row.name in _REPORTING and "--json" in given:
+        from rtshcua.cli.findings import Findings
+
+        return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, f"`{path} --help` explains it")
+    code = fail(ExitCode.USAGE, words)
     if context is not None:
         say(f"usage: {context.get_usage().removeprefix('Usage: ')}")
     say(f" help: `{path} --help` explains it")

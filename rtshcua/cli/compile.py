@@ -11,7 +11,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.faults import fail
+from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.unlock import unlock
@@ -31,6 +31,9 @@ def compile(
     source: Annotated[Path, typer.Argument(help="a source with a mission (.rts), or a mission specification (.json)")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="the bundle [default: SOURCE.bundle]")] = None,
     mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help='a parameter of the mission, as in height="20 m" (repeatable)')
+    ] = None,
     at: Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")] = None,
     policy_key: Annotated[Path | None, typer.Option(help="the policy key [default: the key store's]")] = None,
     mission_key: Annotated[Path | None, typer.Option(help="the mission key [default: the key store's]")] = None,
@@ -43,17 +46,19 @@ def compile(
 ) -> ExitCode:
     """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors."""
     sources_given = [source, *(with_ or [])]
+    findings = Findings(json=as_json, deny_warnings=deny_warnings)
     issued_at = _moment(at)
     if issued_at is None:
-        return fail(ExitCode.USAGE, f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    findings = Findings(json=as_json, deny_warnings=deny_warnings)
+        return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
     target = output or source.with_suffix(".bundle")
     if not target.parent.is_dir():
         return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
     if target.exists() and (not target.is_file() or any(_same(target, each) for each in sources_given)):
         what = "one of the sources" if target.is_file() else "no regular file"
         return findings.refuse(ExitCode.USAGE, "output", f"`{target}` is {what}, and is not replaced by a bundle")
-    compiled, sources = compile_sources(sources_given, mission=mission, issued_at_us=issued_at)
+    compiled, sources = compile_sources(
+        sources_given, mission=mission, issued_at_us=issued_at, values=tuple(set_ or ())
+    )
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
@@ -69,7 +74,13 @@ def compile(
     _replace(target, data)
     if not as_json:
         print(_told(compiled.policy, compiled.mission, target))
-    return findings.finish(ExitCode.OK, bundle=_described(compiled.policy, compiled.mission, target, data, signers))
+        if compiled.bounds is not None:
+            print(bounds_told(compiled.bounds))
+    return findings.finish(
+        ExitCode.OK,
+        bundle=_described(compiled.policy, compiled.mission, target, data, signers),
+        bounds=None if compiled.bounds is None else compiled.bounds._asdict(),
+    )
 
 
 def _moment(text: str | None) -> int | None:

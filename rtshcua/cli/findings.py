@@ -37,7 +37,8 @@ class Findings:
             text = render(found, sources)
             say((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say(_count(found))
-        return (self._deny_warnings and bool(found)) or any(each.severity is Severity.ERROR for each in found)
+        forbidding = {Severity.ERROR, Severity.WARNING} if self._deny_warnings else {Severity.ERROR}
+        return any(each.severity in forbidding for each in found)
 
     def refuse(self, code: ExitCode, slug: str, message: str, help: str | None = None) -> ExitCode:
         """End with a refusal that is about no source."""
@@ -59,12 +60,10 @@ def exit_code(found: Iterable[Diagnostic]) -> ExitCode:
 
 
 def _count(found: tuple[Diagnostic, ...]) -> str:
-    errors = sum(each.severity is Severity.ERROR for each in found)
-    warnings = len(found) - errors
-    parts = [
-        f"{number} {word}{'s' * (number > 1)}" for number, word in ((errors, "error"), (warnings, "warning")) if number
-    ]
-    return f"\n{' and '.join(parts)}"
+    numbers = ((severity.value, sum(each.severity is severity for each in found)) for severity in Severity)
+    parts = [f"{number} {word}{'s' * (number > 1)}" for word, number in numbers if number]
+    first = next((each.code.id for each in found if each.severity is not Severity.NOTE), found[0].code.id)
+    return f"\n{', '.join(parts)}; `rtshcua explain {first}` tells more"
 
 
 def _wants_colour() -> bool:
@@ -84,6 +83,9 @@ def _line(line: str) -> str:
     if line.startswith("warning["):
         kind, _, message = line.partition(": ")
         return f"{_YELLOW}{kind}{_END}{_BOLD}: {message}{_END}"
+    if line.startswith("note["):
+        kind, _, message = line.partition(": ")
+        return f"{_CYAN}{kind}{_END}{_BOLD}: {message}{_END}"
     if bar and not head.strip() and set(rest.lstrip()[:1]) <= {"^", "-"}:
         return f"{_BLUE}{head}{bar}{_END}{_RED if '^' in rest else _BLUE}{rest}{_END}"
     if bar and (not head.strip() or head.strip().isdigit()):

@@ -9,9 +9,11 @@ from rtshcua import library
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.agent.specification import load_specification
-from rtshcua.ground.compiler.program import Compiled, check_program, compile_program
+from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
+from rtshcua.ground.elaborate.settings import parse_settings
+from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.load import Program, load
-from rtshcua.ground.language.parse import MAX_SIZE
+from rtshcua.ground.language.parse import Parsed, parse
 from rtshcua.mavlink import dialect
 
 
@@ -22,29 +24,34 @@ class Reading(NamedTuple):
     pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]]
 
 
-def read_sources(paths: Sequence[Path]) -> Reading:
+def read_sources(paths: Sequence[Path], parse: Callable[[Source], Parsed] = parse) -> Reading:
     """Sources and all that they import. The first may be a mission specification (.json), as an agent proposes it."""
     first, shipped = paths[0], str(library.root())
     rest = [str(path) for path in paths[1:]]
     if first.suffix.lower() == ".json":
         program, specification = load_specification(str(first), rest, _read, shipped, _listing)
         return Reading(program, specification.pointed)
-    return Reading(load([str(first), *rest], _read, shipped, _listing), tuple)
+    return Reading(load([str(first), *rest], _read, shipped, _listing, parse), tuple)
 
 
 def compile_sources(
-    paths: Sequence[Path], *, mission: str | None, issued_at_us: int
+    paths: Sequence[Path], *, mission: str | None, issued_at_us: int, values: Sequence[str] = ()
 ) -> tuple[Compiled, Mapping[str, Source]]:
-    """Compile the mission in the first of `paths`; gives the sources too, for showing what was found in them."""
+    """Compile the mission in the first of `paths`; gives the sources too, for showing what was found in them.
+
+    `values` are those of the mission's parameters, `name=value` each.
+    """
     reading = read_sources(paths)
-    compiled = compile_program(reading.program, dialect.load(), mission=mission, issued_at_us=issued_at_us)
-    return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics)), reading.program.sources
+    compiled = compile_program(
+        reading.program, dialect.load(), mission=mission, issued_at_us=issued_at_us, settings=parse_settings(values)
+    )
+    return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics)), compiled.sources
 
 
-def check_sources(paths: Sequence[Path]) -> tuple[tuple[Diagnostic, ...], Mapping[str, Source]]:
-    """Everything that is wrong with `paths` and what they import."""
-    reading = read_sources(paths)
-    return reading.pointed(check_program(reading.program, dialect.load())), reading.program.sources
+def examine(reading: Reading) -> Checked:
+    """Everything that is wrong with a program, and what its missions take at most."""
+    checked = examine_program(reading.program, dialect.load())
+    return replace(checked, diagnostics=reading.pointed(checked.diagnostics))
 
 
 def _read(path: str) -> bytes:

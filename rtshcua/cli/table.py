@@ -29,11 +29,13 @@ class Row(NamedTuple):
 COMMANDS = (
     Row("check", "write", "report everything that is wrong with sources or a mission specification"),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
+    Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
     Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),
     Row("keys", "fly", "make and list signing keys and the trust root"),
     Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
     Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station"),
     Row("verify-log", "audit", "prove that a flight's log is whole, signed, and decides the same again"),
+    Row("why", "audit", "show a decision step by step: what decided, and what would have passed"),
     Row("show", "audit", "print a bundle, a key, a trust root or a log for a person"),
 )
 

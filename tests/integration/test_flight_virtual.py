@@ -12,7 +12,7 @@ from virtual import case
 from virtual.flight import Flight, Flown
 from virtual.shipped import NAMES, shipped
 
-STEPS = {"short": 3, "standard": 6, "extended": 12}
+STEPS = {"short": 3, "standard": 6, "extended": 12, "one_bridge": 6}
 FLAVOURS = ("px4", "ardupilot")
 
 

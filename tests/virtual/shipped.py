@@ -6,7 +6,7 @@ from rtshcua import library
 from rtshcua.cli.sources import compile_sources
 from virtual import case
 
-NAMES = ("short", "standard", "extended")
+NAMES = ("short", "standard", "extended", "one_bridge")
 
 
 @cache

@@ -32,6 +32,11 @@ def show_policy(page: Page, policy: Policy) -> None:
     page.row("airspace", "anywhere" if policy.airspace is None else policy.airspace.text.removeprefix("airspace "))
     page.rows("contingency", [f"{n} {words.link(policy, link)}" for n, link in enumerate(policy.contingency)])
 
+    if policy.monitors:
+        page.head("Temporal monitors: what conditions of the past look at")
+        for number, monitor in enumerate(policy.monitors):
+            page.row(str(number), words.monitor(monitor), width=2)
+
     page.head("Zones")
     width = max((len(zone.name) for zone in policy.zones), default=0)
     for zone in policy.zones:

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
+from rtshcua.decision.outline import rings as outline
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
 from rtshcua.model.flat.mission import Plan
-from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, unproject
+from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
+from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, Zone, unproject
 from rtshcua.model.quantity import Dimension, display
 
 _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
@@ -122,7 +123,10 @@ def zone(policy: Policy, one: Zone) -> str:
         x, y, squared = one.data
         shape = f"circle of {length(round(squared**0.5))} around {place(policy, x, y)}"
     else:
-        shape = f"polygon of {len(one.data) // 2} corners, the first at {place(policy, one.data[0], one.data[1])}"
+        first = next(outline(one))[0]
+        count = sum(len(ring) for ring in outline(one))
+        several = f" in {one.data[0]} rings" if one.shape == AREA else ""
+        shape = f"polygon of {count} corners{several}, the first at {place(policy, *first)}"
     floor = "no floor" if one.floor == LOWEST else f"floor {length(one.floor)}"
     ceiling = "no ceiling" if one.ceiling == HIGHEST else f"ceiling {length(one.ceiling)} above home"
     return f"{shape}; {floor}, {ceiling}"
@@ -131,3 +135,16 @@ def zone(policy: Policy, one: Zone) -> str:
 def source(kind: int) -> str:
     """A source of decisions."""
     return SourceKind(kind).name.lower()
+
+
+def monitor(monitor: Monitor) -> str:
+    """What a temporal monitor looks at, and how far back."""
+    match monitor.kind:
+        case MonitorKind.FOR_LAST:
+            return f"`{monitor.when.text}` for the last {duration(monitor.window_us)}"
+        case MonitorKind.WITHIN_LAST:
+            return f"`{monitor.when.text}` within the last {duration(monitor.window_us)}"
+        case MonitorKind.RISING:
+            return f"rising `{monitor.when.text}`"
+        case _:
+            return f"falling `{monitor.when.text}`"

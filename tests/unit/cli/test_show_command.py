@@ -8,16 +8,19 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from reference import flat_case as flat
 from reference.forgery import edit, flight, other_flight
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli import app
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.policy import show_policy
 from rtshcua.cli.shown import plain, shorten, utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.zone import CIRCLE, Zone
 from rtshcua.wire.bundle import envelopes
 from rtshcua.wire.keys import Duty
@@ -206,6 +209,24 @@ def test_envelopes_of_other_kinds_are_not_shown_as_roots(bundle: Path, tmp_path:
 def test_words_of_what_is_out_of_range() -> None:
     choice = Parameter("pattern", CHOICE, "", 0, 0, 1, ("grid", "orbit"))
     assert words.arguments(case.policy(), (choice,), (7,)) == "pattern = 7, out of range"
+
+
+@pytest.mark.parametrize(
+    ("kind", "window_us", "text"),
+    [
+        (MonitorKind.FOR_LAST, 3_000_000, "`battery < 25 %` for the last 3 s"),
+        (MonitorKind.WITHIN_LAST, 600_000_000, "`battery < 25 %` within the last 10 min"),
+        (MonitorKind.RISING, 0, "rising `battery < 25 %`"),
+        (MonitorKind.FALLING, 0, "falling `battery < 25 %`"),
+    ],
+)
+def test_a_temporal_monitor(kind: int, window_us: int, text: str) -> None:
+    page = Page(bold=False)
+    show_policy(page, replace(flat.POLICY, monitors=(Monitor(kind, window_us, flat.LOW_BATTERY),)))
+    assert text in str(page)
+    bare = Page(bold=False)
+    show_policy(bare, flat.POLICY)
+    assert "Temporal monitors" not in str(bare)
 
 
 def test_words_of_places_and_zones() -> None:

@@ -1,0 +1,51 @@
+"""`--since`: the policies of an earlier bundle, source or folder."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.cli.programs import SOURCE, SPECIFICATION, Unusable, programs, unfolded
+from rtshcua.cli.showing.bundle import claimed
+from rtshcua.cli.sources import examine
+from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.bundle import MAX_BUNDLE
+from rtshcua.wire.untrusted import Untrusted
+
+
+class Earlier(NamedTuple):
+    """Policies, and where they are from."""
+
+    name: str
+    policies: tuple[Policy, ...]
+
+
+def earlier_policies(path: Path) -> Earlier | Unusable:
+    """The policies of a bundle, whoever signed it, or of sources, which must be free of errors."""
+    if not path.is_dir() and path.suffix.lower() not in (SOURCE, SPECIFICATION):
+        return _bundled(path)
+    files = unfolded([path])
+    if isinstance(files, Unusable):
+        return files
+    policies: list[Policy] = []
+    for each in programs(files):
+        checked = examine(each.reading)
+        if has_errors(checked.diagnostics):
+            message = f"`{each.name}` has errors, so nothing can be held against it"
+            return Unusable(ExitCode.INPUT, "since", message, f"`rtshcua check {path}` shows them")
+        policies += [lowered.policy for lowered in checked.policies]
+    return Earlier(str(path), tuple(policies))
+
+
+def _bundled(path: Path) -> Earlier | Unusable:
+    try:
+        with path.open("rb") as opened:
+            data = opened.read(MAX_BUNDLE + 1)
+    except OSError as error:
+        why = (error.strerror or "it is unreadable").lower()
+        return Unusable(ExitCode.INPUT, "since", f"cannot read `{path}`: {why}")
+    try:
+        return Earlier(str(path), (claimed(data).policy,))
+    except Untrusted as error:
+        code = ExitCode.INPUT if error.slug == "malformed" else ExitCode.UNTRUSTED
+        return Unusable(code, error.slug, f"`{path}`: {error}", "accepted: a bundle, a source or a folder of sources")

@@ -1,0 +1,68 @@
+"""`rtshcua explain`: the page of a diagnostic code."""
+
+import json
+import sys
+from typing import Annotated
+
+import typer
+
+from rtshcua.cli.faults import fail
+from rtshcua.cli.pages import read_page
+from rtshcua.diagnostics.codes import REGISTRY, Code
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.suggest import nearest
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def explain(
+    code: Annotated[str | None, typer.Argument(help="a code, E0310, or its name, dimension-mismatch")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Print what a diagnostic code means, why it matters, a bad and a good example; without a code, list all."""
+    if code is None:
+        _list(as_json)
+        return ExitCode.OK
+    found = _find(code)
+    if found is None:
+        near = nearest(code, [*REGISTRY, *(each.slug for each in REGISTRY.values())])
+        help = f"did you mean `{near}`?" if near is not None else "`rtshcua explain` lists all codes"
+        return fail(ExitCode.USAGE, f"there is no code `{code}`", help)
+    page = read_page(found)
+    if as_json:
+        print(json.dumps(_row(found) | page._asdict(), indent=2, ensure_ascii=False))
+    elif sys.stdout.isatty():
+        _draw(page.text)
+    else:
+        print(page.text, end="")
+    return ExitCode.OK
+
+
+def _find(word: str) -> Code | None:
+    """A code by its id or its name, however it is written: `E0310`, `e310`, `310`, `dimension-mismatch`."""
+    digits = word.upper().removeprefix("E")
+    if digits.isascii() and digits.isdigit():
+        return REGISTRY.get(f"E{digits.zfill(4)}")
+    slug = word.lower().replace("_", "-")
+    return next((code for code in REGISTRY.values() if code.slug == slug), None)
+
+
+def _row(code: Code) -> dict[str, str]:
+    return {"code": code.id, "slug": code.slug, "severity": code.severity.value, "meaning": code.meaning}
+
+
+def _list(as_json: bool) -> None:
+    codes = sorted(REGISTRY.values(), key=lambda code: code.id)
+    if as_json:
+        print(json.dumps([_row(code) for code in codes], indent=2, ensure_ascii=False))
+        return
+    for code in codes:
+        print(f"{code.id}  {code.severity.value:7}  {code.slug:24}  {code.meaning}")
+
+
+def _draw(text: str) -> None:
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    Console(width=min(Console().width, 100)).print(Markdown(text))

@@ -1,0 +1,275 @@
+"""`rtshcua check`: which files it looks at together, what it says of them, and how it ends."""
+
+import io
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.cli.app import main
+from rtshcua.cli.findings import Findings
+from rtshcua.cli.progress import watched
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.exits import ExitCode
+
+AT = ["--at", "2026-01-31T08:00:00Z"]
+
+POLICY = """import "lib:policies/site.rts"
+import "lib:skills/takeoff.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+
+policy meadow_flight version 2 {
+  permit takeoff by role operator through agent when altitude <= 15 m
+  permit hover, return_home, emergency_land by any
+  airspace inside meadow
+  contingency return_home, emergency_land
+}
+"""
+MISSION = """import "policy.rts"
+
+mission look under meadow_flight@2 on quad {
+  proposed by agent openclaw for role operator
+  phase departure  { takeoff(altitude = 10 m) }
+  phase inspection { hover(5 s) }
+  phase recovery   { return_home() }
+}
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a policy, and two missions of one name under it."""
+    monkeypatch.chdir(tmp_path)
+    put({"policy.rts": POLICY, "a/one.rts": above(MISSION), "b/two.rts": above(MISSION)})
+    return tmp_path
+
+
+def above(text: str) -> str:
+    return text.replace('"policy.rts"', '"../policy.rts"')
+
+
+def put(files: dict[str, str]) -> None:
+    for name, text in files.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text, encoding="utf-8")
+
+
+def answer(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, dict[str, Any]]:
+    code = main(["check", *words, "--json"])
+    said = capsys.readouterr()
+    assert said.err == ""
+    return code, json.loads(said.out)
+
+
+def found(answered: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(each["code"], each["at"]["file"]) for each in answered["diagnostics"]]
+
+
+def test_missions_of_one_name_in_unrelated_files_do_not_clash(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "."]) == ExitCode.OK
+    said = capsys.readouterr()
+    assert said.err == ""
+    lines = said.out.splitlines()
+    assert lines[0] == "no errors in 9 files"
+    assert [line.split(":")[0] for line in lines[1:]] == ["look (a/one.rts)", "look (b/two.rts)"]
+
+
+def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put(
+        {
+            "a/.hidden/x.rts": "?",
+            "a/.x.rts": "?",
+            "a/notes.txt": "?",
+            "a/deep/er.rts": MISSION.replace("policy.rts", "../../policy.rts"),
+        }
+    )
+    code, answered = answer(capsys, "b", "a", "b/two.rts", "a/one.rts")
+    assert code == ExitCode.OK
+    assert [each["file"] for each in answered["missions"]] == ["b/two.rts", "a/deep/er.rts", "a/one.rts"]
+    assert {each["mission"] for each in answered["missions"]} == {"look"}
+    assert set(answered) == {"format", "version", "diagnostics", "exit", "missions", "versions"}
+
+
+def test_the_answer_does_not_depend_on_how_often_it_is_asked(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({"policy.rts": POLICY.replace("<= 15 m", "<= 5 m")})
+    assert answer(capsys, ".") == answer(capsys, ".")
+
+
+def test_a_finding_in_a_shared_file_is_told_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({"policy.rts": POLICY.replace("meadow\n", "meddow\n")})
+    code, answered = answer(capsys, "a", "b")
+    assert code == ExitCode.DIAGNOSTICS
+    assert found(answered) == [("E0201", "policy.rts")]
+
+
+def test_each_file_sees_only_what_it_imports(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({"alone.rts": MISSION.replace('import "policy.rts"\n', "")})
+    code, answered = answer(capsys, "alone.rts", "policy.rts")
+    assert (code, found(answered)[0]) == (ExitCode.DIAGNOSTICS, ("E0201", "alone.rts"))
+    code, answered = answer(capsys, "alone.rts", "--with", "policy.rts")
+    assert (code, found(answered)) == (ExitCode.OK, [])
+
+
+def test_files_that_import_each_other_are_checked_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put(
+        {
+            "x.rts": 'import "y.rts"\nzone a = circle(47 N, 8 E, 9 m)\nzone c = union(b)',
+            "y.rts": 'import "x.rts"\nzone b = union(a)',
+        }
+    )
+    code, answered = answer(capsys, "y.rts", "x.rts")
+    assert (code, [each for each, _ in found(answered)]) == (ExitCode.OK, ["E0111"])
+
+
+def test_one_that_cannot_be_read_does_not_hide_the_others(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({"b/two.rts": "zone ?"})
+    code = main(["check", "a", "nowhere.rts", "b"])
+    assert code == ExitCode.INPUT
+    said = capsys.readouterr().err
+    assert "cannot read `nowhere.rts`" in said
+    assert "b/two.rts:1:6" in said
+    assert main(["check", "a", "b"]) == ExitCode.DIAGNOSTICS
+
+
+def test_habits_are_looked_for_in_what_was_asked_for(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({"policy.rts": POLICY.replace("\npolicy", 'import "lib:skills/goto.rts"\npolicy')})
+    code, answered = answer(capsys, "a")
+    assert (code, found(answered)) == (ExitCode.OK, [])
+    code, answered = answer(capsys, "a", "policy.rts")
+    assert (code, found(answered)) == (ExitCode.OK, [("E1305", "policy.rts")])
+    code, answered = answer(capsys, ".")
+    assert (code, found(answered)) == (ExitCode.OK, [("E1305", "policy.rts")])
+    assert main(["check", ".", "--deny-warnings"]) == ExitCode.DIAGNOSTICS
+    assert "warning[E1305]" in capsys.readouterr().err
+
+
+def test_notes_are_no_warnings(capsys: pytest.CaptureFixture[str]) -> None:
+    for code, denied in ((codes.UNDECIDED, False), (codes.NAMING, True), (codes.SYNTAX, True)):
+        assert Findings(json=False, deny_warnings=True).report([Diagnostic(code, "something")], {}) == denied
+    assert not Findings(json=False).report([Diagnostic(codes.NAMING, "something")], {})
+
+
+def test_habits_are_not_looked_for_beside_errors(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({"a/one.rts": above(MISSION).replace("hover(5 s)", "hover(5 s) goto()")})
+    _, answered = answer(capsys, "a")
+    assert {code for code, _ in found(answered)} == {"E0201"}
+
+
+def test_compile_is_not_about_habits(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["keys", "init"]) == ExitCode.OK
+    put({"a/one.rts": above(MISSION).replace("mission look", "mission Look")})
+    assert main(["compile", "a/one.rts", "-o", "x", *AT, "--deny-warnings"]) == ExitCode.OK
+    capsys.readouterr()
+    _, answered = answer(capsys, "a/one.rts")
+    assert found(answered) == [("E1302", "a/one.rts")]
+
+
+def test_a_specification_takes_all_other_sources_as_its_policys(
+    checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proposal = json.loads((checkout / "missions" / "proposal.json").read_text(encoding="utf-8"))
+    text = (checkout / "policies" / "bridge_inspection.rts").read_text(encoding="utf-8")
+    put({"proposal.json": json.dumps(proposal | {"imports": []}), "own/bridges.rts": text})
+    code, answered = answer(capsys, "proposal.json", "own")
+    assert (code, [each["file"] for each in answered["missions"]]) == (ExitCode.OK, ["proposal.json"])
+    assert answer(capsys, "proposal.json", "--with", "own/bridges.rts")[0] == ExitCode.OK
+    code, answered = answer(capsys, "own", "proposal.json")
+    assert (code, answered["error"]["slug"]) == (ExitCode.USAGE, "usage")
+
+
+def test_a_folder_without_a_source(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("empty").mkdir()
+    code, answered = answer(capsys, "empty")
+    assert (code, answered["error"]["slug"]) == (ExitCode.INPUT, "no-source")
+
+
+@pytest.mark.parametrize(
+    "words", [["check", "--json"], ["check", "x.rts", "--bogus", "--json"], ["compile", "--json"],
+              ["compile", "x.rts", "--at", "noon", "--json"]]
+)  # fmt: skip
+def test_a_wrong_command_line_is_answered_in_json_too(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words) == ExitCode.USAGE
+    said = capsys.readouterr()
+    assert said.err == ""
+    answered = json.loads(said.out)
+    assert (answered["exit"], answered["error"]["slug"], answered["diagnostics"]) == ("usage", "usage", [])
+
+
+# ---------------------------------------------------------------------------------------------------- --since
+
+
+@pytest.fixture
+def old(here: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    """The same folder with a bundle of one mission, and a copy of all sources as they were."""
+    assert main(["keys", "init"]) == ExitCode.OK
+    assert main(["compile", "a/one.rts", "-o", "old.bundle", *AT]) == ExitCode.OK
+    for name in ("a", "b"):
+        shutil.copytree(name, f".old/{name}")
+    shutil.copy("policy.rts", ".old/policy.rts")
+    capsys.readouterr()
+    return here
+
+
+@pytest.mark.parametrize("earlier", ["old.bundle", ".old/policy.rts", ".old"])
+def test_a_policy_that_changes_needs_a_new_version(old: Path, earlier: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, answered = answer(capsys, "a", "b", "--since", earlier)
+    assert (code, answered["diagnostics"]) == (ExitCode.OK, [])
+    assert answered["versions"] == [{"policy": "meadow_flight", "version": 2, "earlier": 2}]
+    put({"policy.rts": "// said again\n" + POLICY})
+    assert answer(capsys, "a", "b", "--since", earlier)[0] == ExitCode.OK
+    changed = POLICY.replace("15 m", "16 m")
+    put({"policy.rts": changed})
+    code, answered = answer(capsys, "a", "b", "--since", earlier)
+    assert (code, found(answered)) == (ExitCode.DIAGNOSTICS, [("E0716", "policy.rts")])
+    assert answered["versions"] == [{"policy": "meadow_flight", "version": 2, "earlier": 2}]
+    (finding,) = answered["diagnostics"]
+    assert changed[finding["at"]["start"] : finding["at"]["end"]] == "2"
+    assert finding["fixes"][0]["replacement"] == "3"
+    assert "`permit takeoff by role operator" in finding["help"]
+    put({"policy.rts": changed.replace("version 2", "version 3")})
+    assert answer(capsys, "policy.rts", "--since", earlier)[1]["versions"] == [
+        {"policy": "meadow_flight", "version": 3, "earlier": 2}
+    ]
+
+
+def test_a_person_is_told_what_was_compared(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "a", "--since", "old.bundle"]) == ExitCode.OK
+    assert capsys.readouterr().out.splitlines()[-1] == "meadow_flight: version 2, and 2 in old.bundle"
+    put({"policy.rts": POLICY.replace("meadow_flight", "other_flight")})
+    assert main(["check", "policy.rts", "--since", "old.bundle"]) == ExitCode.OK
+    assert "nothing in old.bundle is an earlier version" in capsys.readouterr().out
+
+
+def test_what_cannot_be_compared_with(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("empty").mkdir()
+    Path("bad.bundle").write_bytes(b"\xd9\xd9\xf7nothing")
+    put({"bad.rts": "zone ?"})
+    for earlier in ("nowhere.bundle", "nowhere.rts", "empty", "bad.rts"):
+        code, answered = answer(capsys, "a", "--since", earlier)
+        assert (code, answered["exit"]) == (ExitCode.INPUT, "input"), earlier
+    code, answered = answer(capsys, "a", "--since", "bad.bundle")
+    assert code in (ExitCode.INPUT, ExitCode.UNTRUSTED)
+    assert "bad.bundle" in answered["error"]["message"]
+
+
+# ---------------------------------------------------------------------------------------------------- progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_for_a_person_who_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    items = [(f"file {number}",) for number in range(5)]
+    for stream, count, shown in ((Terminal(), 5, True), (Terminal(), 3, False), (io.StringIO(), 5, False)):
+        monkeypatch.setattr(sys, "stderr", stream)
+        assert list(watched(items[:count])) == items[:count]
+        assert ("3/5 file 2" in stream.getvalue()) == shown
+        assert stream.getvalue().endswith("\r\033[K") == shown

@@ -1,0 +1,107 @@
+"""`rtshcua why`: by hand and from a log, for a person and for a program, and wrong input."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rtshcua.cli import app
+from rtshcua.diagnostics.exits import ExitCode
+
+CHECKOUT = Path(__file__).resolve().parents[3]
+STANDARD = str(CHECKOUT / "missions" / "standard.rts")
+AT = ("--at", "2026-05-01T10:00:00Z")
+
+
+def why(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    code = app.main(["why", *words])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def shown(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
+    code, out, err = why(capsys, *words, "--json")
+    assert (code, err) == (ExitCode.OK, "")
+    found: dict[str, object] = json.loads(out)
+    return found
+
+
+def test_every_step_of_the_shipped_mission_is_admitted_as_its_contract_wants_the_state(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for step in range(6):
+        found = shown(capsys, STANDARD, "--step", str(step), *AT)
+        assert (found["outcome"], found["reason"]) == ("allow", "admitted"), step
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason", "clause", "would_pass"),
+    [
+        (["battery=32 %"], "state/violated", "battery > 35 %", ["35.01 %"]),
+        (["battery=20%"], "state/violated", "battery > 35 %", ["35.01 %"]),
+        (["gps.fix=unknown"], "state/unknown", "gps.fix >= fix_3d", []),
+        (["wind.speed=36 km/h"], "state/violated", "wind.speed < 10 m/s", ["9999 mm/s"]),
+        (["position=47.39729 N, 8.54771 E"], "safety/airspace", "airspace inside city outside school", []),
+    ],
+)
+def test_a_state_by_hand(
+    settings: list[str], reason: str, clause: str, would_pass: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = [word for setting in settings for word in ("--state", setting)]
+    found = shown(capsys, STANDARD, "--step", "2", *AT, *options)
+    assert (found["reason"], found["clause"]) == (reason, clause)
+    assert [each["words"] for each in found["would_pass"]] == would_pass
+
+
+def test_a_person_sees_each_step_what_decided_and_what_would_pass(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = why(capsys, STANDARD, "--step", "2", *AT, "--state", "battery=32 %")
+    assert code == ExitCode.OK
+    assert "fallback, state/violated" in out
+    assert "> require   false: `battery > 35 %`   with battery = 32 %" in out
+    assert "would pass    battery = 35.01 %" in out
+    assert "7  safety         not reached" in out
+    assert "may fly       hover for 10 s" in out
+
+
+def test_late(capsys: pytest.CaptureFixture[str]) -> None:
+    found = shown(capsys, STANDARD, "--step", "2", *AT, "--waited", "4990")
+    assert (found["outcome"], found["reason"]) == ("fallback", "timing/no-slack")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([STANDARD], "say which step"),
+        ([STANDARD, "--step", "6"], "there is no step 6"),
+        ([STANDARD, "--step", "0", "--state", "batery=3 %"], "did you mean `battery`?"),
+        ([STANDARD, "--step", "0", "--state", "battery"], "sets nothing"),
+        ([STANDARD, "--step", "0", "--state", "battery=3 m"], "write a ratio with one of the units `%`"),
+        ([STANDARD, "--step", "0", "--state", "battery=much"], "is no value of `battery`"),
+        ([STANDARD, "--step", "0", "--state", "gps.fix=fix_4d"], "did you mean `fix_"),
+        ([STANDARD, "--step", "0", "--state", "position=here"], "is no value of `position`"),
+        ([STANDARD, "--step", "0", "--state", "position=0.5 N, 8.5 E"], "too far from the vehicle's home"),
+        ([STANDARD, "--step", "0", "--at", "noon"], "is not a UTC time"),
+        ([STANDARD, "--record", "3"], "is no log"),
+    ],
+)
+def test_wrong_words(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = why(capsys, *words)
+    assert (code, out) == (ExitCode.USAGE, "")
+    assert message in err
+
+
+def test_what_is_no_bundle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "x.bundle"
+    path.write_bytes(b"nothing of ours")
+    code, _, err = why(capsys, str(path), "--step", "0")
+    assert code in (ExitCode.INPUT, ExitCode.UNTRUSTED)
+    assert "accepted: a source" in err
+    assert why(capsys, str(tmp_path / "missing.bundle"), "--step", "0")[0] == ExitCode.INPUT
+
+
+def test_a_source_with_an_error_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "x.rts"
+    path.write_text("mission m under p@1 on q { }", encoding="utf-8")
+    code, _, err = why(capsys, str(path), "--step", "0")
+    assert code == ExitCode.DIAGNOSTICS
+    assert "E0201" in err

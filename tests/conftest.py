@@ -1,5 +1,6 @@
 """What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,13 @@ settings.load_profile("test")
 def checkout() -> Path:
     """The top of the checkout."""
     return CHECKOUT
+
+
+@pytest.fixture(scope="session", autouse=True)
+def byte_code(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Where no byte code may be kept, processes that tests start share what they compile, away from the checkout."""
+    if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+        os.environ["PYTHONPYCACHEPREFIX"] = str(tmp_path_factory.getbasetemp() / "byte_code")
 
 
 @pytest.fixture(autouse=True)

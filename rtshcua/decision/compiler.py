@@ -7,7 +7,7 @@ from rtshcua.decision.places import WellKnown
 from rtshcua.decision.scope import scope_of
 from rtshcua.decision.tree import Node, parse
 from rtshcua.decision.values import point
-from rtshcua.decision.volume import Planner
+from rtshcua.decision.volume import Planner, flown_at
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
@@ -73,7 +73,7 @@ class Compiler:
         if motion.kind == MotionKind.FLY:
             cell = first_cell(contract, PLACE)
             path = link.arguments[cell : cell + 2]
-        altitude = None if motion.altitude == -1 else link.arguments[motion.altitude]
+        altitude = flown_at(motion, 0 if motion.altitude == -1 else link.arguments[motion.altitude], policy.vehicle)
         planner = Planner(motion.kind, path, altitude, policy.vehicle.position_error)
         return PreparedLink(link, tuple(map(point, link.arguments)), require, motion.kind, planner)
 

@@ -17,7 +17,7 @@ from rtshcua.decision.prepared import Limit, PreparedAirspace, PreparedInvocatio
 from rtshcua.decision.reads import monitored, slots_read, where
 from rtshcua.decision.rules import RuleIndex
 from rtshcua.decision.values import point
-from rtshcua.decision.volume import Planner
+from rtshcua.decision.volume import Planner, flown_at
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import MAX_DURATION, MAX_GAP, MAX_VALUE
@@ -95,7 +95,7 @@ def prepare_invocation(
         planner=Planner(
             plan.kind,
             plan.path,
-            None if contract.motion.altitude == -1 else plan.altitude,
+            flown_at(contract.motion, plan.altitude, policy.policy.vehicle),
             policy.policy.vehicle.position_error,
         ),
         energy=Energy(contract, policy.policy.vehicle),

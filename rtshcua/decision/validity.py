@@ -16,8 +16,10 @@ def valid_until(case: Case, state: State) -> int:
     end = invocation.invocation.issued_at_us + contract.validity_us
     released, valid = case.release[0], end - utc - error
     left = (released - now if released < now else 0) + contract.deadline_us  # `min` is slow
-    left = valid if valid < left else left
-    left = invocation.rests_us if invocation.rests_us < left else left
+    if valid < left:
+        left = valid
+    if invocation.rests_us < left:
+        left = invocation.rests_us
     values, ages = state.values, state.ages
     for slot, stale in invocation.reads:
         if 0 <= stale - ages[slot] < left and values[slot] is not None:

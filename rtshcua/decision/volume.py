@@ -1,8 +1,8 @@
 """The planned volume: every place where a skill may take the vehicle from where it is now.
 
 It is the leg from the present position to the first point of the plan's path, and the path, at all heights between the
-present one and the plan's altitude; HOME ends with the descent at home, LAND is the descent here. All of it is widened
-by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no floor
+present one and the plan's altitude; HOME climbs to the height that the vehicle returns at before it flies, and ends with
+the descent at home; LAND is the descent here. All of it is widened by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no floor
 (`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
 """
 
@@ -14,7 +14,8 @@ from rtshcua.decision.bands import Box
 from rtshcua.decision.places import NOWHERE, Part, Place, Sweep, WellKnown
 from rtshcua.decision.truth import UNKNOWN
 from rtshcua.decision.values import ABSENT, MISSING, Span, Value
-from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.contract import Motion, MotionKind
+from rtshcua.model.flat.policy import Vehicle
 
 HOME = (0, 0)  # the origin of local coordinates
 
@@ -36,7 +37,7 @@ class Planner:
     __slots__ = ("_altitude", "_distance", "_error", "_kind", "_last", "_leg", "_path", "_sweep")
 
     def __init__(self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int) -> None:
-        """`altitude` is None where the height at the start counts."""
+        """`altitude` is None where the height at the start counts; for HOME it is what the return climbs to."""
         self._kind, self._altitude = kind, altitude
         self._path = HOME if kind == MotionKind.HOME else path
         self._error: Box = (-position_error, -position_error, position_error, position_error)
@@ -64,6 +65,8 @@ class Planner:
         parts: list[Part] = []
         if self._kind == MotionKind.LAND:
             low = min(low, 0)
+        elif self._kind == MotionKind.HOME:
+            high = max(high, self._altitude) if self._altitude else high
         elif self._altitude is not None:
             low, high = min(low, self._altitude), max(high, self._altitude)
         parts.append((leg, low, high))
@@ -87,6 +90,13 @@ class Planner:
         span = (nearest, farthest)
         self._leg = (key, leg, span)
         return leg, span
+
+
+def flown_at(motion: Motion, altitude: int, vehicle: Vehicle) -> int | None:
+    """The `altitude` of a planner: what the step says, what a return climbs to, or None."""
+    if motion.kind == MotionKind.HOME:
+        return vehicle.return_altitude
+    return None if motion.altitude == -1 else altitude
 
 
 def _clamp(value: int, low: int, high: int) -> int:

@@ -101,7 +101,9 @@ BAD_COORDINATES = _code("E0502", "bad-coordinates", "coordinates are not on the 
 FLOOR_ABOVE_CEILING = _code("E0503", "floor-above-ceiling", "a zone's floor is not below its ceiling")
 ENTRY_OUTSIDE = _code("E0504", "entry-outside", "a zone's entry does not lie inside of it")
 ZONE_VANISHES = _code("E0505", "zone-vanishes", "a zone is so narrow that nothing is left of it when it shrinks")
-ZONE_SHAPE = _code("E0506", "zone-shape", "the outline of a zone cannot be had in whole millimetres, or not within reach")
+ZONE_SHAPE = _code(
+    "E0506", "zone-shape", "the outline of a zone cannot be had in whole millimetres, or not within reach"
+)
 TOO_FAR = _code("E0507", "too-far", "a place is further from the vehicle's home than the local plane reaches")
 PATH_OUTSIDE = _code("E0508", "path-outside", "the planned path leaves the policy's airspace")
 AREA_TOO_SMALL = _code("E0509", "area-too-small", "an area is too small to be covered by a survey path")
@@ -114,6 +116,7 @@ LOITER_OUTSIDE = _code(
     "E0515", "loiter-outside", "where a link of a step's chain flies or waits is outside of the airspace"
 )
 BAD_CORRIDOR = _code("E0516", "bad-corridor", "the places and the width do not make a corridor")
+NO_CLOCK = _code("E0517", "no-clock", "a local time is read, and the vehicle does not say how far that is from UTC")
 
 # E06: skills, arguments, fallback chains
 UNKNOWN_ARGUMENT = _code("E0601", "unknown-argument", "an argument has the name of no parameter")
@@ -122,7 +125,7 @@ MISSING_ARGUMENT = _code("E0603", "missing-argument", "a parameter without a def
 TOO_MANY_ARGUMENTS = _code("E0604", "too-many-arguments", "an argument without a name has no parameter to go to")
 ARGUMENT_RANGE = _code("E0605", "argument-range", "an argument or a default is outside of its parameter's range")
 INCOMPLETE_CONTRACT = _code("E0606", "incomplete-contract", "a skill's contract lacks a field that it must have")
-BAD_PARAMETER = _code("E0607", "bad-parameter", "a parameter's type, range and default do not belong together")
+BAD_PARAMETER = _code("E0607", "bad-parameter", "a parameter's type does not exist, or its range does not belong to it")
 BAD_MOTION = _code("E0608", "bad-motion", "a motion names something that is no parameter of the type it needs")
 UNKNOWN_CLASS = _code("E0609", "unknown-class", "there is no such timing class")
 UNKNOWN_RECORD = _code("E0610", "unknown-record", "there is no such kind of evidence")

@@ -10,27 +10,50 @@ TAB_WIDTH = 4
 MAX_WIDTH = 110
 #: how much is shown before the underlined part of a line that is cut
 BEFORE = 30
+#: of a long line no more characters than these on either side of what is underlined are looked at
+NEAR = 300
 CUT = "..."
 
+#: a span to underline, with which character, and the words after it
+Mark = tuple[Span, str, str]
 
-def excerpt(source: Source, number: int, marks: Sequence[tuple[Span, str, str]]) -> tuple[str, list[str]]:
+
+def together(source: Source, number: int, marks: Sequence[Mark]) -> list[list[Mark]]:
+    """The marks of a line in groups, such that of each mark of a group at least the beginning is in view at once."""
+    text = source.line(number)
+    starts = _starts([_cell(character) for character in text])
+    groups: list[tuple[tuple[int, int], list[Mark]]] = []
+    for mark in marks:
+        column = min(source.position(mark[0].start).column - 1, len(text))
+        for (first, last), group in groups:
+            if first <= column <= last and (column < last or last == len(text)):
+                group.append(mark)
+                break
+        else:
+            groups.append((_window(starts, (column, column)), [mark]))
+    return [group for _, group in groups]
+
+
+def excerpt(source: Source, number: int, marks: Sequence[Mark]) -> tuple[str, list[str]]:
     """The text of a line, and an underline for each mark: a span that begins on the line, a character, and words.
 
     A span that goes on over further lines is underlined up to the end of this one; an empty one has one character.
     """
     text = source.line(number)
+    column = source.position(marks[0][0].start).column - 1
+    begun, ended = max(column - NEAR, 0), column + NEAR
+    offset = marks[0][0].start - column + begun
+    cut = (begun > 0, ended < len(text))
+    text = text[begun:ended]
     cells = [_cell(character) for character in text]
-    starts = [0]
-    for _, width in cells:
-        starts.append(starts[-1] + (width if width >= 0 else TAB_WIDTH - starts[-1] % TAB_WIDTH))
-    offset = marks[0][0].start - (source.position(marks[0][0].start).column - 1)
+    starts = _starts(cells)
     columns = [(min(max(span.start - offset, 0), len(text)), min(span.end - offset, len(text))) for span, _, _ in marks]
     first, last = _window(starts, columns[0])
     rendered = "".join(
         shown if width >= 0 else " " * (starts[at + 1] - starts[at])
         for at, (shown, width) in enumerate(cells[first:last], start=first)
     )
-    before, after = CUT if first > 0 else "", CUT if last < len(text) else ""
+    before, after = CUT if first > 0 or cut[0] else "", CUT if last < len(text) or cut[1] else ""
     underlines = []
     for (begin, end), (_, character, words) in zip(columns, marks, strict=True):
         begin, end = min(max(begin, first), last), min(max(end, first), last)
@@ -38,6 +61,14 @@ def excerpt(source: Source, number: int, marks: Sequence[tuple[Span, str, str]])
         underline = character * max(starts[max(end, begin)] - starts[begin], 1)
         underlines.append(f"{indent}{underline} {visible(words)}".rstrip())
     return before + rendered + after, underlines
+
+
+def _starts(cells: Sequence[tuple[str, int]]) -> list[int]:
+    """The column at which each character begins, and the one after the last."""
+    starts = [0]
+    for _, width in cells:
+        starts.append(starts[-1] + (width if width >= 0 else TAB_WIDTH - starts[-1] % TAB_WIDTH))
+    return starts
 
 
 def _window(starts: Sequence[int], column: tuple[int, int]) -> tuple[int, int]:

@@ -7,8 +7,8 @@ and those that change the direction of writing are shown by their number and nev
 from collections.abc import Iterable, Mapping
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.diagnostics.excerpt import excerpt, visible
-from rtshcua.diagnostics.span import Source, Span
+from rtshcua.diagnostics.excerpt import Mark, excerpt, together, visible
+from rtshcua.diagnostics.span import Source
 
 PRIMARY, SECONDARY = "^", "-"
 
@@ -36,18 +36,15 @@ def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
         elif shown is not None:
             lines.append(f"{margin} :")
         shown = file
-        text, underlines = excerpt(source, line, marks)
-        lines.append(f"{line:>{gutter}} | {text}".rstrip())
-        lines += [f"{margin} | {underline}" for underline in underlines]
+        for group in together(source, line, marks):
+            text, underlines = excerpt(source, line, group)
+            lines.append(f"{line:>{gutter}} | {text}".rstrip())
+            lines += [f"{margin} | {underline}" for underline in underlines]
     if diagnostic.span is not None and not places:
         lines.append(f" --> {visible(diagnostic.span.file)}")
     lines += [f"{margin} = at: {visible(diagnostic.pointer)}"] if diagnostic.pointer else []
     lines += [f"{margin} = help: {visible(diagnostic.help)}"] if diagnostic.help is not None else []
     return "\n".join(lines) + "\n"
-
-
-#: a span to underline, with which character, and the words after it
-Mark = tuple[Span, str, str]
 
 
 def _places(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> list[tuple[str, int, list[Mark]]]:

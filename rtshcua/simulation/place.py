@@ -1,10 +1,11 @@
 """Where things are: local metres around home, and latitude and longitude in 1e-7 degree (WGS 84)."""
 
 from dataclasses import dataclass
-from math import cos, pi, radians
+from math import copysign, cos, pi, radians
 
 _METRES_PER_E7 = 6_378_137 * pi / 180e7
 """Metres of one 1e-7 degree of latitude, on a sphere of the equatorial radius: 0.5 % off at most."""
+_HALF_TURN_E7 = 1_800_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +28,17 @@ class Home:
     def local(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Metres north and east of home; the plane is tangent at home, good for some kilometres."""
         north = (latitude - self.latitude) * _METRES_PER_E7
-        return north, (longitude - self.longitude) * _METRES_PER_E7 * self._shrink()
+        east = longitude - self.longitude
+        if abs(east) > _HALF_TURN_E7:  # longitude 180 lies between
+            east -= copysign(2 * _HALF_TURN_E7, east)
+        return north, east * _METRES_PER_E7 * self._shrink()
 
     def globe(self, north: float, east: float) -> tuple[int, int]:
         """Latitude and longitude in 1e-7 degree: the inverse of `local`."""
-        latitude = self.latitude + round(north / _METRES_PER_E7)
-        return latitude, self.longitude + round(east / _METRES_PER_E7 / self._shrink())
+        longitude = self.longitude + round(east / _METRES_PER_E7 / self._shrink())
+        if abs(longitude) > _HALF_TURN_E7:
+            longitude -= 2 * _HALF_TURN_E7 if longitude > 0 else -2 * _HALF_TURN_E7
+        return self.latitude + round(north / _METRES_PER_E7), longitude
 
     def _shrink(self) -> float:
         return cos(radians(self.latitude / 1e7))

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from math import cos, hypot, radians
 
 from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.model.flat.zone import meridian
 
 _MM_PER_UNIT = 11.1319  # one 1e-7 degree of latitude; only for "has it arrived", never decided, signed or logged
 ARRIVED = 2_000  # mm, horizontally
@@ -53,7 +54,7 @@ def arrived(latitude: int, longitude: int, altitude: int) -> Callable[[Observed]
 
     def near(seen: Observed) -> bool:
         north = (seen.latitude - latitude) * _MM_PER_UNIT
-        east = (seen.longitude - longitude) * _MM_PER_UNIT * shrink
+        east = (meridian(seen.longitude, longitude) - longitude) * _MM_PER_UNIT * shrink
         return hypot(north, east) <= ARRIVED and abs(seen.height - altitude) <= LEVEL
 
     return near

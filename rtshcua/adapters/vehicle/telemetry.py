@@ -9,7 +9,7 @@ from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION, Signal, SignalSource
-from rtshcua.model.flat.zone import MAX_COORDINATE, Projection, project
+from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, project
 
 #: Each message is asked for several times within the shortest time to stale of what it carries, within these, in us.
 MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
@@ -115,7 +115,8 @@ def _place(source: SignalSource, message: Any, projection: Projection) -> tuple[
     if latitude is None or longitude is None:
         return None, None
     x, y = project(projection, latitude, longitude)
-    if max(abs(x), abs(y)) > MAX_COORDINATE:  # farther than any zone can be declared: nonsense, not a place
+    # farther than any zone can be declared, or on no globe: nonsense, not a place
+    if max(abs(x), abs(y)) > MAX_COORDINATE or abs(longitude) > HALF_TURN:
         return None, None
     return x, y
 

@@ -17,6 +17,8 @@ def show_policy(page: Page, policy: Policy) -> None:
     home = words.geographic(projection.latitude, projection.longitude)
     page.row("home", f"{home}, within {words.length(vehicle.home_within)}")
     page.row("moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}")
+    if vehicle.return_altitude:
+        page.row("returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower")
     page.row("position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this")
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
     page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")

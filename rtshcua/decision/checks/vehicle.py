@@ -6,7 +6,7 @@ from rtshcua.decision.checks.indexes import at, within
 from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED, MAX_STALE, MAX_VALUE
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, SignalSource
-from rtshcua.model.flat.zone import MAX_COORDINATE
+from rtshcua.model.flat.zone import HIGHEST, MAX_COORDINATE
 
 MAX_POSITION_ERROR = 1 << 20  # mm, about 1 km
 
@@ -56,4 +56,5 @@ def _numbers(vehicle: Vehicle) -> Iterator[str]:
     yield from within("position error", vehicle.position_error, 0, MAX_POSITION_ERROR)
     yield from within("endurance", vehicle.endurance_us, 1, MAX_DURATION)
     yield from within("reserve", vehicle.reserve, 0, FULL)
+    yield from within("return altitude", vehicle.return_altitude, 0, HIGHEST)
     yield from within("offset from UTC", vehicle.utc_offset_us, -DAY, DAY)

@@ -10,6 +10,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import (
     AREA,
     CIRCLE,
+    HALF_TURN,
     HIGHEST,
     LOWEST,
     MAX_COORDINATE,
@@ -50,12 +51,18 @@ def _projection(projection: Projection) -> Iterator[str]:
 
 def place(projection: Projection, x: int, y: int) -> Iterator[str]:
     """What is wrong with a local place that may be flown to: it must have a latitude and a longitude."""
+    yield from at(f"place {x}, {y}", _near(projection, x))
     yield from at(f"place {x}, {y}", _on_earth(*unproject(projection, x, y)))
+
+
+def _near(projection: Projection, x: int) -> Iterator[str]:
+    if abs(x) << SHIFT >= HALF_TURN * projection.east:
+        yield "it is half around the earth"
 
 
 def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
     yield from within("latitude", latitude, -900_000_000, 900_000_000)  # 1e-7 degree
-    yield from within("longitude", longitude, -1_800_000_000, 1_800_000_000)
+    yield from within("longitude", longitude, -HALF_TURN, HALF_TURN)
 
 
 def _vertices(zone: Zone) -> int:

@@ -14,7 +14,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.json_tree import Tree, read_json
 from rtshcua.ground.agent.mission import mission_of
-from rtshcua.ground.agent.pointers import innermost, pointer
+from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
 from rtshcua.ground.agent.shape import shape_errors
 from rtshcua.ground.language.load import Listing, Program, Read, load
@@ -34,13 +34,14 @@ class Specification:
 
     def pointed(self, diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
         """The findings, those on this specification with a JSON Pointer to the value they are about."""
-        return tuple(self._pointed(diagnostic) for diagnostic in diagnostics)
+        places = None if self.tree is None else Places(self.tree)
+        return tuple(self._pointed(diagnostic, places) for diagnostic in diagnostics)
 
-    def _pointed(self, diagnostic: Diagnostic) -> Diagnostic:
+    def _pointed(self, diagnostic: Diagnostic, places: Places | None) -> Diagnostic:
         span = diagnostic.span
         if span is None or span.file != self.source.file or diagnostic.pointer is not None:
             return diagnostic
-        return replace(diagnostic, pointer="" if self.tree is None else pointer(innermost(self.tree, span)))
+        return replace(diagnostic, pointer="" if places is None else pointer(places.innermost(span)))
 
 
 def parse_specification(file: str, data: bytes) -> Specification:
@@ -95,6 +96,7 @@ def load_specification(
             stable={name: stable(path, library, path), **program.stable},
             data=program.data,
             data_names=program.data_names,
+            whole=program.whole,
         ),
         specification,
     )

@@ -10,7 +10,7 @@ from rtshcua.ground.analysis.plane import Plane
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract
 from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import ENUMERATION, POSITION
+from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.quantity import Dimension
 
@@ -74,12 +74,19 @@ def signals(policy: Policy) -> Sequence[Value]:
         if signal.kind == POSITION:
             values[signal.slot] = values[signal.slot + 1] = maybe(ANYWHERE)
         elif signal.kind == ENUMERATION:
-            values[signal.slot] = maybe(members(value for value, _ in signal.labels))
+            reported = _reported(signal)
+            values[signal.slot] = maybe(members(reported)) if reported else MISSING
         elif signal.dimension in _WHOLE:
             values[signal.slot] = maybe(interval(0, FULL))
         else:
-            values[signal.slot] = maybe(interval(-MAX_VALUE, MAX_VALUE))
+            least = 0 if all(len(source.fields) > 1 for source in signal.sources) else -MAX_VALUE
+            values[signal.slot] = maybe(interval(least, MAX_VALUE))  # what two components make is a magnitude
     return values
+
+
+def _reported(signal: Signal) -> list[int]:
+    """The members that an enumeration's signal may be: one that each of its sources lists as unknown is missing."""
+    return [value for value, _ in signal.labels if any(value not in source.unknown for source in signal.sources)]
 
 
 def _moments(policy: Policy) -> tuple[Span, ...]:

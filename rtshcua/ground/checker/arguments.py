@@ -68,7 +68,7 @@ def pair(
                 "an argument without a name stands after a named one"
                 if named
                 else f"`{skill.name.text}` takes {_count(len(names))}, and this is one more",
-                help="write its name before it" if named else None,
+                help=_decimal(context, written, position) or ("write its name before it" if named else None),
                 labels=declared,
             )
             continue
@@ -92,6 +92,17 @@ def pair(
             labels=[(p.span, f"`{p.name.text}` is declared here, without a default") for p in missing],
         )
     return None if len(report.found) > before else {name: argument.value for name, argument in pairs.items()}
+
+
+def _decimal(context: Context, written: Sequence[ArgumentValue], position: int) -> str | None:
+    """What to write for `20,5 m`, where a comma stands between two numbers without a space."""
+    if not position:
+        return None
+    whole, rest = context.report.text(written[position - 1].value.span), context.report.text(written[position].span)
+    touching = written[position - 1].span.end + 1 == written[position].span.start
+    if touching and whole.isdigit() and rest[:1].isdigit():
+        return f"decimals stand behind a point: write `{whole}.{rest}`"
+    return None
 
 
 def _count(number: int) -> str:

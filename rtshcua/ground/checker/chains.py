@@ -1,4 +1,9 @@
-"""E0611 to E0613, E0615: a chain of links ends, and its last link needs nothing."""
+"""E0611 to E0613, E0615, E0806: a chain of links ends, and its last link needs nothing.
+
+The chain that flies is that of the step, or the contingency, to its end: a link's skill has a fallback chain of its
+own, which never flies for it. So a skill that is a link of its own chain is what has just failed, but a circle of
+chains through other skills is none in flight.
+"""
 
 from collections.abc import Sequence
 
@@ -10,7 +15,7 @@ from rtshcua.ground.checker.fields import quantity
 from rtshcua.ground.checker.lookup import find_skill
 from rtshcua.model.flat.limits import MAX_LINKS
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
-from rtshcua.model.quantity import Dimension
+from rtshcua.model.quantity import Dimension, display
 
 
 def check_link(context: Context, link: LinkDecl) -> SkillDecl | None:
@@ -22,6 +27,7 @@ def check_link(context: Context, link: LinkDecl) -> SkillDecl | None:
     if bound is not None:
         context.bound[id(link)] = bound
     quantity(context, link.limit, Dimension.DURATION)
+    _limit(context, link, skill)
     if skill.motion is not None and skill.motion.kind == "cover":
         context.report.add(
             codes.COVERING_LINK,
@@ -52,15 +58,38 @@ def check_chain(context: Context, links: Sequence[LinkDecl], owner: SkillDecl | 
             )
         elif index == len(links) - 1:
             _last(context, link, skill)
-        elif link.limit is None and not _ends(skill):
-            context.report.add(
-                codes.ENDLESS_LINK,
-                link.span,
-                f"`{skill.name.text}` does not end by itself, so the links after it would never run",
-                help=f"say for how long, as in `{context.report.text(link.span)} for 20 s`",
-                labels=[(skill.name.span, f"`{skill.name.text}` declares no `lasts at most`")],
-                fix=(link.span, f"{context.report.raw(link.span)} for 20 s", "hold for 20 s"),
-            )
+        else:
+            check_end(context, link, skill)
+
+
+def check_end(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
+    """Report a link that something comes after, and that does not end: of a chain, or the target of a `degrade`."""
+    if link.limit is None and not _ends(skill):
+        context.report.add(
+            codes.ENDLESS_LINK,
+            link.span,
+            f"`{skill.name.text}` does not end by itself, so the links after it would never run",
+            help=f"say for how long, as in `{context.report.text(link.span)} for 20 s`",
+            labels=[(skill.name.span, f"`{skill.name.text}` declares no `lasts at most`")],
+            fix=(link.span, f"{context.report.raw(link.span)} for 20 s", "hold for 20 s"),
+        )
+
+
+def _limit(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
+    """Report a link that is to fly for longer than its skill lasts."""
+    limit, lasts = link.limit, skill.duration
+    if limit is None or lasts is None or {limit.dimension, lasts.dimension} != {Dimension.DURATION}:
+        return
+    if limit.value > lasts.value:
+        most = display(lasts.value, Dimension.DURATION)
+        context.report.add(
+            codes.INCOHERENT_TIMING,
+            limit.span,
+            f"the link is to fly for {display(limit.value, Dimension.DURATION)}, and `{skill.name.text}` lasts at "
+            f"most {most}",
+            help=f"at most `{most}` fits",
+            labels=[(lasts.span, "does not fit with this")],
+        )
 
 
 def _ends(skill: SkillDecl) -> bool:

@@ -21,12 +21,24 @@ def _enumeration(scope: Scope, node: Value) -> Type | None:
     return None
 
 
+def _names_type(scope: Scope, node: Value, other: Value) -> bool:
+    """Whether an enumeration is named where its value is meant, and compared with one of its members."""
+    if not isinstance(node, Reference) or not isinstance(other, Reference) or scope.find(node.name) is not None:
+        return False
+    enum = scope.symbols.enums.get(node.name)
+    return enum is not None and any(member.name.text == other.name for member in enum.members)
+
+
 def check_comparison(scope: Scope, node: Comparison) -> None:
     """`left operator right`."""
     if is_phase(scope, node.left):
         phase_compared(scope, node)
         return
     asked = _enumeration(scope, node.left)
+    for enum, member in ((node.left, node.right), (node.right, node.left)):
+        if _names_type(scope, enum, member):  # a signal of that type is meant, and the member is right
+            typed(scope, enum)
+            return
     left = typed(scope, node.left, _enumeration(scope, node.right) if asked is None else None)
     right = typed(scope, node.right, asked)
     if left is None or right is None:
@@ -34,7 +46,9 @@ def check_comparison(scope: Scope, node: Comparison) -> None:
     if right.type == MISSION_PHASE:
         phase_compared(scope, node)
         return
-    if left.type.kind is Kind.NUMBER and right.type.kind is Kind.NUMBER:
+    if TIME_OF_DAY in (left.type, right.type):
+        _clock(scope, node, left, right)
+    elif left.type.kind is Kind.NUMBER and right.type.kind is Kind.NUMBER:
         _same(scope, node, left, right)
     elif asked is not None or left.type.kind is Kind.ENUMERATION:
         _enumerated(scope, node, left, right)
@@ -90,13 +104,27 @@ def _enumerated(scope: Scope, node: Comparison, left: Typed, right: Typed) -> No
         )
 
 
-def _incomparable(scope: Scope, node: Comparison, left: Typed) -> None:
-    if left.type == TIME_OF_DAY:
-        help = "write `local time in 08:00 .. 18:00`"
-    elif left.type in (ZONE, POSITION):
-        help = "ask whether it is `inside` or `outside` a zone"
+def _clock(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
+    """`local time` before or after a time of day that is written out; what is meant is a part of the same day."""
+    if left.type != right.type:
+        odd, other = (node.left, left) if right.type == TIME_OF_DAY else (node.right, right)
+        message = (
+            f"`{scope.report.text(odd.span)}` is {other.type.describe()}, and is compared with {TIME_OF_DAY.describe()}"
+        )
+        help = "a time of day is compared with `local time`, as in `local time >= 19:00`"
+    elif (left.constant is None) == (right.constant is None):
+        message = f"`{node.operator}` compares `local time` with a time of day that is written out"
+        help = "write `local time >= 19:00`, or `local time in 08:00 .. 18:00`"
+    elif node.operator in ("==", "!="):
+        message = f"`{node.operator}` asks for one moment of the day, which no clock can be held to"
+        help = "write a window, such as `local time in 08:00 .. 08:10`, or a comparison, such as `local time >= 08:00`"
     else:
-        help = None
+        return
+    scope.report.add(codes.NOT_COMPARABLE, node.span, message, help=help, labels=declaration_labels(scope, node.left))
+
+
+def _incomparable(scope: Scope, node: Comparison, left: Typed) -> None:
+    help = "ask whether it is `inside` or `outside` a zone" if left.type in (ZONE, POSITION) else None
     scope.report.add(
         codes.NOT_COMPARABLE,
         node.span,

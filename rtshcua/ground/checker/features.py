@@ -71,6 +71,7 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
 
 def _geometry(feature: dict[str, Any], pointer: str) -> tuple[dict[str, Any], str]:
     """RFC 7946, 3.2: a Feature's geometry is a geometry object, or null where it has no place."""
+    _reference_system(feature)
     geometry = feature.get("geometry")
     if geometry is None:
         raise Refused(codes.GEOJSON_SHAPE, f"the feature at `{pointer or '/'}` has no geometry")
@@ -88,6 +89,7 @@ def _area(geometry: Any, pointer: str) -> tuple[dict[str, Any], str]:
             "a zone is read from a Polygon or a MultiPolygon",
         )
     assert isinstance(geometry, dict)
+    _reference_system(geometry)
     return geometry, pointer
 
 
@@ -117,7 +119,8 @@ def _known(features: list[dict[str, Any]], asked: str | None = None) -> str | No
 
 
 def _reference_system(tree: dict[str, Any]) -> None:
-    """RFC 7946, 4: all positions are WGS 84; a `crs`, as files had before, must say the same."""
+    """RFC 7946, 4: all positions are WGS 84; a `crs`, as files had before, must say the same,
+    wherever it stands (GeoJSON 2008, 3)."""
     crs = tree.get("crs")
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None

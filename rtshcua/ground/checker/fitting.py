@@ -5,8 +5,8 @@ from math import floor
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.scope import Argument, Scope
-from rtshcua.ground.checker.types import COUNT, EXAMPLES, LENGTH, Kind, Type, Typed
+from rtshcua.ground.checker.scope import ENTRY, Argument, Scope
+from rtshcua.ground.checker.types import COUNT, EXAMPLES, LENGTH, POSITION, Kind, Type, Typed
 from rtshcua.ground.language.exact import CANONICAL
 from rtshcua.model.ir.expression import Quantity, Reference, Value
 from rtshcua.model.ir.places import ZoneDecl
@@ -38,7 +38,7 @@ def fit(scope: Scope, node: Value, found: Typed, expected: Type, asked: tuple[Sp
         else codes.WRONG_TYPE,
         node.span,
         message,
-        help=_accepted(expected, replacement),
+        help=_accepted(scope, node, expected, replacement),
         labels=[*declaration_labels(scope, node), *(() if asked is None else (asked,))],
         fix=None if replacement is None else (node.span, replacement, f"write `{replacement}`"),
     )
@@ -67,7 +67,14 @@ def _numbers(left: Type, right: Type) -> bool:
     return left.kind is Kind.NUMBER and right.kind is Kind.NUMBER
 
 
-def _accepted(expected: Type, replacement: str | None) -> str:
+def _accepted(scope: Scope, node: Value, expected: Type, replacement: str | None) -> str:
+    if expected == POSITION:
+        zone = scope.find(node.name) if isinstance(node, Reference) else None
+        if replacement is not None:
+            return f"write `{replacement}` for the place where the zone is entered"
+        if isinstance(zone, ZoneDecl):
+            return f"give the zone `{zone.name.text}` an `entry` to fly to, or write coordinates"
+        return "write coordinates, as in `47.3977 N, 8.5456 E`, or a zone's entry, as in `bridge.entry`"
     if replacement is not None:
         return f"write `{replacement}`, if that is what you mean"
     if expected.kind is Kind.NUMBER and expected.dimension is not None:
@@ -79,7 +86,10 @@ def _accepted(expected: Type, replacement: str | None) -> str:
 
 
 def _corrected(scope: Scope, node: Value, found: Typed, expected: Type) -> str | None:
-    """The literal with the unit or the datum that was asked, where that is likely what was meant."""
+    """The literal with the unit or the datum that was asked, or a zone's entry, where that is likely what was meant."""
+    zone = scope.find(node.name) if isinstance(node, Reference) and expected == POSITION else None
+    if isinstance(zone, ZoneDecl):
+        return None if zone.entry is None else f"{zone.name.text}{ENTRY}"
     if not isinstance(node, Quantity) or expected.kind is not Kind.NUMBER or expected.dimension is None:
         return None
     written = scope.report.text(node.span)

@@ -169,7 +169,7 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
             raise Refused(
                 codes.GEOJSON_SHAPE,
                 f"the ring at `{pointer}` crosses the antimeridian after its position {i}",
-                "cut the area at longitude 180 (RFC 7946, 3.1.9), and declare either part as a zone of its own",
+                "cut the area at longitude 180 into two parts of a MultiPolygon (RFC 7946, 3.1.9)",
             )
     ring = [a for a, b in pairwise(corners) if a != b]
     if len(ring) < 3:

@@ -31,7 +31,7 @@ def phase_compared(scope: Scope, node: Comparison) -> None:
     if not is_phase(scope, node.left):
         _report(scope, node.left, "the mission's phase stands on the left side of a comparison")
     elif node.operator not in ("==", "!="):
-        scope.report.add(codes.NOT_COMPARABLE, node.span, "the phases of a mission have no order", help=_HELP)
+        scope.report.add(codes.PHASE_NAME, node.span, "the phases of a mission have no order", help=_HELP)
     elif not isinstance(name, Reference) or name.name in (PHASE, LOCAL_TIME) or "." in name.name:
         _report(scope, name, f"`{scope.report.text(name.span)}` is not the name of a phase")
 

@@ -31,7 +31,9 @@ def check_inside(scope: Scope, node: Inside) -> None:
             codes.BAD_SUBJECT,
             node.subject.span,
             f"`{scope.report.text(node.subject.span)}` cannot be inside or outside of a zone",
-            help=f"ask it of `{POSITION_SIGNAL}`, or of an argument that is a position or a zone",
+            help=f"of all signals, it is `{POSITION_SIGNAL}` that is read as the vehicle's place: call this one so"
+            if isinstance(found, SignalDecl) and subject.type == POSITION
+            else f"ask it of `{POSITION_SIGNAL}`, or of an argument that is a position or a zone",
             labels=declaration_labels(scope, node.subject),
         )
     elif is_argument and not isinstance(scope.find(region.name), ZoneDecl):
@@ -39,6 +41,8 @@ def check_inside(scope: Scope, node: Inside) -> None:
             codes.BAD_SUBJECT,
             node.region.span,
             "an argument is compared with a declared zone only, not with another argument",
+            help=f"write a declared zone instead of `{region.name}`, in which only `{POSITION_SIGNAL}` can be; "
+            "or make this a rule of a template, whose parameters stand for declared zones",
             labels=declaration_labels(scope, region),
         )
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.dialect import DATUM
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import Symbols, suggestion
@@ -78,11 +79,18 @@ class Scope:
             return
         kind = self.symbols.kind_of(name)
         if kind is not None:
+            of_type = [each.name.text for each in self.symbols.signals.values() if each.type.text == name]
             self.report.add(
                 codes.WRONG_KIND,
                 span,
                 f"`{name}` is {kind}, not a value",
+                help=None
+                if not of_type
+                else f"did you mean the signal `{of_type[0]}`, which is of this type?"
+                if len(of_type) == 1
+                else f"the signals of this type are {listed(of_type)}",
                 labels=[(self.symbols.declared[name].name.span, "declared here")],
+                fix=(span, of_type[0], f"write `{of_type[0]}`") if len(of_type) == 1 else None,
             )
             return
         zone = self.symbols.zones.get(name.removesuffix(ENTRY)) if name.endswith(ENTRY) else None
@@ -93,6 +101,18 @@ class Scope:
                 f"the zone `{zone.name.text}` declares no entry",
                 help="add `entry` and its coordinates to the zone",
                 labels=[(zone.name.span, "declared here")],
+            )
+            return
+        zone = self.symbols.zones.get(name.rpartition(".")[0])
+        if zone is not None:
+            entry = f"{zone.name.text}{ENTRY}"
+            self.report.add(
+                codes.UNKNOWN_NAME,
+                span,
+                f"a zone has no `{name.rpartition('.')[2]}`",
+                help=f"the one place that is asked of a zone by name is its entry: write `{entry}`",
+                labels=[(zone.name.span, "the zone is declared here")],
+                fix=(span, entry, f"write `{entry}`"),
             )
             return
         for enum in self.symbols.enums.values():

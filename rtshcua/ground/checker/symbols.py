@@ -61,7 +61,10 @@ class Symbols:
 
 
 def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symbols:
-    """The symbol table of a program; of two declarations of one name the first counts, the second is a duplicate."""
+    """The symbol table of a program; of two declarations of one name the first counts, the second is a duplicate.
+
+    Units come in the order in which files are reached, those that were asked for first.
+    """
     symbols = Symbols(broken=broken)
     for unit in units:
         for declarations, table in (
@@ -78,7 +81,7 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
     return symbols
 
 
-def suggestion(word: str, known: Iterable[str]) -> str | None:
-    """`did you mean ...?` for a word that is not among the known ones."""
-    near = nearest(word, known)
+def suggestion(word: str, known: Iterable[str], about: str = "") -> str | None:
+    """`did you mean ...?` for a word that is not among the known ones; `about` are words that stand around it."""
+    near = nearest(word, known, about)
     return None if near is None else f"did you mean `{near}`?"

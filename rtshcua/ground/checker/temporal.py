@@ -1,7 +1,7 @@
 """E0320, E0321: what is observed over time is there whether or not a skill runs, and no further back than is kept.
 
 An edge asks for the moment at which its condition becomes true, so it reads the condition both ways: no side of a grown
-zone, which is rounded towards one of them, would be the safe one.
+zone, which is rounded towards one of them, would be the safe one; nor one of a band that is known to within an error.
 """
 
 from rtshcua.diagnostics import codes
@@ -11,8 +11,9 @@ from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import DURATION
 from rtshcua.ground.checker.values import typed
 from rtshcua.model.flat.limits import MAX_WINDOW
-from rtshcua.model.ir.expression import Edge, ForLast, Grow, Near, Quantity, Reference, WithinLast
-from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.ir.expression import Edge, ForLast, Grow, Inside, Near, Quantity, Reference, WithinLast
+from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.quantity import Datum, Dimension, display
 
 Temporal = ForLast | WithinLast | Near | Edge
 
@@ -59,8 +60,12 @@ def check_observable(scope: Scope, node: Temporal) -> None:
 
 
 def _exact(scope: Scope, edge: Edge) -> None:
-    """Report a grown zone under an edge."""
+    """Report a zone under an edge that is not known exactly: a grown one, or one whose band is above sea where some
+    vehicle's elevation is known to within an error only.
+    """
     for part in walk(edge.operand):
+        if isinstance(part, Inside) and not isinstance(part.region, Grow):
+            _banded(scope, edge, part.region)
         if isinstance(part, Grow):
             scope.report.add(
                 codes.TIMED_ARGUMENT,
@@ -69,3 +74,25 @@ def _exact(scope: Scope, edge: Edge) -> None:
                 help="declare a zone of the shape that you mean",
                 labels=[(edge.span, "an edge reads its condition both ways, and a grown zone is safe one way only")],
             )
+
+
+def _banded(scope: Scope, edge: Edge, region: Reference) -> None:
+    zone = scope.find(region.name)
+    bands = (zone.floor, zone.ceiling) if isinstance(zone, ZoneDecl) else ()
+    above_sea = next((each for each in bands if each is not None and each.datum is Datum.SEA), None)
+    errors = (each.elevation_within for each in scope.symbols.vehicles.values())
+    error = next((each for each in errors if each is not None and each.value > 0), None)
+    if above_sea is None or error is None:
+        return
+    scope.report.add(
+        codes.TIMED_ARGUMENT,
+        region.span,
+        f"`{'rising' if edge.rising else 'falling'}` cannot read `{region.name}`, whose height above sea is not known "
+        "exactly",
+        help="declare a zone whose floor and ceiling are above home",
+        labels=[
+            (edge.span, "an edge reads its condition both ways, and the band is safe one way only"),
+            (above_sea.span, "above sea"),
+            (error.span, "how far the real elevation may differ"),
+        ],
+    )

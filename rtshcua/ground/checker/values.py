@@ -1,5 +1,6 @@
 """The type of a value, and its number where it is constant. What does not fit, by unit or datum, is reported."""
 
+import re
 from fractions import Fraction
 
 from rtshcua.diagnostics import codes
@@ -19,6 +20,7 @@ from rtshcua.model.ir.expression import (
     TimeOfDay,
     Value,
 )
+from rtshcua.model.quantity import UNITS
 
 
 def typed(
@@ -41,6 +43,8 @@ def _infer(scope: Scope, node: Value, expected: Type | None) -> Typed | None:
         case Reference():
             return _reference(scope, node, expected)
         case Arithmetic():
+            if _parted(scope, node):
+                return None
             left, right = _infer(scope, node.left, None), _infer(scope, node.right, None)
             return None if left is None or right is None else arithmetic(scope, node, left, right)
         case Function():
@@ -51,6 +55,27 @@ def _infer(scope: Scope, node: Value, expected: Type | None) -> Typed | None:
             return Typed(TIME_OF_DAY, Fraction(node.value))
         case Coordinates():
             return Typed(POSITION, None)
+
+
+def _parted(scope: Scope, node: Arithmetic) -> bool:
+    """Whether `8 m / s` is written for `8 m/s`; reports it."""
+    number = node.left.right if isinstance(node.left, Arithmetic) else node.left
+    name = node.right
+    if node.operator != "/" or not isinstance(number, Quantity) or not isinstance(name, Reference):
+        return False
+    written = scope.report.text(number.span)
+    unit = re.search(r"[a-z]+$", written)
+    if unit is None or f"{unit[0]}/{name.name}" not in UNITS or scope.find(name.name) is not None:
+        return False
+    meant = f"{written}/{name.name}"
+    scope.report.add(
+        codes.UNKNOWN_NAME,
+        name.span,
+        f"nothing declares `{name.name}`",
+        help=f"write `{meant}`: there is no space in a unit",
+        fix=(number.span.to(name.span), meant, f"write `{meant}`"),
+    )
+    return True
 
 
 def _reference(scope: Scope, node: Reference, expected: Type | None) -> Typed | None:

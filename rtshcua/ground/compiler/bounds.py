@@ -20,7 +20,7 @@ from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.mission import Invocation, Mission
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.quantity import Dimension, display
 
@@ -68,14 +68,14 @@ def _time(ground: Ground, mission: Mission, invocation: Invocation) -> int:
 
 def _approval(ground: Ground, mission: Mission, invocation: Invocation) -> int:
     """How long a step may wait for an approval."""
-    confirms = [rule for rule in ground.prepared.policy.rules if rule.kind == RuleKind.CONFIRM]
-    if not any(not rule.skills or invocation.skill in rule.skills for rule in confirms):
+    rules = ground.prepared.rules.candidates(invocation.skill, invocation.role, invocation.source)
+    if not rules.confirms:
         return 0
     prepared = prepare_invocation(invocation, ground.prepared, mission.phases)
     if isinstance(prepared, Malformed):
         return 0  # reported by the proofs
     at = ground.case(prepared).at
-    return max((each.rule.within_us for each in prepared.candidates.confirms if each.condition(at) & TRUE), default=0)
+    return max((each.rule.within_us for each in rules.confirms if each.condition(at) & TRUE), default=0)
 
 
 def _chain_time(chain: Iterable[Link], policy: Policy) -> int:

@@ -13,6 +13,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import ZONE
 from rtshcua.ground.checker.values import typed
+from rtshcua.ground.compiler import clock
 from rtshcua.ground.compiler.emit import Code
 from rtshcua.ground.compiler.files import Files
 from rtshcua.ground.compiler.memberships import Memberships
@@ -55,6 +56,14 @@ class Place(NamedTuple):
     strict: bool
 
 
+def _smaller(node: Condition) -> str:
+    """How a condition that is too large is said in less."""
+    ranges = "comparisons of one value are shorter as a range, `a in low .. high`, or as a set, `a in {x, y}`"
+    if isinstance(node, Junction) and node.operator == "or":
+        return f"in a policy, write a rule for each part of the `or`; or say less: {ranges}"
+    return f"say less: {ranges}"
+
+
 class Conditions:
     """Lowers the conditions of one policy into shared slots, zones, sets and monitors."""
 
@@ -78,7 +87,7 @@ class Conditions:
                 node.span,
                 f"the condition takes {code.length} instructions on a stack of {code.deepest}, and on board fit "
                 f"{MAX_INSTRUCTIONS} on one of {MAX_STACK}",
-                help="split it at `and` into several clauses or rules",
+                help=_smaller(node),
             )
         text, source, start, end = self._files.place(quoted.span)
         return Clause(text, source, start, end, tuple(code.integers))
@@ -113,7 +122,7 @@ class Conditions:
         numbers = Numbers(self._context.report, self._slots, place.scope, place.cells)
         match node:
             case Comparison():
-                if not members.compare(code, node):
+                if not clock.compare(code, node) and not members.compare(code, node):
                     numbers.compare(code, node)
             case Within(range=limits):
                 if isinstance(limits.low, TimeOfDay) and isinstance(limits.high, TimeOfDay):

@@ -72,7 +72,7 @@ def _covered(
             step.span,
             f"`{zone.name.text}` is in {several} parts, and a path lies in one"
             if several > 1
-            else f"`{zone.name.text}` is too small or too bent for a `{pattern}` path",
+            else f"`{zone.name.text}` is too small or too bent for the pattern `{pattern}`",
             help="declare each part as a zone, and fly over one after the other"
             if several > 1
             else "the path keeps the vehicle's position error away from the edge; a `perimeter` needs the least room",

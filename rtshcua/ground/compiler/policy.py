@@ -12,6 +12,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.places import POSITION_SIGNAL
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, Type
+from rtshcua.ground.compiler import local_time
 from rtshcua.ground.compiler.belonging import belongs
 from rtshcua.ground.compiler.conditions import Conditions
 from rtshcua.ground.compiler.contracts import Contracts
@@ -49,6 +50,7 @@ class LoweredPolicy:
     conditions: Conditions
     slots: Slots
     written: Mapping[Rule, RuleDecl]  # each flat rule's declaration
+    rules: tuple[RuleDecl, ...] = ()  # the same by the number of the flat rule
 
 
 def lower_policy(
@@ -62,10 +64,11 @@ def lower_policy(
     skills = _skills(context, policy, files)
     if not _well_known(context, policy, files) or not belongs(context, policy, skills, vehicle, files):
         return None
+    declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
+    local_time.check_policy(context, policy, vehicle, skills, declared)
     table = Files(context.report, names)
     slots = Slots(context)
     position, height, battery = (slots.of(name) for name in WELL_KNOWN)
-    declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
     for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in WELL_KNOWN), *skills):
         table.index(part.span.file)  # all that the policy rests on is named, quoted or not
     for zone in declared:
@@ -110,7 +113,18 @@ def lower_policy(
         return None
     by_name = {role: number for number, role in enumerate(roles)}
     return LoweredPolicy(
-        flat, policy, vehicle, numbers, by_name, zones, contracts, table, conditions, slots, dict(lowered_rules)
+        flat,
+        policy,
+        vehicle,
+        numbers,
+        by_name,
+        zones,
+        contracts,
+        table,
+        conditions,
+        slots,
+        dict(lowered_rules),
+        tuple(rule for _, rule in lowered_rules),
     )
 
 
@@ -189,4 +203,5 @@ def _vehicle(vehicle: VehicleDecl, position: int, height: int, battery: int) -> 
         position=position,
         height=height,
         battery=battery,
+        return_altitude=0 if vehicle.return_altitude is None else vehicle.return_altitude.value,
     )

@@ -119,7 +119,7 @@ class _Run:
         self.report = Report({**program.sources, **options}, program.data)
         self.report.found += program.diagnostics
         self.bounds: dict[str, Bounds] = {}
-        self.whole = not any(found.code in FILE_CODES for found in program.diagnostics)
+        self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], Ground | None] = {}
         data = DataFiles(program.data, program.data_names)
@@ -131,7 +131,7 @@ class _Run:
             self.context = Context(symbols, self.report, dialect, instances=instances, samples=samples, data=data)
 
     def check(self) -> None:
-        """Check all declarations; where a file is missing altogether, half of all names would be unknown."""
+        """Check all declarations; where a file is missing or an import unread, half of all names would be unknown."""
         if self.whole:
             check_declarations(self.context)
 

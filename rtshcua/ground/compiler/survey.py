@@ -7,6 +7,7 @@ perimeter is that around the area, not those around its holes. An area in severa
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 
 from rtshcua.ground.checker.polygons import contained, doubled_area, meet
 from rtshcua.ground.compiler.distance import far
@@ -32,7 +33,7 @@ CORNERS = (
 def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | None) -> tuple[Point, ...] | None:
     """The points of a path in `area`, beginning at the end nearer to `start`; None where the area is too small."""
     try:
-        shape = inner(area, -max(inset, LEAST_INSET))
+        shape = _inset(area, max(inset, LEAST_INSET))
     except Unshapely:
         return None
     if isinstance(shape, Disc):
@@ -46,6 +47,12 @@ def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | N
     if points is not None and start is not None and length(points[-1], start) < length(points[0], start):
         points.reverse()
     return None if points is None else tuple(points)
+
+
+@lru_cache(maxsize=64)
+def _inset(area: Shape, by: int) -> Shape:
+    """An area without what is within `by` mm of its edge; the choices of a mission's parameters ask for the same."""
+    return inner(area, -by)
 
 
 def _regular(center: Point, radius: int) -> tuple[Point, ...]:

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from rtshcua.decision.reads import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import ENTRY
@@ -25,9 +26,10 @@ from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.limits import MAX_CLAUSES
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
 from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.ir.skills import Clause as ClauseDecl
+from rtshcua.model.quantity import Dimension, display
 
 
 class Tightened:
@@ -102,7 +104,7 @@ class Tightened:
         if lacking is not None:
             self._trial = None  # what it gained is not the policy's
             if len(self._context.report.found) == before:
-                self._report(clause.span, f"needs {lacking}")
+                self._report(clause.span, *lacking)
         return lowered if len(self._context.report.found) == before else None
 
     def _known(self, clause: ClauseDecl) -> bool:
@@ -114,7 +116,8 @@ class Tightened:
             zone = reference.name.removesuffix(ENTRY)
             if reference.name in context.symbols.signals and reference.name not in signals:
                 good = False
-                self._report(reference.span, f"reads the signal `{reference.name}`, which the policy does not")
+                what = f"reads the signal `{reference.name}`, which the policy does not"
+                self._report(reference.span, what, _signals(under.policy))
             elif zone in context.symbols.zones and zone not in under.zones.index:
                 good = False
                 context.report.add(
@@ -126,14 +129,13 @@ class Tightened:
                 )
         return good
 
-    def _report(self, span: Span, what: str) -> None:
+    def _report(self, span: Span, what: str, has: str) -> None:
         policy = self._under.policy
-        signals = ", ".join(f"`{signal.name}`" for signal in policy.signals)
         self._context.report.add(
             codes.NOT_OBSERVED,
             span,
             f"a clause of a step {what}: `{policy.name}` is signed as it is for all its missions",
-            help=f"use what its rules and contracts use, or let one of them use this; it reads {signals}",
+            help=f"use what its rules and contracts use, or let one of them use this; {has}",
             labels=[(self._under.declaration.name.span, "the policy is declared here")],
         )
 
@@ -167,15 +169,32 @@ def _trial(context: Context, under: LoweredPolicy, files: Files) -> _Trial:
     return _Trial(deepcopy(under.conditions, memo), deepcopy(under.slots, memo), deepcopy(under.zones, memo))
 
 
-def _lacking(trial: _Trial, policy: Policy) -> Iterator[str]:
-    """What a lowering has added to the tables of a policy."""
+def _lacking(trial: _Trial, policy: Policy) -> Iterator[tuple[str, str]]:
+    """What a lowering has added to the tables of a policy, and what these have of its kind."""
     if trial.slots.count > policy.slots:
-        yield "a signal that the policy does not read"
+        yield "reads a signal that the policy does not", _signals(policy)
     if len(trial.zones.flat()) > len(policy.zones) or len(trial.zones.tables) > len(policy.tables):
-        yield "a grown zone that the policy does not have"
-    if len(trial.conditions.sets.all) > len(policy.sets):
-        yield "a set of values that no condition of the policy has"
+        grown = listed(dict.fromkeys(zone.name for zone in policy.zones[len(trial.zones.index) :]))
+        yield "needs a grown zone that the policy does not have", f"it has {grown or 'none'}"
     if len(trial.conditions.sets.phases) > len(policy.phases):
-        yield "the name of a phase that no condition of the policy has"
+        yield "names a phase that no condition of the policy does", f"they name {listed(policy.phases) or 'none'}"
+    if len(trial.conditions.sets.all) > len(policy.sets):
+        yield "needs a set of values that no condition of the policy has", "a single value is compared with `==`"
     if len(trial.conditions.monitors.all) > len(policy.monitors):
-        yield "a temporal condition that the policy does not observe"
+        watched = listed(dict.fromkeys(_window(monitor) for monitor in policy.monitors))
+        yield "needs a temporal condition that the policy does not observe", f"it observes {watched or 'none'}"
+
+
+def _signals(policy: Policy) -> str:
+    return f"it reads {listed(signal.name for signal in policy.signals)}"
+
+
+def _window(monitor: Monitor) -> str:
+    """A temporal condition as it is written."""
+    words = {
+        MonitorKind.FOR_LAST: "for the last",
+        MonitorKind.WITHIN_LAST: "within the last",
+    }.get(MonitorKind(monitor.kind))
+    if words is None:
+        return f"{MonitorKind(monitor.kind).name.lower()} {monitor.when.text}"
+    return f"{monitor.when.text} {words} {display(monitor.window_us, Dimension.DURATION)}"

@@ -13,7 +13,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of
 from rtshcua.ground.checker.lookup import find_skill
 from rtshcua.ground.checker.report import Report
-from rtshcua.model.flat.limits import MAX_RULES
+from rtshcua.model.flat.limits import MAX_ROLES, MAX_RULES
 from rtshcua.model.ir.expression import Condition, Junction
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule
@@ -21,13 +21,24 @@ from rtshcua.model.ir.skills import SkillDecl
 
 #: who speaks for a role where a permit does not say
 OWN_SOURCE = "operator"
+#: two roles need no more than one for each of their skills and conditions
+MOST_DELEGATIONS = 4_096
 
 
 def delegated(context: Context, policy: PolicyDecl, rules: Sequence[Rule], *, whole: bool) -> tuple[Rule, ...]:
     """The rules of a policy with those that its delegations make of them; `whole` where no rule is missing."""
     found = list(rules)
-    for delegation in _ordered(context.report, policy.delegations):
-        found += _made(context, delegation, found, whole=whole)
+    if _too_many(context.report, policy.delegations):
+        return tuple(found)
+    ordered = list(_ordered(context.report, policy.delegations))
+    made = set(map(id, ordered))
+    # roles that may lack something, for a reason that is reported
+    lacking = {each.grantee.text for each in policy.delegations if id(each) not in made}
+    for delegation in ordered:
+        before = len(context.report.found)
+        found += _made(context, delegation, found, whole=whole and delegation.grantor.text not in lacking)
+        if len(context.report.found) > before or delegation.grantor.text in lacking:
+            lacking.add(delegation.grantee.text)
         if len(found) > MAX_RULES:
             context.report.add(
                 codes.TOO_MANY,
@@ -37,6 +48,18 @@ def delegated(context: Context, policy: PolicyDecl, rules: Sequence[Rule], *, wh
             )
             break
     return tuple(found)
+
+
+def _too_many(report: Report, delegations: Sequence[Delegation]) -> bool:
+    """Report more delegations, or among more roles, than fit on board: to order them would take minutes."""
+    roles: set[str] = set()
+    for number, each in enumerate(delegations, 1):
+        roles |= {each.grantor.text, each.grantee.text}
+        if len(roles) > MAX_ROLES or number > MOST_DELEGATIONS:
+            what, most = ("roles", MAX_ROLES) if len(roles) > MAX_ROLES else ("delegations", MOST_DELEGATIONS)
+            report.add(codes.TOO_MANY, each.span, f"the policy delegates by more than {most} {what}")
+            return True
+    return False
 
 
 def _ordered(report: Report, delegations: Sequence[Delegation]) -> Iterator[Delegation]:

@@ -1,7 +1,8 @@
 """A mission with parameters: the one that is compiled, with the values that are given, and those that are checked.
 
 A mission is checked for every zone and every choice that its parameters may have, and for both ends of every range:
-at most `MAX_INSTANCES` of these, the defaults first, then each parameter changed alone, then together.
+at most `MAX_INSTANCES` of these, the defaults first, then each parameter changed alone, then together; fewer of a
+mission with so many steps that it would take minutes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +25,8 @@ from rtshcua.model.quantity import display
 
 #: for how many combinations of values a mission is checked
 MAX_INSTANCES = 64
+#: how many steps these have at most, together; the first is checked however many it has
+MOST_STEPS = 4_096
 
 
 def assigned(context: Context, mission: MissionDecl, settings: Settings) -> Instance | None:
@@ -96,7 +99,9 @@ def instances(context: Context, mission: MissionDecl, files: frozenset[str]) -> 
     if len(known) < len(mission.parameters):
         return
     names = [name for name, _ in ranges]
-    for numbers in islice(_combinations([found for _, found in ranges]), MAX_INSTANCES):
+    steps = sum(len(phase.steps) for phase in mission.phases)
+    most = max(1, min(MAX_INSTANCES, MOST_STEPS // max(steps, 1)))
+    for numbers in islice(_combinations([found for _, found in ranges]), most):
         values = {name: found[number] for number, (name, found) in zip(numbers, ranges, strict=True)}
         yield _instance(mission, {name: values[name] for name in names})
 

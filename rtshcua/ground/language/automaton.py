@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.reduce import Reduction, reduction
+from rtshcua.ground.language.reduce import Reductions
 from rtshcua.ground.language.table import END, Table
 
 
@@ -33,11 +33,12 @@ class Automaton:
     states: list[int] = field(default_factory=lambda: [0])
     values: list[Any] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
-    rules: list[Reduction] = field(init=False)
+    end: int = 0  # of the last token that was taken, when the parser has stopped
+    rules: Reductions = field(init=False)
 
     def __post_init__(self) -> None:
         """Binds each rule to its action, once for the text, however often the parser stops in it."""
-        self.rules = [reduction(rule, self.source.file, self.actions) for rule in self.table.rules]
+        self.rules = Reductions(self.table.rules, self.source.file, self.actions)
 
     def run(self, offset: int) -> Failure | None:
         """Parses from `offset` on; None when the text was read to its end."""
@@ -57,6 +58,7 @@ class Automaton:
                 start = after = blank.end() if blank else end
                 word = kind = END
                 if start < len(text):
+                    self.end = end
                     return self._failure(start)
             while True:
                 row = rows[states[-1]]
@@ -64,6 +66,7 @@ class Automaton:
                 if step is None:
                     step = row.get(kind)
                     if step is None:
+                        self.end = end
                         return Failure(start, after, kind or word)
                 if step >= 0:
                     states.append(step)

@@ -8,9 +8,9 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.automaton import Automaton, Failure
 from rtshcua.ground.language.expected import (
+    ARITHMETIC,
     CONDITION,
     SHAPE,
-    VALUE,
     accepted,
     beginnings,
     describe,
@@ -18,6 +18,7 @@ from rtshcua.ground.language.expected import (
     phrase,
     words,
 )
+from rtshcua.ground.language.habits import habit, last_word
 from rtshcua.ground.language.recovery import at_line_start, open_braces, owner, pending
 from rtshcua.ground.language.table import END, NAME
 from rtshcua.ground.language.wording import SHOWN, short
@@ -42,6 +43,14 @@ def explain(automaton: Automaton, failure: Failure) -> Diagnostic:
         return _unclosed_block(automaton, span, found)
     shown = f"`{short(found)}`" if found else "the end of the file"
     message = f"found {shown}, expected {describe(automaton, symbols)}"
+    known = habit(automaton, failure, symbols)
+    if known is not None:
+        place, message = (span, message) if known.at is None else known.at
+        return Diagnostic(SYNTAX, message, place, known.help, fixes=() if known.fix is None else (known.fix,))
+    if ".." in symbols and symbols & ARITHMETIC:
+        at = _in(automaton)
+        if at is not None:
+            return _not_in_range(automaton, span, at)
     if found == "not" and symbols & CONDITION:
         return Diagnostic(SYNTAX, message, span, "put it in brackets, as in `(not a > b)`")
     if NAME in symbols and automaton.table.words.get(found) is False:
@@ -55,7 +64,50 @@ def explain(automaton: Automaton, failure: Failure) -> Diagnostic:
     if meant is not None:
         fix = Fix(span, meant, f"write `{meant}`")
         return Diagnostic(SYNTAX, message, span, f"did you mean `{meant}`?", fixes=(fix,))
-    return Diagnostic(SYNTAX, message, span, _help(automaton, failure, symbols))
+    help = _help(automaton, failure, symbols)
+    if "\n" in automaton.source.text[automaton.end : failure.start] and not _may_end(automaton, symbols):
+        return _broken_off(automaton, span, shown, symbols, help)
+    return Diagnostic(SYNTAX, message, span, help)
+
+
+def _may_end(automaton: Automaton, symbols: set[str]) -> bool:
+    """Whether what was begun could be over, so that what follows on another line is itself at fault."""
+    return "}" in symbols or beginnings(automaton) <= symbols or bool(parts(automaton, symbols))
+
+
+def _broken_off(automaton: Automaton, span: Span, shown: str, symbols: set[str], help: str | None) -> Diagnostic:
+    """A line ends before what it begins; the finding is there, not on the line that follows."""
+    last = last_word(automaton)
+    text = short(automaton.source.slice(last))
+    labels = (Label(span, f"found {shown}"),) if span.start < span.end else ()
+    message = f"expected {describe(automaton, symbols)} after `{text}`"
+    fixes: tuple[Fix, ...] = ()
+    if symbols == {"("}:
+        help = "what takes nothing is written with `()`"
+        fixes = (Fix(Span(last.file, last.end, last.end), "()", "write `()`"),)
+    return Diagnostic(SYNTAX, message, last, help, labels, fixes)
+
+
+def _in(automaton: Automaton) -> int | None:
+    """Where the `in` stands after which a single value was read."""
+    for value, start in zip(reversed(automaton.values[-3:]), reversed(automaton.starts[-3:]), strict=True):
+        if value == "in":
+            return start
+    return None
+
+
+def _not_in_range(automaton: Automaton, span: Span, at: int) -> Diagnostic:
+    """`position in city`, `gps.fix in fix_3d`."""
+    word = Span(span.file, at, at + len("in"))
+    inside = Fix(word, "inside", "write `inside`")
+    return Diagnostic(
+        SYNTAX,
+        "`in` is followed by a range, or by names in `{ }`",
+        word,
+        "a place is `inside` a zone; a number is `in 5 m .. 20 m`, a name `in {fix_2d, fix_3d}`",
+        labels=(Label(span, "before this, `..` is missing"),) if span.start < span.end else (),
+        fixes=(inside,) if re.search(r"\bposition\s+\Z", automaton.source.text[:at][-40:]) else (),
+    )
 
 
 def _meant(found: str, symbols: set[str]) -> str | None:
@@ -67,7 +119,7 @@ def _meant(found: str, symbols: set[str]) -> str | None:
 
 
 def _help(automaton: Automaton, failure: Failure, symbols: set[str]) -> str | None:
-    if failure.kind == "<COMPARE>" and not symbols >= VALUE:
+    if failure.kind == "<COMPARE>" and "+" in symbols:
         return "comparisons are not chained: write `height in 5 m .. 10 m`, or join two by `and`"
     begin = beginnings(automaton)
     if begin <= symbols:

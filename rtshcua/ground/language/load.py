@@ -43,6 +43,8 @@ class Program:
     `data` has the bytes, UTF-8 and not looked at further, of the files that zones are read from, and `stable` their
     names too; `data_names` says which of them a source's `from "..."` means, by the source and the path as written. A
     file that could not be had has its finding already, and is in neither.
+
+    `whole` is false where an import has a syntax error, so that a name may be declared in a file that was not read.
     """
 
     units: tuple[Unit, ...]
@@ -52,6 +54,7 @@ class Program:
     stable: dict[str, str]
     data: dict[str, bytes] = field(default_factory=dict)
     data_names: dict[tuple[str, str], str] = field(default_factory=dict)
+    whole: bool = True
 
 
 def load(
@@ -81,6 +84,7 @@ def load(
         {name: stable(name, library, paths[0]) for name in (*loader.sources, *loader.data)},
         loader.data,
         loader.data_names,
+        loader.whole,
     )
 
 
@@ -100,6 +104,7 @@ class _Loader:
     tried: set[str] = field(default_factory=set)  # of the files that zones are read from
     data: dict[str, bytes] = field(default_factory=dict)
     data_names: dict[tuple[str, str], str] = field(default_factory=dict)
+    whole: bool = True
 
     def want(self, path: str, by: Import | None) -> str:
         """Queues a file, unless it was met before; gives its name."""
@@ -118,6 +123,7 @@ class _Loader:
         self.units.append(parsed.unit)
         self.diagnostics += parsed.diagnostics
         self.broken |= parsed.broken
+        self.whole = self.whole and parsed.whole
         self.imports[name] = []
         for each in parsed.unit.imports:
             path = self._path(each, name)

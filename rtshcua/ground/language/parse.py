@@ -28,29 +28,32 @@ T = TypeVar("T", bound=Node)
 class Parsed:
     """The declarations without errors, all findings in the order of the text, and the names of what was dropped.
 
-    `broken` keeps the checker from reporting as unknown a name whose declaration is there, but has an error.
+    `broken` keeps the checker from reporting as unknown a name whose declaration is there, but has an error. Where an
+    import has one, `whole` is false: any name may be declared in a file that was not read.
     """
 
     unit: Unit
     diagnostics: tuple[Diagnostic, ...]
     broken: frozenset[str]
+    whole: bool = True
 
 
 def parse(source: Source) -> Parsed:
     """Parses `source`; a text that is too large, or no text, is one finding and no declarations."""
     builder = Builder(source)
     refused = _refused(source)
+    whole = True
     if refused is not None:
         builder.note(refused)
     else:
         try:
-            _run(Automaton(table(), source, builder), builder)
+            whole = _run(Automaton(table(), source, builder), builder)
         except Enough:
             help = f"correct the first {MAX_FINDINGS}, then look again"
             last = builder.diagnostics[-1].span
             builder.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "there are more findings than these", last, help))
     found = tuple(sorted(builder.diagnostics, key=lambda d: d.span.start if d.span else 0))
-    return Parsed(_unit(source, builder.declarations), found, frozenset(builder.broken))
+    return Parsed(_unit(source, builder.declarations), found, frozenset(builder.broken), whole)
 
 
 def _refused(source: Source) -> Diagnostic | None:
@@ -64,20 +67,24 @@ def _refused(source: Source) -> Diagnostic | None:
     return None
 
 
-def _run(automaton: Automaton, builder: Builder) -> None:
+def _run(automaton: Automaton, builder: Builder) -> bool:
+    """Whether every import was understood."""
+    whole = True
     offset: int | None = 1 if automaton.source.text.startswith("\ufeff") else 0
     while offset is not None:
         failure = automaton.run(offset)
         if failure is None:
-            return
+            return whole
         failure = misread(automaton, failure)
         builder.note(explain(automaton, failure))
         begun = pending(automaton)
+        whole = whole and (begun is None or begun[0] != "import")
         offset = resume(automaton, failure.start)
         if offset is None or len(automaton.states) == file_level(automaton):
             if begun is not None and begun[1] is not None:
                 builder.broken.add(begun[1].text)
             builder.settle()
+    return whole
 
 
 def _unit(source: Source, declarations: list[Node]) -> Unit:

@@ -1,6 +1,6 @@
 """What to do with the values of a rule: one small function for each, made once for a text."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.span import Span
@@ -28,6 +28,18 @@ def reduction(rule: Rule, file: str, actions: object) -> Reduction:
         (at,) = rule.kept
         make = _keep(at or 0)
     return Reduction(rule.origin, rule.length, make)
+
+
+class Reductions(dict[int, Reduction]):
+    """The reductions by the rule's number, each made when it is first needed: a short text has need of few."""
+
+    def __init__(self, rules: Sequence[Rule], file: str, actions: object) -> None:
+        super().__init__()
+        self._rules, self._file, self._actions = rules, file, actions
+
+    def __missing__(self, number: int) -> Reduction:
+        made = self[number] = reduction(self._rules[number], self._file, self._actions)
+        return made
 
 
 def _keep(at: int) -> Make:

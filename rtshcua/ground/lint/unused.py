@@ -77,10 +77,10 @@ def _parameters(owner: Parametric, read: frozenset[str]) -> Iterator[Diagnostic]
 
 
 def _unread(owner: Parametric, parameter: Parameter) -> Diagnostic:
-    where = "its motion, its clauses and no rule" if isinstance(owner, SkillDecl) else "nothing in it"
+    by = "neither the skill nor a rule reads" if isinstance(owner, SkillDecl) else "nothing in it reads"
     return Diagnostic(
         codes.UNUSED,
-        f"`{parameter.name.text}` is a parameter of `{owner.name.text}`, and {where} reads it",
+        f"`{parameter.name.text}` is a parameter of `{owner.name.text}` that {by}",
         parameter.name.span,
         "remove it, or say what it is for",
     )

@@ -74,6 +74,7 @@ class Vehicle(Flat, frozen=True):
     """The one aircraft this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
 
     `position`, `height`, `battery` are the state slots of the well-known signals (-1: the policy declares none).
+    `return_altitude` (mm above home) is the height that a return climbs to, if it is lower, before it flies home.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Vehicle(Flat, frozen=True):
     position: int
     height: int
     battery: int
+    return_altitude: int = 0
 
 
 class Policy(Flat, frozen=True):

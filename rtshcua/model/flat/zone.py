@@ -16,11 +16,11 @@ CIRCLE, POLYGON, AREA = 0, 1, 2
 
 class Projection(Flat, frozen=True):
     """Local mm from 1e-7 degree: `x = (longitude - longitude0) * east >> SHIFT`, `y = (latitude - latitude0) * north
-    >> SHIFT`.
+    >> SHIFT`. The difference of the longitudes is the one within 180 degrees, also where longitude 180 lies between.
 
-    `east` and `north` are mm per 1e-7 degree, times 2**SHIFT, computed at compile time on the WGS 84 ellipsoid at home.
-    The shift rounds towards minus infinity: at most 1 mm. At mid-latitudes, distances are true to 1 part in 1,000 within
-    5 km of home and to 1 part in 10,000 within 500 m; docs/adr/0011-zones.md has the bound.
+    `east` and `north` are mm per 1e-7 degree, times 2**SHIFT, computed at compile time on the WGS 84 ellipsoid at
+    home. The shift rounds towards minus infinity: at most 1 mm. At mid-latitudes, distances are true to 1 part in
+    1,000 within 5 km of home and to 1 part in 10,000 within 500 m; docs/adr/0011-zones.md has the bound.
     """
 
     latitude: int
@@ -31,21 +31,35 @@ class Projection(Flat, frozen=True):
 
 SHIFT = 20
 
+#: a whole turn, in 1e-7 degree
+TURN = 3_600_000_000
+HALF_TURN = TURN // 2
+
+
+def meridian(longitude: int, near: int) -> int:
+    """The number within 180 degrees of the longitude `near` that names the same meridian as `longitude`, which may be
+    beyond 180 degrees. In 1e-7 degree.
+    """
+    return near + (longitude - near + HALF_TURN) % TURN - HALF_TURN
+
 
 def project(projection: Projection, latitude: int, longitude: int) -> tuple[int, int]:
     """(x, y) in local mm of a place in 1e-7 degree."""
     return (
-        (longitude - projection.longitude) * projection.east >> SHIFT,
+        (meridian(longitude, projection.longitude) - projection.longitude) * projection.east >> SHIFT,
         (latitude - projection.latitude) * projection.north >> SHIFT,
     )
 
 
 def unproject(projection: Projection, x: int, y: int) -> tuple[int, int]:
-    """(latitude, longitude) in 1e-7 degree of a local place, to the nearest 1e-7 degree."""
+    """(latitude, longitude) in 1e-7 degree of a local place, to the nearest 1e-7 degree; the longitude from 180 W to
+    180 E, on whichever side of longitude 180 home is.
+    """
     east, north = projection.east, projection.north
+    longitude = projection.longitude + ((x << SHIFT) + east // 2) // east
     return (
         projection.latitude + ((y << SHIFT) + north // 2) // north,
-        projection.longitude + ((x << SHIFT) + east // 2) // east,
+        longitude if abs(longitude) <= HALF_TURN else meridian(longitude, 0),
     )
 
 

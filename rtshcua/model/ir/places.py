@@ -105,6 +105,7 @@ class VehicleDecl(Node):
     utc_offset: Quantity | None
     elevation: Quantity | None = None  # of home above sea
     elevation_within: Quantity | None = None  # how far the real elevation of the ground at home may differ
+    return_altitude: Quantity | None = None  # `return at 30 m`: the autopilot's return climbs to it before it flies
 
 
 Combination.model_rebuild()

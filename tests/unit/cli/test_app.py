@@ -60,6 +60,18 @@ def test_the_door_opens_without_loading_what_is_behind_it(words: list[str]) -> N
     assert not heavy & set(run.stderr.split())
 
 
+def test_what_ships_is_checked_without_floating_point_geometry(checkout: Path) -> None:
+    """What a check needs not takes long to import, and the floats of geometry differ between machines."""
+    files = [str(path) for folder in ("skills", "policies", "missions") for path in (checkout / folder).glob("*.rts")]
+    program = (
+        f"import sys; from rtshcua.cli.app import main; code = main(['check', *{files}]); print(code, *sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    code, *modules = run.stdout.splitlines()[-1].split()
+    assert (code, run.stderr) == (str(int(ExitCode.OK)), "")
+    assert not {"shapely", "numpy", "lark", "pymavlink", "rich"} & set(modules)
+
+
 @pytest.mark.parametrize(
     ("word", "answer"),
     [

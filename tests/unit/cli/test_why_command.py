@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from reference.forgery import flight
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -105,3 +106,26 @@ def test_a_source_with_an_error_is_reported(tmp_path: Path, capsys: pytest.Captu
     code, _, err = why(capsys, str(path), "--step", "0")
     assert code == ExitCode.DIAGNOSTICS
     assert "E0201" in err
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("run") / "log.jsonl"
+    path.write_bytes(b"".join(flight()))
+    return path
+
+
+def test_a_log_shows_its_latest_decision_or_the_one_that_is_asked_for(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = shown(capsys, str(log.parent))
+    assert {step["verdict"] for step in found["steps"]} == {"passes"}
+    again = shown(capsys, str(log), "--record", str(found["record"]))
+    assert again == found
+
+
+def test_a_log_that_lacks_what_is_asked_for(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = why(capsys, str(log), "--record", "9999")
+    assert (code, out) == (ExitCode.INPUT, "")
+    assert "`rtshcua show` lists the records" in err
+    assert why(capsys, str(log), "--step", "1")[0] == ExitCode.USAGE

@@ -85,6 +85,7 @@ def test_a_plan_faster_than_the_vehicle() -> None:
     assert ask(goto(110 * M, 0, speed=12 * M)).outcome is ALLOW
     decision = ask(goto(110 * M, 0, speed=12 * M + 1))
     assert (decision.outcome, decision.reason, decision.clause) == (FALLBACK, Reason.ENVELOPE, None)
+    assert decision.step == 7
 
 
 @pytest.mark.parametrize(
@@ -112,6 +113,13 @@ def test_airspace_between_the_present_height_and_the_planned_one() -> None:
     assert ask(goto(110 * M, 0, 30 * M), policy=policy).outcome is ALLOW
     assert ask(goto(110 * M, 0, 50 * M), policy=policy).reason is Reason.AIRSPACE  # the ceiling is outside
     assert ask(goto(110 * M, 0, 30 * M), values={HEIGHT: 60 * M}, policy=policy).reason is Reason.AIRSPACE
+
+
+def test_what_is_flown_instead_keeps_to_the_airspace_all_along() -> None:
+    """The school lies between here and home: the way there begins and ends well, and is not flown."""
+    policy, contract = with_contract(INSPECT, fallback=(flat.link(HOME), flat.link(LAND)))
+    decision = ask(replace(STEP, contract=contract), values={POSITION_X: 0, POSITION_Y: 450 * M}, policy=policy)
+    assert (decision.outcome, decision.link, decision.target) == (FALLBACK, 1, contract.fallback[1])
 
 
 def test_no_airspace_is_no_limit() -> None:
@@ -215,6 +223,23 @@ def volume(near: int, far: int, gap: int = 0) -> Volume:
 )
 def test_energy_over_sets(battery: Any, planned: Volume, truth: int) -> None:
     assert ENERGY.suffices(battery, planned) == truth
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({}, Reason.SAFETY_UNKNOWN),
+        ({HEIGHT: 31 * M}, Reason.INVARIANT),
+        ({BATTERY: 1_499}, Reason.ENERGY),
+        ({BATTERY: 2_499}, Reason.DEGRADED),
+    ],
+)
+def test_what_is_false_outweighs_what_was_unknown_before_it(values: dict[int, int], reason: Reason) -> None:
+    low = clause("height <= 30 m", (Op.SIGNAL, HEIGHT, 0, Op.CONST, 30 * M, 0, Op.LE, 0, 0))
+    reads = (HEIGHT, WIND, flat.LINK, FIX, OBSTACLE)
+    policy, contract = with_contract(GOTO, maintain=(flat.FREE, low), reads=reads)
+    step = replace(goto(110 * M, 0), contract=contract)
+    assert ask(step, values={OBSTACLE: None, **values}, policy=policy).reason is reason
 
 
 # ------------------------------------------------------------------------------------------------------- degrade

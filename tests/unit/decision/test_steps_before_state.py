@@ -77,6 +77,7 @@ E = 20_000  # the clock's error
 def test_freshness(utc: int, outcome: Outcome, reason: Reason) -> None:
     decision = ask(now=replace(NOW, utc_us=utc, utc_error_us=E))
     assert (decision.outcome, decision.reason) == (outcome, reason)
+    assert decision.step == (8 if reason is Reason.ADMITTED else 2)
 
 
 def test_a_replay_comes_before_the_clock() -> None:
@@ -230,6 +231,23 @@ def test_an_approval_moves_the_deadline() -> None:
     assert decision.valid_until_us == AT + 100_000
 
 
+def test_a_release_still_to_come_lengthens_no_permit() -> None:
+    policy, contract = with_contract(INSPECT, deadline_us=100_000)
+    decision = ask(replace(STEP, contract=contract), policy=policy, released_us=AT + S, remaining_us=0)
+    assert (decision.outcome, decision.valid_until_us) == (ALLOW, AT + 100_000)
+
+
+def test_what_is_missing_grows_no_older() -> None:
+    """Nothing that was admitted rests on a value that is not there, so its age bounds no permit."""
+    either = clause("calm or free", (*flat.CALM.code, *flat.FREE.code, Op.OR, 0, 0))
+    reads = (*flat.CONTRACTS[flat.GOTO].reads, flat.OBSTACLE)
+    policy, contract = with_contract(flat.GOTO, require=(flat.FIX_IS_GOOD, either), reads=reads)
+    step = replace(flat.INVOCATIONS[1], contract=contract)
+    for value, left in ((None, 490_000), (9_000, 10)):
+        decision = ask(step, values={flat.OBSTACLE: value}, ages={flat.OBSTACLE: S - 10}, policy=policy)
+        assert (decision.outcome, decision.valid_until_us) == (ALLOW, AT + left)
+
+
 def test_an_unknown_confirm_needs_an_approval_too() -> None:
     rules = (rule(PERMIT), rule(CONFIRM, when=MAYBE, approver=SUPERVISOR, within_us=30 * S))
     policy = with_rules(*rules)
@@ -267,6 +285,7 @@ def test_a_refusal_outweighs_what_is_awaited() -> None:
 def test_phase(phases: int, current: int, outcome: Outcome, reason: Reason) -> None:
     decision = ask(replace(STEP, phases=phases), phase=current)
     assert (decision.outcome, decision.reason) == (outcome, reason)
+    assert decision.step == (8 if outcome is ALLOW else 4)
 
 
 # ----------------------------------------------------------------------------------------------------- 5 timing
@@ -320,6 +339,11 @@ ADMITTED = (ALLOW, Reason.ADMITTED)
         ({"utc_us": ((flat.ISSUED, flat.ISSUED + 10 * MIN),)}, {ADMITTED}),
         ({"utc_us": ((flat.ISSUED - 1, flat.ISSUED),)}, {ADMITTED, (DENY, Reason.ISSUED_IN_FUTURE)}),
         ({"utc_us": ((flat.ISSUED - 2, flat.ISSUED - 1),)}, {(DENY, Reason.ISSUED_IN_FUTURE)}),
+        ({"utc_us": ((flat.ISSUED + 10 * MIN, flat.ISSUED + 11 * MIN),)}, {ADMITTED, (DENY, Reason.EXPIRED)}),
+        (  # to pass one step is not to be admitted
+            {"utc_us": ((flat.ISSUED - 1, flat.ISSUED),), "values": {BATTERY: point(3_000)}},
+            {(DENY, Reason.ISSUED_IN_FUTURE), (FALLBACK, Reason.STATE_VIOLATED)},
+        ),
         (
             {"utc_us": ((NOW.utc_us, NOW.utc_us), (NOW.utc_us + 2, NOW.utc_us + 11 * MIN))},
             {ADMITTED, (DENY, Reason.EXPIRED)},
@@ -335,6 +359,14 @@ ADMITTED = (ALLOW, Reason.ADMITTED)
         (
             {"utc_us": ((flat.ISSUED + 10 * MIN + 10,) * 2,), "utc_error_us": (0, 20)},
             {(DENY, Reason.EXPIRED), (DEFER, Reason.CLOCK_UNCERTAIN)},
+        ),
+        (  # the greatest error alone reaches the last moment
+            {"utc_us": ((flat.ISSUED + 10 * MIN + 20,) * 2,), "utc_error_us": (0, 20)},
+            {(DENY, Reason.EXPIRED), (DEFER, Reason.CLOCK_UNCERTAIN)},
+        ),
+        (
+            {"utc_us": ((flat.ISSUED - 20,) * 2,), "utc_error_us": (0, 20)},
+            {(DENY, Reason.ISSUED_IN_FUTURE), (DEFER, Reason.CLOCK_UNCERTAIN)},
         ),
         ({"values": {BATTERY: interval(3_000, 9_000)}}, {ADMITTED, (FALLBACK, Reason.STATE_VIOLATED)}),
         (  # sound, not exact: that the charge is known once step 6 has passed is forgotten in step 7
@@ -353,10 +385,24 @@ def test_what_is_possible(fields: dict[str, Any], expected: set[tuple[Outcome, R
 
 
 @pytest.mark.parametrize(
+    ("monotonic", "expected"),
+    [
+        ((AT, AT + 2 * S), {ADMITTED}),
+        ((AT + 2 * S, AT + 3 * S), {ADMITTED, (FALLBACK, Reason.NO_SLACK)}),
+        ((AT + 2 * S + 1, AT + 3 * S), {(FALLBACK, Reason.NO_SLACK)}),
+    ],
+)
+def test_the_last_moment_of_a_deadline(monotonic: tuple[int, int], expected: set[Any]) -> None:
+    assert answers(all_of(monotonic_us=monotonic), released_us=AT, remaining_us=0) == expected
+
+
+@pytest.mark.parametrize(
     ("rules", "wind", "expected"),
     [
         ([(FORBID, MAYBE), (PERMIT, YES)], interval(-1, 1), {ADMITTED, (DENY, Reason.FORBIDDEN)}),
         ([(PERMIT, MAYBE)], interval(-1, 1), {ADMITTED, (DENY, Reason.OUT_OF_SCOPE)}),
+        ([(PERMIT, MAYBE), (PERMIT, NO)], interval(-1, 1), {ADMITTED, (DENY, Reason.OUT_OF_SCOPE)}),
+        ([(PERMIT, NO), (PERMIT, MAYBE)], interval(-1, 1), {ADMITTED, (DENY, Reason.OUT_OF_SCOPE)}),
         ([(FORBID, MAYBE), (PERMIT, NO)], maybe(point(0)), {(DENY, Reason.OUT_OF_SCOPE)}),
         (
             [(FORBID, MAYBE), (PERMIT, YES)],

@@ -157,7 +157,13 @@ def test_an_argument_is_asked_about_at_the_moment() -> None:
     """`target inside school`, in a rule: while the school exists."""
     target = flat.clause("target inside city", (Op.ARGUMENT_POINT_IN, 0, flat.CITY))
     step = next(one for one in flat.INVOCATIONS if one.skill == flat.GOTO)
-    for dates, outcome in [((0, UTC - H), Outcome.DENY), ((0, UTC + MIN), Outcome.ALLOW), ((), Outcome.ALLOW)]:
+    for dates, outcome in [
+        ((0, UTC - H), Outcome.DENY),
+        ((0, UTC + ERROR - 1), Outcome.DENY),
+        ((0, UTC + ERROR), Outcome.ALLOW),
+        ((0, UTC + MIN), Outcome.ALLOW),
+        ((), Outcome.ALLOW),
+    ]:
         zones = (replace(flat.ZONES[flat.CITY], dates=dates), *flat.ZONES[1:])
         rules = (flat.rule(RuleKind.PERMIT, flat.GOTO, when=target),)
         policy = loaded(replace(flat.POLICY, zones=zones, rules=rules, airspace=None))

@@ -97,6 +97,44 @@ def test_legs_past_a_circle_of_one_metre(leg: tuple[int, int, int, int], answer:
     assert PreparedZone(0, zone).along(there, (0, 0, 0, 0)) == answer
 
 
+@pytest.mark.parametrize(
+    ("path", "answer"),
+    [
+        ((5, 0), F),  # on the circle
+        ((3, -4), F),
+        ((3, -3), T),
+        ((0, 0, 4, 2), T),
+        ((0, 0, 4, 3), T | F),  # ends on it
+        ((-3, 4, 0, 0), T | F),
+    ],
+)
+def test_the_circle_itself_is_outside(path: tuple[int, ...], answer: int) -> None:
+    zone = Zone("c", CIRCLE, LOWEST, HIGHEST, (0, 0, 25))
+    assert PreparedZone(0, zone).along(path, (0, 0, 0, 0)) == answer
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+@pytest.mark.parametrize(
+    ("east", "reach", "answer"),
+    [
+        (-1_040, (0, 50), T | F),  # reaches in
+        (-1_060, (0, 50), F),
+        (980, (0, 50), T | F),  # reaches out
+        (980, (50, 0), T),
+        (-980, (50, 0), T | F),
+        (949, (50, 50), T),
+        (950, (50, 50), T | F),
+    ],
+)
+def test_a_box_that_reaches_to_one_side(turn: int, east: int, reach: tuple[int, int], answer: int) -> None:
+    """Of a circle of one metre, from west and east, and turned to the other points of the compass."""
+    x, y, west, south, east_side, north = east, 0, -reach[0], 0, reach[1], 0
+    for _ in range(turn):
+        x, y, west, south, east_side, north = -y, x, -north, west, -south, east_side
+    zone = Zone("c", CIRCLE, LOWEST, HIGHEST, (0, 0, 1_000 * 1_000))
+    assert PreparedZone(0, zone).along((x, y), (west, south, east_side, north)) == answer
+
+
 def check_circle(zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]) -> None:
     """Exact inside; outside it may say both when the leg comes nearer than 3 mm and the difference of box and disc."""
     answer = PreparedZone(0, zone).along((*a, *b), box)
@@ -149,6 +187,8 @@ def test_by_hand(path: tuple[int, ...], answer: int) -> None:
 )
 def test_a_slanted_edge_is_outside(point: tuple[int, int], answer: int) -> None:
     assert PreparedZone(0, polygon(0, 0, 10, 0, 0, 10)).along(point, (0, 0, 0, 0)) == answer
+    mirrored = (10 - point[0], point[1])  # now it is the western edge
+    assert PreparedZone(0, polygon(0, 0, 10, 0, 10, 10)).along(mirrored, (0, 0, 0, 0)) == answer
 
 
 @pytest.mark.parametrize(

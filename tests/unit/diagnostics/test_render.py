@@ -2,12 +2,14 @@
 
 import json
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics import excerpt as excerpts
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label
-from rtshcua.diagnostics.excerpt import MAX_WIDTH, TAB_WIDTH, excerpt
+from rtshcua.diagnostics.excerpt import MAX_WIDTH, NEAR, TAB_WIDTH, excerpt
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.serialise import FORMAT, VERSION, as_json
 from rtshcua.diagnostics.span import Source, Span
@@ -51,6 +53,17 @@ def test_a_long_line_is_cut_around_the_span() -> None:
     assert line.endswith("...")
     assert line[underline.index("^") : underline.rindex("^") + 1] == "here"
     assert len(line) <= MAX_WIDTH + 6
+
+
+def test_of_a_very_long_line_only_what_is_near_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred findings on one line of a megabyte are shown as fast as on short lines."""
+    looked_at: list[str] = []
+    monkeypatch.setattr(excerpts, "_cell", lambda character: looked_at.append(character) or (character, 1))
+    line, underline = shown("x" * 500_000 + "here" + "y" * 500_000, 500_000, 500_004)
+    assert line[underline.index("^") : underline.rindex("^") + 1] == "here"
+    assert line.startswith("...")
+    assert line.endswith("...")
+    assert len(looked_at) == 2 * NEAR
 
 
 def test_nothing_reaches_the_terminal_that_it_would_obey() -> None:
@@ -129,3 +142,16 @@ def test_json_has_every_key_and_the_format_of_the_registry() -> None:
     assert first["pointer"] == "/a"
     assert second["at"] is None
     assert set(first) == set(second)
+
+
+def test_what_is_labelled_on_a_long_line_is_in_view() -> None:
+    line = "first" + " x" * 100 + " second" + " y" * 100 + " third"
+    places = [line.index(word) for word in ("first", "second", "third")]
+    spans = [Span("a.rts", at, at + 5) for at in places]
+    found = Diagnostic(codes.SYNTAX, "bad", spans[1], labels=(Label(spans[0], "one"), Label(spans[2], "three")))
+    lines = render([found], {"a.rts": Source("a.rts", line)}).splitlines()
+    for word, mark in (("secon", "^^^^^"), ("first", "----- one"), ("third", "----- three")):
+        at = next(number for number, each in enumerate(lines) if each.endswith(mark))
+        column = lines[at].index(mark)
+        assert lines[at - 1][column : column + 5] == word
+        assert len(lines[at - 1]) < 130

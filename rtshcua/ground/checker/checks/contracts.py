@@ -8,6 +8,7 @@ from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import DURATION, HEIGHT, POSITION, SPEED, ZONE, Kind, Type
 from rtshcua.model.flat.contract import TimingClass
 from rtshcua.model.flat.limits import FULL
+from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import Motion, SkillDecl
 from rtshcua.model.quantity import Dimension
@@ -31,13 +32,23 @@ def check(context: Context) -> None:
             quantity(context, field, Dimension.DURATION)
         quantity(context, skill.grace, Dimension.DURATION, positive=False)
         quantity(context, skill.energy, Dimension.RATIO, positive=False)
-        if skill.energy is not None and skill.energy.value > FULL:
-            context.report.add(codes.NUMBER_SIZE, skill.energy.span, "a skill takes at most 100 % of the energy")
+        more_than_full(context, skill.energy, "skill")
         if skill.motion is not None:
             _motion(context, skill, skill.motion)
         scope = context.scope_of(skill)
         for clause in (*skill.require, *skill.assume, *skill.maintain):
             check_condition(scope, clause.condition)
+
+
+def more_than_full(context: Context, energy: Quantity | None, what: str) -> None:
+    """Report a share of the energy that no battery has."""
+    if energy is not None and energy.dimension is Dimension.RATIO and energy.value > FULL:
+        context.report.add(
+            codes.BEYOND_VEHICLE,
+            energy.span,
+            f"the {what} may take `{context.report.text(energy.span)}`, and a full battery has 100 %",
+            help="write what it takes at most, as a share of a full battery and with the reserve left over",
+        )
 
 
 def _complete(context: Context, skill: SkillDecl) -> None:

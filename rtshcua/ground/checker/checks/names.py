@@ -6,6 +6,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context, Parametric
 from rtshcua.ground.checker.scope import PHASE
+from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import SkillDecl
@@ -15,13 +16,15 @@ def check(context: Context) -> None:
     """Report every name that is declared twice, or that hides another."""
     symbols, report = context.symbols, context.report
     for first, again in symbols.duplicates:
-        kind = symbols.kind_of(first.name.text)
+        nearer, other, words = again, first, "first declared here"
+        if first.span.file != again.span.file:  # a file is reached before what it imports, which is not at fault
+            nearer, other, words = first, again, "also declared here"
         report.add(
             codes.DUPLICATE_NAME,
-            again.name.span,
-            f"`{again.name.text}` is declared twice",
+            nearer.name.span,
+            f"`{nearer.name.text}` is declared twice",
             help="give it another name: one name has one meaning, whatever it is declared as",
-            labels=[(first.name.span, f"first declared here, as {kind}")],
+            labels=[(other.name.span, f"{words}, as {WORDS[type(other)]}")],
         )
     enumerators = {member.name.text: enum for enum in symbols.enums.values() for member in enum.members}
     for enum in symbols.enums.values():

@@ -4,11 +4,10 @@ Shorter times, more energy kept ready, fewer phases; clauses and kinds of eviden
 """
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.checks.contracts import RECORDS
+from rtshcua.ground.checker.checks.contracts import RECORDS, more_than_full
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of, quantity
-from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Overrides
 from rtshcua.model.ir.skills import SkillDecl
@@ -24,8 +23,7 @@ def check_overrides(context: Context, skill: SkillDecl, overrides: Overrides) ->
         quantity(context, field, Dimension.DURATION)
     quantity(context, overrides.grace, Dimension.DURATION, positive=False)
     quantity(context, overrides.energy, Dimension.RATIO, positive=False)
-    if overrides.energy is not None and overrides.energy.value > FULL:
-        context.report.add(codes.NUMBER_SIZE, overrides.energy.span, "a step takes at most 100 % of the energy")
+    more_than_full(context, overrides.energy, "step")
     _shorter(context, skill, overrides)
     _phases(context, skill, overrides)
     for name in overrides.record:

@@ -4,9 +4,13 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.context import Context, Parametric
 from rtshcua.ground.checker.fields import size
+from rtshcua.ground.checker.fitting import declaration_labels
+from rtshcua.ground.checker.parts import walk
+from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
 from rtshcua.ground.checker.values import whole_range
+from rtshcua.model.ir.expression import Range, Reference
 from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import Parameter
 
@@ -42,17 +46,25 @@ def check(context: Context) -> None:
                 before = len(context.report.found)
                 ends = whole_range(scope, parameter.range, argument.type)
                 if ends is None and len(context.report.found) == before:
-                    context.report.add(
-                        codes.BAD_PARAMETER,
-                        parameter.range.span,
-                        "both ends of a parameter's range are written out",
-                        help="write numbers with their units",
-                    )
+                    _unknown_end(scope, parameter.range)
                 elif ends is not None and argument.type.dimension is not None:
                     for end, number in zip((parameter.range.low, parameter.range.high), ends, strict=True):
                         size(context, end, argument.type.dimension, number)
             if parameter.default is not None:
                 bind_value(scope, argument, parameter.default)
+
+
+def _unknown_end(scope: Scope, range: Range) -> None:
+    """Report the ends of a range that are read in flight, or are an argument."""
+    for end in (range.low, range.high):
+        if any(isinstance(part, Reference) for part in walk(end)):
+            scope.report.add(
+                codes.NOT_CONSTANT,
+                end.span,
+                f"a range is known before the flight, and `{scope.report.text(end.span)}` is not",
+                help="write both ends as numbers with their units; ask for the rest in a `require` clause or a rule",
+                labels=declaration_labels(scope, end),
+            )
 
 
 def _types(owner: type[Parametric]) -> str:

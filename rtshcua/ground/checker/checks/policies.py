@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.chains import check_chain, check_link
+from rtshcua.ground.checker.chains import check_chain, check_end, check_link
 from rtshcua.ground.checker.conditions import check_condition, references
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of, quantity
@@ -61,7 +61,9 @@ def _rule(context: Context, rule: Rule) -> None:
     if rule.kind == "confirm":
         _confirm(context, rule)
     if rule.target is not None:
-        check_link(context, rule.target)
+        target = check_link(context, rule.target)
+        if target is not None:
+            check_end(context, rule.target, target)
     if rule.when is not None and len(skills) == len(rule.skills):
         shared = shared_arguments(context, rule, skills)
         if shared is not None:

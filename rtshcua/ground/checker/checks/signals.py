@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.dialect import DATUM, UNITS, Field
+from rtshcua.ground.checker.dialect import DATUM, UNITS, Field, Message
 from rtshcua.ground.checker.fields import quantity, size
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.symbols import suggestion
@@ -106,8 +107,9 @@ def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Ty
                 codes.UNKNOWN_FIELD,
                 name.span,
                 f"`{source.message.text}` has no field `{name.text}`",
-                help=suggestion(name.text, message.fields)
-                or "its fields are " + ", ".join(f"`{each}`" for each in message.fields),
+                help=" ".join(
+                    filter(None, (suggestion(name.text, message.fields, source.message.text), _fields(message)))
+                ),
             )
         elif field.length or field.type == "char":
             report.add(
@@ -119,6 +121,10 @@ def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Ty
         else:
             _field(context, signal, source, name, field, type)
             _sentinels(context, signal, field)
+
+
+def _fields(message: Message) -> str:
+    return f"its fields are {listed(message.fields)}"
 
 
 def _count(context: Context, signal: SignalDecl, source: SignalSource, type: Type | None) -> bool:
@@ -149,6 +155,8 @@ def _field(
     elif type is not None and type.kind is Kind.ENUMERATION:
         enum = context.symbols.enums[signal.type.text]
         mirrored = None if enum.dialect is None else enum.dialect.text
+        if mirrored is not None and mirrored not in context.dialect.enums:
+            return  # reported where it is declared
         if field.unit or field.type in ("float", "double") or (mirrored is not None and field.enum != mirrored):
             has = f"has values of `{field.enum}`" if field.enum else "has no enumeration"
             help = (
@@ -214,7 +222,9 @@ def _sentinels(context: Context, signal: SignalDecl, field: Field) -> None:
                 codes.UNKNOWN_AT,
                 name.span,
                 f"`{name.text}` is no value of a field of type `{field.type}`",
-                help=suggestion(name.text, members) or f"its values go from {low} to {high}",
+                help=suggestion(name.text, members)
+                or (f"its values are {listed(members)}; as numbers they " if members else "its values ")
+                + f"go from {low} to {high}",
             )
 
 

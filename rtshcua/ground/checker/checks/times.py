@@ -18,7 +18,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.overrides import DEFAULT_GRACE_US
 from rtshcua.ground.checker.context import Context
 from rtshcua.model.ir.expression import Quantity
-from rtshcua.model.ir.missions import Overrides
+from rtshcua.model.ir.missions import Overrides, Step
+from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import Rule
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
@@ -46,6 +47,7 @@ def check(context: Context) -> None:
             for step in phase.steps:
                 skill_of = context.symbols.skills.get(step.skill.text)
                 if step.overrides is not None and skill_of is not None:
+                    _awaited(context, mission.policy, step)
                     _coherent(context, _overridden(_of(skill_of), _of(step.overrides)), _of(step.overrides))
     for policy in context.symbols.policies.values():
         for rule in policy.rules:
@@ -129,6 +131,27 @@ def _approval(context: Context, rule: Rule) -> None:
                 f"{_words(validity)}",
                 help=f"at most `{_words(validity)}` fits",
                 labels=[(validity.span, "does not fit with this")],
+            )
+
+
+def _awaited(context: Context, policy: Name, step: Step) -> None:
+    """An approval that a step's own validity does not leave time for, where its skill's does."""
+    under, skill = context.symbols.policies.get(policy.text), context.symbols.skills.get(step.skill.text)
+    own = None if step.overrides is None else _time(step.overrides.validity)
+    if under is None or skill is None or own is None:
+        return
+    for rule in under.rules:
+        if rule.kind != "confirm" or step.skill.text not in [name.text for name in rule.skills]:
+            continue
+        within, validity = _time(rule.within), _time(skill.validity)
+        if within is not None and within.value > own.value and (validity is None or within.value <= validity.value):
+            context.report.add(
+                codes.INCOHERENT_TIMING,
+                own.span,
+                f"an approval is awaited for {_words(within)}, and the decision on this step is valid for "
+                f"{_words(own)}",
+                help=f"at least `{_words(within)}` fits",
+                labels=[(within.span, "does not fit with this")],
             )
 
 

@@ -28,6 +28,7 @@ def check(context: Context) -> None:
             )
         elevation(context, vehicle.elevation)
         quantity(context, vehicle.elevation_within, Dimension.LENGTH, positive=False)
+        quantity(context, vehicle.return_altitude, Dimension.ALTITUDE, positive=False)
         offset = vehicle.utc_offset
         if offset is not None and abs(offset.value) > MAX_OFFSET_US:
             context.report.add(codes.NUMBER_SIZE, offset.span, "local times are at most 14 h before or after UTC")

@@ -7,7 +7,7 @@ from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.fields import height, on_globe, quantity
 from rtshcua.ground.checker.polygons import Corner, contained, contains, crossing, tangled
 from rtshcua.ground.checker.report import Report
-from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
+from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES, meridian
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, Corridor, GeoJson, Polygon, ZoneDecl
 from rtshcua.model.quantity import Dimension
@@ -59,7 +59,7 @@ def _geojson(context: Context, shape: GeoJson) -> None:
 
 def _corridor(context: Context, shape: Corridor) -> None:
     before = len(context.report.found)
-    quantity(context, shape.width, Dimension.LENGTH)
+    quantity(context, shape.width, Dimension.LENGTH, positive=False)
     for point in shape.points:
         on_globe(context, point)
     if len(context.report.found) > before:
@@ -72,7 +72,7 @@ def _corridor(context: Context, shape: Corridor) -> None:
             help="all places within a distance of a single one are a `circle`",
         )
     for a, b in zip(shape.points, shape.points[1:], strict=False):
-        if _corner(a) == _corner(b):
+        if _corner(a, a) == _corner(b, a):
             context.report.add(
                 codes.BAD_CORRIDOR,
                 b.span,
@@ -82,7 +82,10 @@ def _corridor(context: Context, shape: Corridor) -> None:
             )
     if shape.width.value < LEAST_WIDTH:
         context.report.add(
-            codes.BAD_CORRIDOR, shape.width.span, "the corridor is too narrow to fly in", help="at least 10 cm"
+            codes.BAD_CORRIDOR,
+            shape.width.span,
+            "the corridor has no width" if shape.width.value == 0 else "the corridor is too narrow to fly in",
+            help="write how wide it is from edge to edge, at least `10 cm`",
         )
 
 
@@ -101,15 +104,15 @@ def _polygon(context: Context, zone: ZoneDecl, shape: Polygon) -> None:
         return
     if not _holes(context, zone, shape):
         return
-    placed = [[_corner(each) for each in ring] for ring in rings]
-    if zone.entry is not None and zone.shape is shape and not contained(placed, _corner(zone.entry)):
+    placed = [_corners(shape, ring) for ring in rings]
+    if zone.entry is not None and zone.shape is shape and not contained(placed, _corner(zone.entry, shape.corners[0])):
         entry_outside(context.report, zone)
 
 
 def _ring(context: Context, zone: ZoneDecl, shape: Polygon, ring: tuple[Coordinates, ...]) -> bool:
     """Whether a ring of a polygon is simple."""
     report = context.report
-    corners = [_corner(each) for each in ring]
+    corners = _corners(shape, ring)
     what, whole = ("polygon", shape.span) if ring is shape.corners else ("hole", ring[0].span)
     if len(corners) < 3:
         report.add(
@@ -147,7 +150,7 @@ def _ring(context: Context, zone: ZoneDecl, shape: Polygon, ring: tuple[Coordina
 def _holes(context: Context, zone: ZoneDecl, shape: Polygon) -> bool:
     """Whether all holes lie in the polygon, and apart from each other."""
     rings = (shape.corners, *shape.holes)
-    placed = [[_corner(each) for each in ring] for ring in rings]
+    placed = [_corners(shape, ring) for ring in rings]
     met = tangled(placed)
     if met is not None:
         (one, i), (other, j) = met
@@ -163,8 +166,9 @@ def _holes(context: Context, zone: ZoneDecl, shape: Polygon) -> bool:
         )
         return False
     for number, hole in enumerate(shape.holes):
-        around = [each for i, each in enumerate(placed[1:]) if i != number and contains(each, _corner(hole[0]))]
-        if around or not contains(placed[0], _corner(hole[0])):
+        first = placed[1 + number][0]
+        around = [each for i, each in enumerate(placed[1:]) if i != number and contains(each, first)]
+        if around or not contains(placed[0], first):
             context.report.add(
                 codes.BAD_POLYGON,
                 hole[0].span,
@@ -188,5 +192,10 @@ def entry_outside(report: Report, zone: ZoneDecl) -> None:
     )
 
 
-def _corner(place: Coordinates) -> Corner:
-    return place.longitude, place.latitude
+def _corners(shape: Polygon, ring: tuple[Coordinates, ...]) -> list[Corner]:
+    return [_corner(each, shape.corners[0]) for each in ring]
+
+
+def _corner(place: Coordinates, near: Coordinates) -> Corner:
+    """A place in the plane of longitudes and latitudes around another, across longitude 180 where that is shorter."""
+    return meridian(place.longitude, near.longitude), place.latitude

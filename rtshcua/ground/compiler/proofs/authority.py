@@ -105,7 +105,10 @@ def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, ca
     report, flat = ground.context.report, invocation.invocation
     names = list(dict.fromkeys(name for unmet in nearest for name in unmet.parameters))
     span = argument_span(ground.context, step, names[0]) if names else step.span
-    written = "" if span == step.span else f" = {report.text(span)}"
+    default = _default(ground, step, names[0]) if names and span == step.span else None
+    written = (
+        f" = {report.text(span if default is None else default)}" if names and (default or span != step.span) else ""
+    )
     subject = f"`{names[0]}{written}`" if names else f"`{flat.contract.name}`"
     accepted = {each.subject: "` or `".join(_words(each)) for unmet in nearest for each in unmet.accepted}
     fix = None
@@ -119,9 +122,18 @@ def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, ca
         help="nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in accepted.items())
         if accepted
         else None,
-        labels=[(unmet.span, "this does not hold") for unmet in nearest],
+        labels=[
+            *((unmet.span, "this does not hold") for unmet in nearest),
+            *(() if default is None else ((default, "the step says nothing, so this default holds"),)),
+        ],
         fix=fix,
     )
+
+
+def _default(ground: Ground, step: Step, parameter: str) -> Span | None:
+    """Where the default of a parameter is written."""
+    skill = ground.context.symbols.skills[step.skill.text]
+    return next((p.default.span for p in skill.parameters if p.name.text == parameter and p.default is not None), None)
 
 
 def _words(offer: Offer) -> list[str]:

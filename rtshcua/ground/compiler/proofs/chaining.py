@@ -27,13 +27,12 @@ ON_GROUND, IN_AIR = 1, 2
 _ALOFT = {MotionKind.FLY: "flies somewhere", MotionKind.COVER: "flies a survey", MotionKind.HOLD: "holds in the air"}
 
 
-def prove(
+def aloft(
     ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], before: Sequence[Step]
 ) -> tuple[Place, ...]:
-    """Where of `starts` a step finds what it needs, nowhere after a finding: the first thing that it lacks.
+    """All of `starts` if the vehicle can do there what a step does, nowhere after a finding: that it is on the ground.
 
-    The first of `starts` is where it begins when no step `before` was skipped. That a vehicle on the ground cannot hold
-    or fly there is not asked when the step is admitted, so `skip` does not help against that.
+    That it cannot hold or fly there is not asked when the step is admitted, so `skip` does not help against that.
     """
     flat = invocation.invocation
     for start in starts:
@@ -42,16 +41,19 @@ def prove(
             assert motion is not None
             words = f"`{flat.contract.name}` {_ALOFT[MotionKind(flat.plan.kind)]}"
             skipped = [] if start is starts[0] else before
-            _report(
-                ground,
-                step,
-                start,
-                words,
-                (motion.span, "its motion"),
-                skipped,
-                "let a step before it climb, as `takeoff` does",
-            )
+            help = "let a step before it climb, as `takeoff` does"
+            _report(ground, step, start, words, (motion.span, "its motion"), skipped, help)
             return ()
+    return tuple(starts)
+
+
+def prove(
+    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], before: Sequence[Step]
+) -> tuple[Place, ...]:
+    """Where of `starts` a step finds what it needs, nowhere after a finding: the first thing that it lacks.
+
+    The first of `starts` is where it begins when no step `before` was skipped.
+    """
 
     def finds(start: Place) -> None:
         clause = _lacking(ground, invocation, start)

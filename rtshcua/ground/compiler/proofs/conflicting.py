@@ -1,8 +1,10 @@
 """E0721, E0723: degrade rules that another always comes before.
 
-The first `degrade` that matches and whose target may fly is the one that flies. Two rules with the same condition are
-so a chain. But a narrower rule after a wider one is not what its author means: where it matches, the wider one flies.
-If nothing can keep the wider one's target from flying, the narrower one never does.
+The first `degrade` that matches and whose target may fly is the one that flies. A narrower rule after a wider one is
+not what its author means: where it matches, the wider one flies. Nor are two with one condition: they ask for different
+things at once, and what follows a target that cannot fly is said by a chain. If nothing can keep the first one's target
+from flying, the other never does. Rules that merely overlap are left alone: which of them comes first says what matters
+more.
 """
 
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
@@ -15,7 +17,7 @@ from rtshcua.model.flat.policy import RuleKind
 
 
 def prove(rules: Ruleset, alive: list[Group]) -> None:
-    """Report each degrade rule that comes after a wider one to another target."""
+    """Report each degrade rule that comes after one to another target that is wider, or has the same condition."""
     degrades = [group for group in alive if group.kind == RuleKind.DEGRADE]
     for at, later in enumerate(degrades):
         for earlier in degrades[:at]:
@@ -24,8 +26,9 @@ def prove(rules: Ruleset, alive: list[Group]) -> None:
 
 
 def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
-    """Whether one rule matches wherever another, which is narrower, does; reports it."""
+    """Whether one rule matches wherever another does; reports it."""
     witness: tuple[Yes, int] | None = None
+    narrower = False
     target = rules.rule(earlier.rules[0]).target
     assert target is not None
     always = not rules.policy.contracts[target.skill].require
@@ -39,10 +42,10 @@ def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
             before = _before(rules, earlier, number, skill)
             if before is None:
                 return False
-            wider = rules.ask([(before, TRUE), (number, FALSE | UNKNOWN)], skill)
-            if isinstance(wider, Yes) and witness is None:
-                both = rules.ask([(number, TRUE)], skill)
-                witness = (both, skill) if isinstance(both, Yes) else None
+            narrower = narrower or isinstance(rules.ask([(before, TRUE), (number, FALSE | UNKNOWN)], skill), Yes)
+            both = rules.ask([(number, TRUE)], skill)
+            if witness is None and isinstance(both, Yes):
+                witness = both, skill
     if witness is None:
         return False
     policy = rules.policy
@@ -54,9 +57,8 @@ def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
         "this `degrade` never decides: wherever it matches, an earlier one does too"
         if always
         else f"at {situation} an earlier `degrade` matches too, and it is the one that decides",
-        help=f"write the narrower rule first; at {situation} `{name}` flies"
-        if always
-        else f"write the narrower rule first; now `{name}` flies there, if it may",
+        help=("write the narrower rule first" if narrower else "delete one of them, or tell their conditions apart")
+        + (f"; at {situation} `{name}` flies" if always else f"; now `{name}` flies there, if it may"),
         labels=[(earlier.span, "this comes first")],
     )
     return True
@@ -73,11 +75,11 @@ def _before(rules: Ruleset, earlier: Group, number: int, skill: int) -> int | No
     later, matching = rules.rule(number), rules.ask([(number, TRUE)], skill)
     for candidate in earlier.rules:
         rule = rules.rule(candidate)
-        if rule.target is None or later.target is None or _same(rule.target, later.target):
+        if rule.target is None or later.target is None or same(rule.target, later.target):
             continue
         if skill not in rules.skills(candidate):
             continue
-        if not _covers(rule.roles, later.roles) or not _covers(rule.sources, later.sources):
+        if not covers(rule.roles, later.roles) or not covers(rule.sources, later.sources):
             continue
         condition = rules.ground.prepared.compiler.condition(rule, candidate)
         if isinstance(matching, Yes) and condition(matching.witness.at) != TRUE:
@@ -87,10 +89,11 @@ def _before(rules: Ruleset, earlier: Group, number: int, skill: int) -> int | No
     return None
 
 
-def _same(one: Link, other: Link) -> bool:
+def same(one: Link, other: Link) -> bool:
+    """Whether two links fly the same."""
     return (one.skill, one.arguments) == (other.skill, other.arguments)
 
 
-def _covers(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
+def covers(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
     """Whether a list of roles or sources, where none means any, has all of another."""
     return not wider or (bool(narrower) and set(narrower) <= set(wider))

@@ -45,7 +45,10 @@ def prove(ground: Ground) -> None:
             f"these parts of `{contract.name}` never hold together",
         )
         airspace = list(_airspace(ground)) if number in permitted else []
+        before = len(ground.context.report.found)
         _together(ground, [*airspace, *parts], space, ("skill", number), together, [(name, "the skill")], name)
+        if any(found.code is codes.CONTRADICTION for found in ground.context.report.found[before:]):
+            ground.impossible.add(number)
 
 
 def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
@@ -57,6 +60,11 @@ def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> No
     key = ("step", flat.skill, invocation.arguments, tuple(clause.code for clause in clauses))
     if isinstance(ground.questions.known(key), Yes):
         return
+    if step.overrides is not None:
+        skills = ground.prepared.policy.contracts[flat.skill]
+        known = {clause.span for clause in _clauses(ground, skills)}
+        own = [part for part in _clauses(ground, flat.contract) if part.span not in known]
+        _vacuous(ground, flat.contract, own, ground.questions.space(flat.skill))
     space = ground.questions.space(flat.skill)._replace(arguments=invocation.arguments)
     parts = [*_clauses(ground, flat.contract), *_airspace(ground)]
     name = flat.contract.name

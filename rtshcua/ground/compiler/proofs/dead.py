@@ -1,6 +1,7 @@
 """E0720: rules whose condition can never hold, whatever is asked for, by whom, and in what state.
 
-A forbid and a confirm rule act too where their condition is unknown, so they are dead only if it can be neither.
+A forbid and a confirm rule act too where their condition is unknown: they may then defer a step, but never do what they
+say, so they are reported too.
 """
 
 from collections.abc import Iterator
@@ -18,14 +19,9 @@ from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.expression import Condition
 
 
-def acting(kind: int) -> Truth:
-    """The truths of its condition with which a rule of a kind does something."""
-    return TRUE | UNKNOWN if kind in (RuleKind.FORBID, RuleKind.CONFIRM) else TRUE
-
-
 def dead(rules: Ruleset, group: Group) -> bool:
     """Whether a rule is dead; reports it."""
-    wanted = acting(group.kind)
+    wanted: Truth = TRUE
     open_: str | None = None
     for number in group.rules:
         for skill in rules.skills(number):
@@ -45,10 +41,24 @@ def dead(rules: Ruleset, group: Group) -> bool:
         last.span,
         f"this `{group.declared.kind}` can never match: "
         + ("what it asks for cannot all hold at once" if others else "this cannot hold"),
-        help="change the condition, or delete the rule",
+        help="change the condition, or delete the rule"
+        + (
+            f"; it can only be unknown, and then it defers what it is to {group.declared.kind}"
+            if _defers(rules, group)
+            else ""
+        ),
         labels=[*others, *_ranges(rules, group, conflict)],
     )
     return True
+
+
+def _defers(rules: Ruleset, group: Group) -> bool:
+    """Whether a rule whose condition is never true may still defer, for it may be unknown."""
+    return group.kind in (RuleKind.FORBID, RuleKind.CONFIRM) and any(
+        not isinstance(rules.ask([(number, UNKNOWN)], skill), No)
+        for number in group.rules
+        for skill in rules.skills(number)
+    )
 
 
 def _ranges(rules: Ruleset, group: Group, conflict: list[Condition]) -> Iterator[tuple[Span, str]]:

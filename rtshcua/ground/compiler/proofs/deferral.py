@@ -3,14 +3,17 @@
 A deferral for an approval is bounded by the rule's `within` (E0707 asks for it, E0806 that it fits the validity), one
 for a phase by the mission itself (E0803). What remains is UNKNOWN: of a signal, which a report resolves, or of a
 temporal monitor, which time resolves. Each must be able to before the deadline. A reflex does not wait: what is unknown
-to it falls back at once or within its 200 ms, as it should; but no person can approve it in that time.
+to it falls back at once or within its 200 ms, as it should; but no person can approve it in that time, nor anything in
+less than `PERSON_US`. A step's own block may make its contract's deadline shorter, so each such step is asked again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 
 from rtshcua.decision import tree
+from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.decision.reads import slots_read
+from rtshcua.decision.truth import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.rates import RATES, arrives, interval, signal_of
@@ -23,6 +26,11 @@ from rtshcua.model.flat.signal import Signal
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
+#: no person sees what is asked, judges it and answers in less, us
+PERSON_US = 2_000_000
+#: us, longer than anything lasts
+NEVER = 1 << 62
+
 
 def prove(ground: Ground) -> None:
     """Report the deferrals of each skill that no report can end, and approvals that come too late by their nature."""
@@ -34,20 +42,56 @@ def prove(ground: Ground) -> None:
             _approved(ground, number, contract)
             continue
         watched = {signal.name for signal in _signals(ground, (*contract.assume, *contract.maintain))}
-        forbids = tuple(
-            rule.when
-            for rule in policy.rules
-            if rule.kind == RuleKind.FORBID and rule.when is not None and number in (rule.skills or (number,))
-        )
-        for clause in (*contract.require, *contract.assume, *contract.maintain, *forbids):
-            for signal in _signals(ground, (clause,)):
-                if not arrives(signal):
-                    if signal.name not in watched | reported:  # else it is E1201
-                        reported.add(signal.name)
-                        _never(ground, signal, clause)
-                elif interval(signal, intervals) > contract.deadline_us and contract.name not in reported:
-                    reported.add(contract.name)
-                    _late(ground, contract, signal, clause, intervals)
+        for clause, signal in _awaited(ground, number, contract):
+            if not arrives(signal):
+                if signal.name not in watched | reported:  # else it is E1201
+                    reported.add(signal.name)
+                    _never(ground, signal, clause)
+            elif interval(signal, intervals) > contract.deadline_us and contract.name not in reported:
+                reported.add(contract.name)
+                _late(ground, contract, signal, clause, intervals)
+    _hasty(ground)
+
+
+def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
+    """Report a step whose own deadline or clauses leave its contract no time for a report, as the skill's do not."""
+    flat = invocation.invocation
+    if step.overrides is None or flat.contract.timing_class == TimingClass.REFLEX:
+        return
+    intervals = RATES.intervals(ground.prepared.policy)
+    skills = ground.prepared.policy.contracts[flat.skill]
+    if any(interval(signal, intervals) > skills.deadline_us for _, signal in _awaited(ground, flat.skill, skills)):
+        return  # said of the skill
+    for clause, signal in _awaited(ground, flat.skill, flat.contract):
+        if arrives(signal) and interval(signal, intervals) > flat.contract.deadline_us:
+            own = step.overrides.deadline
+            _late(ground, flat.contract, signal, clause, intervals, step.span if own is None else own.span)
+            return
+
+
+def _awaited(ground: Ground, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
+    """The signals that a decision on a contract may wait for, and what reads them."""
+    forbids = tuple(
+        rule.when
+        for rule in ground.prepared.policy.rules
+        if rule.kind == RuleKind.FORBID and rule.when is not None and number in (rule.skills or (number,))
+    )
+    for clause in (*contract.require, *contract.assume, *contract.maintain, *forbids):
+        for signal in _signals(ground, (clause,)):
+            yield clause, signal
+
+
+def _hasty(ground: Ground) -> None:
+    """Approvals that are awaited for less time than a person takes."""
+    for rule in ground.prepared.policy.rules:
+        if rule.kind == RuleKind.CONFIRM and rule.within_us < PERSON_US:
+            written = ground.lowered.written[rule].within
+            ground.context.report.add(
+                codes.NO_RESOLVER,
+                ground.span(rule) if written is None else written.span,
+                f"an approval is awaited for {_time(rule.within_us)}, and a person takes {_time(PERSON_US)} at least",
+                help=f"wait for `{_time(PERSON_US)}` or longer: 30 s leave time to look",
+            )
 
 
 def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
@@ -59,8 +103,9 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
         contract = invocation.invocation.contract
         latest += approval(ground, invocation) + contract.deadline_us
         for clause in (*contract.require, *contract.assume):
-            window = max(_needed(ground, ground.prepared.compiler.node(clause, contract)), default=0)
-            if window > latest:
+            at = ground.case(invocation).at
+            window = _needed(ground, at, ground.prepared.compiler.node(clause, contract), True)
+            if latest < window < NEVER:
                 ground.context.report.add(
                     codes.NO_RESOLVER,
                     step.span,
@@ -70,18 +115,46 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
                     labels=[(ground.span(clause), "the contract asks for this")],
                 )
                 return
+        if _unpermitted(ground, step, invocation, latest):
+            return
         latest += contract.duration_us
 
 
-def _needed(ground: Ground, node: tree.Node) -> Iterator[int]:
-    """How long must have been observed for a condition to be true, as far as its conjuncts say."""
-    if isinstance(node, tree.Both):
-        yield from _needed(ground, node.left)
-        yield from _needed(ground, node.right)
-    elif isinstance(node, tree.Monitored):
-        monitor = ground.prepared.policy.monitors[node.monitor]
-        if monitor.kind == MonitorKind.FOR_LAST:
-            yield monitor.window_us
+def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
+    """Whether each permit that may cover a step must observe for longer than the flight up to it; reports it."""
+    at, compiler = ground.case(invocation).at, ground.prepared.compiler
+    permits = [permit.rule for permit in invocation.candidates.permits if permit.condition(at) & TRUE]
+    nodes = [(rule, compiler.when(rule)) for rule in permits]
+    needed = [(rule, 0 if node is None else _needed(ground, at, node, True)) for rule, node in nodes]
+    least = min((window for _, window in needed), default=0)
+    if not latest < least < NEVER:
+        return False
+    ground.context.report.add(
+        codes.NO_RESOLVER,
+        step.span,
+        f"nothing permits this step before {_time(least)} were observed, and it begins no later than {_time(latest)} "
+        "after the mission was issued",
+        help="take a shorter window, or ask for it in a later step",
+        labels=[(ground.span(rule), f"this permits it after {_time(window)}") for rule, window in needed],
+    )
+    return True
+
+
+def _needed(ground: Ground, at: Environment, node: tree.Node, wanted: bool) -> int:
+    """How long must have been observed at least for a condition to be true (or false, where that is wanted)."""
+    match node:
+        case tree.Not(operand):
+            return _needed(ground, at, operand, not wanted)
+        case tree.Both(left, right) | tree.Either(left, right):
+            each = _needed(ground, at, left, wanted), _needed(ground, at, right, wanted)
+            return max(each) if isinstance(node, tree.Both) == wanted else min(each)
+        case tree.Monitored(number):
+            monitor = ground.prepared.policy.monitors[number]
+            kind = MonitorKind.FOR_LAST if wanted else MonitorKind.WITHIN_LAST
+            return monitor.window_us if monitor.kind == kind else 0
+        case _:
+            possible = build(node, ground.prepared.tables)(at) & (TRUE if wanted else FALSE)
+            return 0 if possible else NEVER
 
 
 def _signals(ground: Ground, clauses: Sequence[Clause]) -> Iterator[Signal]:
@@ -101,13 +174,20 @@ def _never(ground: Ground, signal: Signal, clause: Clause) -> None:
     )
 
 
-def _late(ground: Ground, contract: Contract, signal: Signal, clause: Clause, intervals: Mapping[str, int]) -> None:
+def _late(
+    ground: Ground,
+    contract: Contract,
+    signal: Signal,
+    clause: Clause,
+    intervals: Mapping[str, int],
+    span: Span | None = None,
+) -> None:
     deadline = ground.context.symbols.skills[contract.name].deadline
     assert deadline is not None
     often = interval(signal, intervals)
     ground.context.report.add(
         codes.NO_RESOLVER,
-        deadline.span,
+        span or deadline.span,
         f"`{contract.name}` waits {_time(contract.deadline_us)} at most, and while `{signal.name}` is unknown its next "
         f"report may take {_time(often)}",
         help=f"let the deadline be {_time(often)} or more, or let `{signal.name}` go stale sooner, so that it is "

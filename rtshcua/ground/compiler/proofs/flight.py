@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.diagnostics import codes
-from rtshcua.ground.compiler.proofs import chaining, charge, last_link, path
-from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after
+from rtshcua.ground.compiler.proofs import chaining, charge, last_link, path, starting
+from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after, may_be_skipped
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.ways import Ways
 from rtshcua.model.ir.missions import MissionDecl, Step
@@ -27,9 +27,13 @@ def prove(
     places: tuple[Place, ...] = (AT_HOME,)
     decided = True
     for number, (step, one) in enumerate(zip(steps, invocations, strict=True)):
-        able = path.prove(ground, step, one, places) if permitted[number] else ()
+        able = places if permitted[number] and one.invocation.skill not in ground.impossible else ()
+        if (able and not may_be_skipped(one)) or not any(place.aloft for place in places):
+            able = chaining.aloft(ground, step, one, able, steps[:number])
+        able = path.prove(ground, step, one, able, steps[:number]) if able else ()
+        able = chaining.aloft(ground, step, one, able, steps[:number])
         able = chaining.prove(ground, step, one, able, steps[:number]) if able else ()
-        if not able:
+        if not able or not (number or starting.prove(ground, step)):
             return
         ways.prove(step, one, able)
         starts.append(able)

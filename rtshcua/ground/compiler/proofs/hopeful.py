@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from rtshcua.decision import tree
 from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.rules import PreparedRule
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space
@@ -26,18 +27,26 @@ def refused(
 
     At most one of each. `given` must hold in them.
     """
-    compiler, candidates = ground.prepared.compiler, invocation.candidates
-    permits = [compiler.when(permit.rule) for permit in candidates.permits]
+    candidates = invocation.candidates
+    permits = [_hoped(ground, permit, True) for permit in candidates.permits]
     if None not in permits:
-        wanting: list[Goal] = [(hopeful(node, True), FALSE | UNKNOWN) for node in permits if node is not None]
+        wanting: list[Goal] = [(node, FALSE | UNKNOWN) for node in permits if node is not None]
         answer = satisfiable([*given, *wanting], space)
         if isinstance(answer, Yes):
             yield answer.witness, None
     for forbid in candidates.forbids:
-        node = compiler.when(forbid.rule)
-        answer = satisfiable([*given, (ALWAYS if node is None else hopeful(node, False), TRUE)], space)
+        node = _hoped(ground, forbid, False)
+        answer = satisfiable([*given, (ALWAYS if node is None else node, TRUE)], space)
         if isinstance(answer, Yes):
             yield answer.witness, forbid.rule
+
+
+def _hoped(ground: Ground, rule: PreparedRule, hope: bool) -> tree.Node | None:
+    key = (rule.number, hope)
+    if key not in ground.hopes:
+        node = ground.prepared.compiler.when(rule.rule)
+        ground.hopes[key] = None if node is None else hopeful(node, hope)
+    return ground.hopes[key]
 
 
 def hopeful(node: tree.Node, hope: bool) -> tree.Node:

@@ -1,14 +1,17 @@
 """E1201, E1203, E0808: what a running skill is watched by can be seen, in time for something to come of it.
 
 A signal that `assume`, `maintain`, a `degrade` rule or a temporal monitor reads must be reported by vehicles, at least
-as often as it goes stale. A `maintain` clause must read something that can change. And a breach, as well as a signal
-that is lost, must be noticed while the skill still runs: from one report to the next (or until the signal is stale and
-the grace is over), then the decision, then one round trip of the command that begins the fallback.
+as often as it goes stale. A clause of `assume` or `maintain` must read something that can change.
+
+And a breach, as well as a signal that is lost, must be noticed while the skill still runs: from one report to the next
+(or until the signal is stale and the grace is over), then the decision, then one round trip of the command that begins
+the fallback. A step's own block may shorten the time or add clauses, so each such step is asked again.
 """
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
+from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.decision.reads import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
@@ -18,6 +21,7 @@ from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
 from rtshcua.model.flat.signal import Signal
+from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 #: `L_rem` as it is assumed on board until it was measured (a test compares them), us
@@ -51,10 +55,33 @@ def prove(ground: Ground) -> None:
         _observable(ground, watched, intervals)
     _windows(ground, intervals)
     for contract in policy.contracts:
-        for clause in contract.maintain:
+        for clause in (*contract.assume, *contract.maintain):
             if _CHANGING.isdisjoint(clause.code[::3]):
                 _unwatched(ground, clause)
-        _reaction(ground, contract, intervals)
+        skill = ground.context.symbols.skills[contract.name]
+        if skill.duration is not None:
+            _reaction(ground, contract, intervals, skill.duration.span)
+
+
+def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
+    """Report what a step's own block makes of its contract, where the skill's alone was found good."""
+    own = step.overrides
+    if own is None:
+        return
+    intervals = RATES.intervals(ground.prepared.policy)
+    flat = invocation.invocation
+    contract, skills = flat.contract, ground.prepared.policy.contracts[flat.skill]
+    watched = (*contract.assume[len(skills.assume) :], *contract.maintain[len(skills.maintain) :])
+    before = {signal.name for clause in _watched(ground) for signal in _signals(ground, clause)}
+    for clause in watched:
+        if _CHANGING.isdisjoint(clause.code[::3]):
+            _unwatched(ground, clause)
+        for signal in _signals(ground, clause):
+            if signal.name not in before:
+                before.add(signal.name)
+                _observable(ground, Watched(signal, ground.span(clause)), intervals)
+    if _late(ground, skills, intervals) is None:
+        _reaction(ground, contract, intervals, step.span if own.duration is None else own.duration.span)
 
 
 def _watched(ground: Ground) -> Iterator[Clause]:
@@ -126,33 +153,48 @@ def _unwatched(ground: Ground, clause: Clause) -> None:
     )
 
 
-def _reaction(ground: Ground, contract: Contract, intervals: Mapping[str, int]) -> None:
-    """Whether a breach and the loss of a signal can both be answered while the skill runs."""
+class _Late(NamedTuple):
+    """The signal that tells of a cause too late, how long it all takes in us, and what that is made of."""
+
+    signal: Signal
+    takes: int
+    what: str
+
+
+def _late(ground: Ground, contract: Contract, intervals: Mapping[str, int]) -> _Late | None:
+    """What cannot be answered while a skill runs: a breach, or the loss of a signal."""
     signals = [signal for signal in _signals(ground, *contract.assume, *contract.maintain) if arrives(signal)]
     lasts = contract.duration_us
     if not signals or not lasts:
-        return
+        return None
     seldom = max(signals, key=lambda signal: interval(signal, intervals))
     late = max(signals, key=lambda signal: signal.stale_us)
     breach = interval(seldom, intervals) + DECIDE_US + ACTUATE_US
     lost = late.stale_us + contract.grace_us + DECIDE_US + ACTUATE_US
     if breach > lasts:
-        signal, takes, what = seldom, breach, f"{_time(interval(seldom, intervals))} until `{seldom.name}` tells"
-    elif lost > max(lasts, BLIND_US):
-        signal, takes = late, lost
+        return _Late(seldom, breach, f"{_time(interval(seldom, intervals))} until `{seldom.name}` tells")
+    if lost > max(lasts, BLIND_US):
         what = f"{_time(late.stale_us)} until `{late.name}` is stale, {_time(contract.grace_us)} of grace"
-    else:
+        return _Late(late, lost, what)
+    return None
+
+
+def _reaction(ground: Ground, contract: Contract, intervals: Mapping[str, int], span: Span) -> None:
+    """Whether a breach and the loss of a signal can both be answered while the skill runs."""
+    late = _late(ground, contract, intervals)
+    if late is None:
         return
-    skill, vehicle = ground.context.symbols.skills[contract.name], ground.prepared.policy.vehicle
-    assert skill.duration is not None
-    metres = display(takes * vehicle.speed // 1_000_000 // 1_000 * 1_000, Dimension.LENGTH)
+    vehicle = ground.prepared.policy.vehicle
+    metres = display(late.takes * vehicle.speed // 1_000_000 // 1_000 * 1_000, Dimension.LENGTH)
+    stale = ground.context.symbols.signals[late.signal.name].stale_after.span
     ground.context.report.add(
         codes.SLOW_REACTION,
-        skill.duration.span,
-        f"`{contract.name}` lasts at most {_time(lasts)}, and a fallback may begin only {_time(takes)} after its cause",
-        help=f"that is {what}, {_time(DECIDE_US)} to decide and {_time(ACTUATE_US)} for the command; at top speed "
+        span,
+        f"`{contract.name}` lasts at most {_time(contract.duration_us)}, and a fallback may begin only "
+        f"{_time(late.takes)} after its cause",
+        help=f"that is {late.what}, {_time(DECIDE_US)} to decide and {_time(ACTUATE_US)} for the command; at top speed "
         f"`{vehicle.name}` flies {metres} meanwhile",
-        labels=[(ground.context.symbols.signals[signal.name].stale_after.span, "this signal is the last to tell")],
+        labels=[(stale, "this signal is the last to tell")],
     )
 
 

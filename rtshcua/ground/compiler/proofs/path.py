@@ -12,13 +12,13 @@ from rtshcua.decision.lasting import longest
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.decision.reads import monitored, slots_read, where
 from rtshcua.decision.safety import ranging
-from rtshcua.decision.state import state
-from rtshcua.decision.truth import EVERYWHERE, FALSE
-from rtshcua.decision.verdict import PASS
+from rtshcua.decision.truth import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.volume import Volume
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.mission import argument_span
 from rtshcua.ground.compiler.proofs.anytime import may_keep
+from rtshcua.ground.compiler.proofs.leaving import breach, path_legs
 from rtshcua.ground.compiler.proofs.places import Place, end, from_home, from_where, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.shapes import Point
@@ -30,21 +30,31 @@ from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 SECOND_US = 1_000_000
+MILLISECOND_US = 1_000
 
 
-def prove(ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place]) -> tuple[Place, ...]:
+def prove(
+    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], before: Sequence[Step]
+) -> tuple[Place, ...]:
     """Report what no state makes possible about a step that may come at any of `starts`; where of these it may begin,
     nowhere after a finding.
+
+    The first of `starts` is where it begins when no step `before` was skipped.
     """
     report = ground.context.report
-    before = len(report.found)
+    already = len(report.found)
     _speed(ground, step, invocation)
-    if len(report.found) > before:
+    if len(report.found) > already:
         return ()
-    able = from_where(ground, invocation, starts, lambda start: _volume(ground, step, invocation, start))
+
+    def flies(start: Place) -> None:
+        skipped = [] if start is starts[0] else [each for each in before if each.on_inadmissible == "skip"]
+        _volume(ground, step, invocation, start, skipped)
+
+    able = from_where(ground, invocation, starts, flies)
     for start in able:
         _duration(ground, step, invocation, start)
-        if len(report.found) > before:
+        if len(report.found) > already:
             return ()
     return able
 
@@ -67,23 +77,27 @@ def _speed(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
     )
 
 
-def _volume(ground: Ground, step: Step, invocation: PreparedInvocation, start: Place) -> None:
+def _volume(ground: Ground, step: Step, invocation: PreparedInvocation, start: Place, skipped: Sequence[Step]) -> None:
     """The planned volume keeps the airspace and what the contract maintains; charge and clauses can suffice."""
     at, volume = planned(ground, invocation, start)
-    airspace = ground.prepared.airspace
+    airspace, policy = ground.prepared.airspace, ground.prepared.policy
+    labels = [(each.span, "this step may be skipped") for each in skipped[-1:]]
     if airspace is not None and EVERYWHERE[may_keep(volume.place, airspace)] == FALSE:
+        path = invocation.invocation.plan.path
+        legs = path_legs([(start.x, start.y), *zip(path[::2], path[1::2], strict=True)])
         ground.context.report.add(
             codes.PATH_OUTSIDE,
             step.span,
-            f"on its way, which begins {from_home(start.x, start.y)}, the vehicle would leave the airspace",
+            f"on its way, which {'may begin' if skipped else 'begins'} {from_home(start.x, start.y)}, the vehicle "
+            f"would {breach(policy, airspace, legs, *volume.height[:2])}",
             help="the leg to where the step begins counts, widened by the vehicle's position error; "
             "go around by further steps",
-            labels=[(ground.span(airspace.airspace), "the airspace")],
+            labels=[(ground.span(airspace.airspace), "the airspace"), *labels],
         )
         return
     clause = _broken(ground, invocation, at, volume)
     if clause is not None:
-        _never(ground, step, clause)
+        _never(ground, step, clause, labels)
         return
     needed = Energy(invocation.invocation.contract, ground.prepared.policy.vehicle).needed(volume.farthest[1])
     if needed > FULL:
@@ -108,10 +122,10 @@ def _broken(ground: Ground, invocation: PreparedInvocation, at: Environment, vol
             truth = EVERYWHERE[truth]
         if truth == FALSE:
             return clause
-    found = state(ground.case(invocation))
-    if found and PASS not in found:
-        broken = found[0].clause
-        return broken if isinstance(broken, Clause) else None
+    case = ground.case(invocation)
+    for clause, condition in (*invocation.require, *invocation.assume):
+        if not condition(case.at) & TRUE:
+            return clause
     return None
 
 
@@ -126,13 +140,14 @@ def _timed(ground: Ground, clause: Clause) -> bool:
     return False
 
 
-def _never(ground: Ground, step: Step, clause: Clause) -> None:
+def _never(ground: Ground, step: Step, clause: Clause, labels: list[tuple[Span, str]]) -> None:
     ground.context.report.add(
         codes.NEVER_HOLDS,
         step.span,
         f"`{clause.text}` cannot hold all along this step",
-        help="change the step's arguments, or where it begins",
-        labels=[(ground.span(clause), "the contract asks for this")],
+        help="change the step's arguments, or where it begins"
+        + (": a step before it may be skipped, and then it begins elsewhere" if labels else ""),
+        labels=[(ground.span(clause), "the contract asks for this"), *labels],
     )
 
 
@@ -156,11 +171,14 @@ def _duration(ground: Ground, step: Step, invocation: PreparedInvocation, start:
     own = None if step.overrides is None else step.overrides.duration
     limit = own or skill.duration
     assert limit is not None
+    lasts = f"`{skill.name.text}` lasts at most {display(allowed, Dimension.DURATION)}"
+    over = -(-(total - allowed) // MILLISECOND_US) * MILLISECOND_US
     ground.context.report.add(
         codes.PLAN_TOO_LONG,
         step.span,
-        f"the step takes at least {display(total // SECOND_US * SECOND_US, Dimension.DURATION)}, and "
-        f"`{skill.name.text}` lasts at most {display(allowed, Dimension.DURATION)}",
+        f"the step takes at least {display(total // SECOND_US * SECOND_US, Dimension.DURATION)}, and {lasts}"
+        if total - allowed >= SECOND_US
+        else f"{lasts}, and the step takes up to {display(over, Dimension.DURATION)} longer",
         help="fly a shorter path, or faster" if flat.plan.path else None,
         labels=[(limit.span, "declared here")],
     )

@@ -1,9 +1,10 @@
 """All proofs, of a policy and of the missions under it."""
 
-from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation
+from rtshcua.decision.prepare import Malformed, prepare
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.space import signals
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.ground.compiler.proofs import (
@@ -18,9 +19,10 @@ from rtshcua.ground.compiler.proofs import (
     last_link,
     observation,
     rules,
+    some_time,
     timing,
 )
-from rtshcua.ground.compiler.proofs.situation import Ground, anything
+from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.ir.missions import MissionDecl
 
@@ -31,7 +33,7 @@ def prove_policy(context: Context, lowered: LoweredPolicy) -> Ground | None:
     if isinstance(prepared, Malformed):
         _refused(context, lowered, prepared)
         return None
-    ground = Ground(context, lowered, prepared, anything(lowered.policy), Questions(prepared))
+    ground = Ground(context, lowered, prepared, tuple(signals(lowered.policy)), Questions(prepared))
     for proof in (chains, last_link, deferral, observation, contradiction, delegations, rules):
         proof.prove(ground)
     return ground
@@ -41,7 +43,7 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     """The proofs of a mission under a policy."""
     prepared: list[PreparedInvocation] = []
     for invocation in mission.invocations:
-        found = prepare_invocation(invocation, ground.prepared, mission.phases)
+        found = ground.prepare(invocation, mission.phases)
         if isinstance(found, Malformed):
             _refused(ground.context, ground.lowered, found)
             return
@@ -56,7 +58,13 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
                 contradiction.prove_step(ground, step, one)
     if all(permitted):
         between.prove(ground, declared, steps, prepared)
-        hours.prove(ground, steps, prepared)
+        if mission.issued_at_us:
+            hours.prove(ground, steps, prepared)
+        else:
+            some_time.prove(ground, steps, prepared)
+    for step, one in zip(steps, prepared, strict=True):
+        deferral.prove_step(ground, step, one)
+        observation.prove_step(ground, step, one)
     timing.prove(ground, steps, prepared)
     deferral.prove_mission(ground, steps, prepared)
 

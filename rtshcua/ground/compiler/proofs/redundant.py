@@ -2,7 +2,8 @@
 
 A permit never decides where some forbid is true wherever it is. A permit says nothing further where some other permit
 is true wherever it is; a forbid, where some other forbid is, and where wherever it is unknown another is true or
-unknown. Of rules that make each other redundant the last one is reported.
+unknown; the other kinds have words of their own (`nested`). Of rules that make each other redundant the last one is
+reported.
 """
 
 from collections.abc import Set as AbstractSet
@@ -11,50 +12,61 @@ from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import No, Undecided
+from rtshcua.ground.compiler.proofs.nested import covering
 from rtshcua.ground.compiler.proofs.ruleset import Group, Ruleset
 from rtshcua.model.flat.policy import RuleKind
 
 
-def prove(rules: Ruleset, alive: list[Group]) -> None:
-    """Report the permits that forbids outweigh, and then the permits and forbids that others make redundant."""
+def prove(rules: Ruleset, alive: list[Group]) -> set[int]:
+    """Report the permits that forbids outweigh, and then the rules that others make redundant; their numbers."""
     gone: set[int] = set()
     for group in alive:
         if group.kind == RuleKind.PERMIT and _shadowed(rules, group):
             gone.update(group.rules)
     for group in reversed(alive):
-        if group.kind in (RuleKind.PERMIT, RuleKind.FORBID) and not gone.intersection(group.rules):
+        if not gone.intersection(group.rules):
             gone.update(group.rules)
-            covering = _redundant(rules, group, gone)
-            if covering is None:
+            said_by = _redundant(rules, group, alive, gone)
+            if said_by is None:
                 gone.difference_update(group.rules)
             else:
-                _report(rules, group, covering)
+                _report(rules, group, said_by)
+    return gone
 
 
 def _shadowed(rules: Ruleset, group: Group) -> bool:
     question = ((TRUE, FALSE | UNKNOWN),)
-    covering = _covered(rules, group, RuleKind.FORBID, frozenset(), question, "is ever not outweighed by a `forbid`")
-    if covering is None:
+    outweighing = _covered(rules, group, RuleKind.FORBID, frozenset(), question, "is ever not outweighed by a `forbid`")
+    if outweighing is None:
         return False
     rules.ground.context.report.add(
         codes.SHADOWED_RULE,
         group.span,
         "this `permit` never decides: wherever it matches, a `forbid` does too",
         help="narrow the `forbid`, or delete this rule",
-        labels=[(span, "this outweighs it") for span in covering],
+        labels=[(span, "this outweighs it") for span in outweighing],
     )
     return True
 
 
-def _redundant(rules: Ruleset, group: Group, gone: AbstractSet[int]) -> tuple[Span, ...] | None:
+def _redundant(rules: Ruleset, group: Group, alive: list[Group], gone: AbstractSet[int]) -> tuple[Span, ...] | None:
     """Where the rules are written that say all that a rule says; `gone` has its own numbers and those of rules that
     were already reported.
     """
+    if group.kind in (RuleKind.PERMIT, RuleKind.FORBID):
+        return said(rules, group, gone)
+    one = covering(rules, group, (each for each in alive if gone.isdisjoint(each.rules)))
+    return None if one is None else (one,)
+
+
+def said(rules: Ruleset, group: Group, gone: AbstractSet[int], *, quiet: bool = False) -> tuple[Span, ...] | None:
+    """Where the permits or forbids are written that say all that one says; nothing is noted if `quiet`."""
     kind = RuleKind(group.kind)
     questions: tuple[tuple[Truth, Truth], ...] = ((TRUE, FALSE | UNKNOWN),)
     if kind is RuleKind.FORBID:
         questions = (*questions, (UNKNOWN, FALSE))
-    return _covered(rules, group, kind, gone, questions, "says anything that others do not say")
+    what = None if quiet else "says anything that others do not say"
+    return _covered(rules, group, kind, gone, questions, what)
 
 
 def _covered(
@@ -63,7 +75,7 @@ def _covered(
     kind: RuleKind,
     but: AbstractSet[int],
     questions: tuple[tuple[Truth, Truth], ...],
-    what: str,
+    what: str | None,
 ) -> tuple[Span, ...] | None:
     """Where the rules are written that together leave a rule nothing; None where they leave something.
 
@@ -82,7 +94,8 @@ def _covered(
                     return None
                 found.update(dict.fromkeys(rules.ground.span(rules.rule(each)) for each in used))
     if open_ is not None:
-        rules.undecided(group, what, open_)
+        if what is not None:
+            rules.undecided(group, what, open_)
         return None
     return tuple(found)
 
@@ -92,17 +105,15 @@ def _clock_matters(rules: Ruleset, number: int, used: tuple[int, ...]) -> bool:
     return len(used) > 1 and rules.timed(number)
 
 
-def _report(rules: Ruleset, group: Group, covering: tuple[Span, ...]) -> None:
+def _report(rules: Ruleset, group: Group, said_by: tuple[Span, ...]) -> None:
     kind = group.declared.kind
-    copies = [span for span in covering if _same(rules, group, rules.at[span])]
+    copies = [span for span in said_by if _same(rules, group, rules.at[span])]
     rules.ground.context.report.add(
         codes.REDUNDANT_RULE,
         group.span,
-        f"this `{kind}` says nothing that " + ("another does" if len(covering) == 1 else "others do") + " not say",
+        f"this `{kind}` says nothing that " + ("another does" if len(said_by) == 1 else "others do") + " not say",
         help="delete it, or change what it is about",
-        labels=[
-            (span, "this says it already" if len(covering) == 1 else "this says a part of it") for span in covering
-        ],
+        labels=[(span, "this says it already" if len(said_by) == 1 else "this says a part of it") for span in said_by],
         fix=(group.span, "", "delete this rule") if copies else None,
     )
 

@@ -1,6 +1,6 @@
 """E0720 to E0723: rules that are dead, shadowed, redundant or in the way of each other."""
 
-from rtshcua.ground.compiler.proofs import conflicting, redundant
+from rtshcua.ground.compiler.proofs import bundles, conflicting, redundant
 from rtshcua.ground.compiler.proofs.dead import dead
 from rtshcua.ground.compiler.proofs.ruleset import Ruleset
 from rtshcua.ground.compiler.proofs.situation import Ground
@@ -11,5 +11,6 @@ def prove(ground: Ground) -> None:
     rules = Ruleset(ground)
     alive = [group for group in rules.groups if not dead(rules, group)]
     alive = [group for group in alive if group.span not in rules.open]
-    redundant.prove(rules, alive)
-    conflicting.prove(rules, alive)
+    gone = redundant.prove(rules, alive)
+    bundles.prove(rules, alive, gone)
+    conflicting.prove(rules, [group for group in alive if gone.isdisjoint(group.rules)])

@@ -4,19 +4,20 @@ from dataclasses import dataclass, field
 
 from rtshcua.decision.case import Case
 from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.prepare import Malformed, prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.values import MISSING, Sets, Value, interval, maybe, members
+from rtshcua.decision.tree import Node
+from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
-from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE
-from rtshcua.model.flat.policy import Airspace, Policy, Rule
-from rtshcua.model.flat.signal import ENUMERATION, POSITION
+from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context as Standing
-from rtshcua.model.flat.zone import MAX_COORDINATE
 
 #: us since the epoch: later than any flight
 EVER = 1 << 53
@@ -27,6 +28,9 @@ class Ground:
     """A lowered policy, prepared as on board, and any state that its vehicle may be in; `questions` are asked of it.
 
     `kept` are the ways that were found to keep its airspace (`ways`): the missions of one policy share many.
+    `steps` are those that were prepared, `hopes` the conditions of rules as `hopeful` has them: the choices of a
+    mission's parameters share many.
+    `impossible` are the skills whose contracts were reported to contradict themselves: no step of one is looked at.
     """
 
     context: Context
@@ -35,10 +39,20 @@ class Ground:
     anything: tuple[Value, ...]
     questions: Questions
     kept: set[tuple[object, ...]] = field(default_factory=set)
+    steps: dict[tuple[Invocation, tuple[str, ...]], PreparedInvocation | Malformed] = field(default_factory=dict)
+    hopes: dict[tuple[int, bool], Node | None] = field(default_factory=dict)
+    impossible: set[int] = field(default_factory=set)
 
     def sets(self, at_us: int = 0) -> Sets:
         """Any state, at any time within a day from a UTC time; at any time at all where that is not known (0)."""
         return Sets(self.anything, (0, 0), ((at_us, at_us + DAY - 1 if at_us else EVER),), (0, 0))
+
+    def prepare(self, invocation: Invocation, phases: tuple[str, ...]) -> PreparedInvocation | Malformed:
+        """A step of a mission with these phases, prepared as on board, or what is wrong with it."""
+        found = self.steps.get((invocation, phases))
+        if found is None:
+            found = self.steps[invocation, phases] = prepare_invocation(invocation, self.prepared, phases)
+        return found
 
     def case(self, invocation: PreparedInvocation) -> Case:
         """A step in any state."""
@@ -47,26 +61,11 @@ class Ground:
         standing = Standing(flat.binding, policy.vehicle.identity, policy.version, 0, 0, flat.phase, 0, ())
         return Case(invocation, self.prepared, standing, self.sets(flat.issued_at_us), exact=False)
 
-    def environment(self, arguments: tuple[Value, ...]) -> Environment:
-        """Known arguments in any state, for a condition."""
+    def environment(self, arguments: tuple[Value, ...], phase: int) -> Environment:
+        """Arguments in any state, in a phase by its number among the policy's names, for a condition."""
         sets = self.sets()
-        return Environment((*sets.values, MISSING), arguments, sets.utc_us, sets.utc_error_us)
+        return Environment((*sets.values, MISSING), arguments, sets.utc_us, sets.utc_error_us, phase=phase)
 
     def span(self, part: Clause | Rule | Link | Airspace) -> Span:
         """Where a part of the policy is written."""
         return self.lowered.files.span(part.source, part.start, part.end)
-
-
-def anything(policy: Policy) -> tuple[Value, ...]:
-    """One value a slot: whatever its signal may report, or nothing."""
-    values: list[Value] = [MISSING] * policy.slots
-    for signal in policy.signals:
-        if signal.kind == POSITION:
-            values[signal.slot] = values[signal.slot + 1] = maybe(interval(-MAX_COORDINATE, MAX_COORDINATE))
-        elif signal.kind == ENUMERATION:
-            values[signal.slot] = maybe(members(value for value, _ in signal.labels))
-        elif signal.slot == policy.vehicle.battery:
-            values[signal.slot] = maybe(interval(0, FULL))
-        else:
-            values[signal.slot] = maybe(interval(-MAX_VALUE, MAX_VALUE))
-    return tuple(values)

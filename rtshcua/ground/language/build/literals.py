@@ -1,6 +1,16 @@
 """Numbers, places, times, texts and names."""
 
-from rtshcua.diagnostics.codes import BAD_PERIOD, DATUM_NOT_ALLOWED, NOT_EXACT, OUT_OF_BOUNDS, UNKNOWN_UNIT
+import re
+from fractions import Fraction
+
+from rtshcua.diagnostics.codes import (
+    BAD_COORDINATES,
+    BAD_PERIOD,
+    DATUM_NOT_ALLOWED,
+    NOT_EXACT,
+    OUT_OF_BOUNDS,
+    UNKNOWN_UNIT,
+)
 from rtshcua.diagnostics.diagnostic import Fix
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
@@ -8,6 +18,8 @@ from rtshcua.ground.language.build.base import Base
 from rtshcua.ground.language.exact import CANONICAL, Exact, Trouble, exact
 from rtshcua.ground.language.moment import moment
 from rtshcua.ground.language.wording import SHOWN, short
+from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
+from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name
 from rtshcua.model.quantity import UNITS, Datum, Dimension, display
@@ -21,6 +33,33 @@ MEANT = {
 }  # fmt: skip
 
 DAY = 24 * 60  # minutes
+
+#: The largest number of each dimension that is kept on board, where it is not `MAX_VALUE`.
+LARGEST = {
+    Dimension.LENGTH: MAX_COORDINATE,
+    Dimension.SPEED: MAX_SPEED,
+    Dimension.DURATION: MAX_DURATION,
+}
+
+#: What words before a number ask for; the help for an unknown unit shows the units of that first.
+ASKING = {
+    word: dimension
+    for dimension, words in (
+        (Dimension.LENGTH, "altitude height floor ceiling elevation error circle width grow length distance"),
+        (Dimension.SPEED, "speed climb"),
+        (Dimension.DURATION, "after deadline for last within grace lasts valid duration time"),
+        (Dimension.RATIO, "energy battery reserve ratio"),
+        (Dimension.ANGLE, "angle heading"),
+    )
+    for word in words.split()
+}
+
+#: The points of the compass, which stand after a latitude or a longitude, and their opposites.
+POINTS = {"N": "S", "S": "N", "E": "W", "W": "E"}
+
+_EXPONENT = re.compile(r"[eE][0-9]*")
+
+LOOK_BACK = 120  # characters before a number in which such a word is looked for
 
 
 class Literals(Base):
@@ -53,7 +92,7 @@ class Literals(Base):
         """A number with its unit, in the canonical unit; a length above something is an altitude."""
         value, dimension, trouble = found = exact(number, unit, minus is not None)
         if trouble is not None:
-            self._check(found, self._source.slice(span), span, unit, datum)
+            self._check(found, self._source.slice(span), span, unit, datum, plain=None if unit else number)
         if datum is None:
             return Quantity(span=span, value=value, dimension=dimension)
         if dimension is not Dimension.LENGTH and trouble is not Trouble.UNKNOWN_UNIT:
@@ -67,11 +106,22 @@ class Literals(Base):
 
     def coordinates(self, span: Span, latitude: str, north: str, longitude: str, east: str) -> Coordinates:
         """A place on the ground; south and west are negative."""
-        return Coordinates(
-            span=span,
-            latitude=self._degrees(span, latitude, 90, "latitude", north == "S"),
-            longitude=self._degrees(span, longitude, 180, "longitude", east == "W"),
+        values = (
+            self._degrees(span, latitude, "latitude", north == "S"),
+            self._degrees(span, longitude, "longitude", east == "W"),
         )
+        beyond = [abs(each) > most * UNITS["deg"].numerator for each, most in zip(values, (90, 180), strict=True)]
+        if any(beyond):
+            written, what, most = (latitude, "latitude", 90) if beyond[0] else (longitude, "longitude", 180)
+            swapped = abs(values[1]) <= 90 * UNITS["deg"].numerator and not beyond[1]
+            self.report(
+                BAD_COORDINATES,
+                f"`{short(written)}` is not a {what}: a {what} goes up to {most} degrees",
+                span,
+                "are latitude and longitude the wrong way round? the latitude, `N` or `S`, stands first" * swapped
+                or "a place is its latitude and longitude in degrees, as in `47.3977 N, 8.5456 E`",
+            )
+        return Coordinates(span=span, latitude=values[0], longitude=values[1])
 
     def time_of_day(self, span: Span, text: str) -> TimeOfDay:
         """A local time, in us since midnight."""
@@ -90,13 +140,11 @@ class Literals(Base):
             self.report(BAD_PERIOD, f"`{short(raw[1:-1])}` is not a moment: {error}", span, help)
             return 0
 
-    def _degrees(self, span: Span, number: str, most: int, what: str, negative: bool) -> int:
+    def _degrees(self, span: Span, number: str, what: str, negative: bool) -> int:
         found = exact(number, "deg", negative)
-        if abs(found.value) > most * UNITS["deg"].numerator or found.trouble is Trouble.OUT_OF_BOUNDS:
-            self.report(
-                OUT_OF_BOUNDS, f"`{short(number)}` is not a {what}", span, f"a {what} goes up to {most} degrees"
-            )
-        elif found.trouble is Trouble.NOT_EXACT:
+        if found.trouble is Trouble.OUT_OF_BOUNDS:
+            return 360 * UNITS["deg"].numerator
+        if found.trouble is Trouble.NOT_EXACT:
             self.report(
                 NOT_EXACT,
                 f"the {what} `{short(number)}` has more than 7 decimals",
@@ -105,18 +153,33 @@ class Literals(Base):
             )
         return found.value
 
-    def _check(self, found: Exact, written: str, span: Span, unit: str | None = None, datum: str | None = None) -> None:
-        """Reports what is wrong with a number, if anything is."""
+    def _check(
+        self,
+        found: Exact,
+        written: str,
+        span: Span,
+        unit: str | None = None,
+        datum: str | None = None,
+        plain: str | None = None,
+    ) -> None:
+        """Reports what is wrong with a number, if anything is; `plain` are the digits of a value without a unit."""
         if found.trouble is Trouble.UNKNOWN_UNIT and unit is not None:
             meant = MEANT.get(unit.casefold()) or (nearest(unit, UNITS) if len(unit) <= SHOWN else None)
             fix = Fix(span, written.replace(unit, meant, 1), f"write `{meant}`") if meant else None
-            known = ", ".join(f"`{name}`" for name in UNITS)
-            help = f"did you mean `{meant}`?" if meant else f"units are {known}"
+            if unit in POINTS or _EXPONENT.fullmatch(unit):
+                self._no_unit(unit, written, span)
+                return
+            asked = self._asked(span)
+            names = sorted(UNITS, key=lambda name: UNITS[name].dimension is not asked)
+            help = f"did you mean `{meant}`?" if meant else "units are " + ", ".join(f"`{name}`" for name in names)
             self.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help, fixes=(fix,) if fix else ())
         elif found.trouble is Trouble.NOT_EXACT:
             whole = CANONICAL[found.dimension]
             kept = f"a {found.dimension.value} is kept in whole {whole}" if whole else "it is a plain number"
             near = _written(found, unit) + (f" above {datum}" if datum else "")
+            if plain is not None and datum is None and len(plain) <= SHOWN:
+                self.report(NOT_EXACT, f"`{short(written)}` is not a whole number", span, f"{kept}; {_exactly(plain)}")
+                return
             self.report(
                 NOT_EXACT,
                 f"`{short(written)}` is not a whole number" + (f" of {whole}" if whole else ""),
@@ -125,7 +188,37 @@ class Literals(Base):
                 fixes=(Fix(span, near, f"write `{near}`"),),
             )
         elif found.trouble is Trouble.OUT_OF_BOUNDS:
-            self.report(OUT_OF_BOUNDS, f"`{short(written)}` is too large", span, "a quantity fits in 64 bits")
+            limit = LARGEST.get(found.dimension, MAX_VALUE)
+            whole_units = 0 if unit is None else limit * UNITS[unit].denominator // UNITS[unit].numerator
+            most = f"{whole_units} {unit}" if whole_units else display(limit, found.dimension)
+            self.report(OUT_OF_BOUNDS, f"`{short(written)}` is too large", span, f"at most `{most}` fits")
+
+    def _no_unit(self, unit: str, written: str, span: Span) -> None:
+        """`-47.4 N, 8.5 E` where a value stands, and `2e3`."""
+        if unit in POINTS:
+            plain = written.removeprefix("-").strip()
+            opposite = plain[: -len(unit)] + POINTS[unit]
+            help = "a place is its latitude and longitude, as in `47.3977 N, 8.5456 E`"
+            if written.startswith("-"):
+                help = f"a place has no sign: write `{opposite}`, or `{plain}`"
+            last = self.diagnostics[-1].span if self.diagnostics else None
+            if unit in "EW" and last is not None and self._source.text[last.end : span.start].strip() == ",":
+                return  # the longitude of a latitude that was reported
+        else:
+            help = "numbers have no exponents: write all digits, which `_` may group, as in `20_000 m`"
+        self.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help)
+
+    def _asked(self, span: Span) -> Dimension | None:
+        """The dimension that the last telling word before a number asks for, as far as words tell."""
+        before = re.findall(r"[a-z]+", self._source.text[max(0, span.start - LOOK_BACK) : span.start])
+        return next((ASKING[word] for word in reversed(before) if word in ASKING), None)
+
+
+def _exactly(digits: str) -> str:
+    """A plain number with decimals, as what it is exactly."""
+    value = Fraction(digits.replace("_", ""))
+    ratio = f", or `{display(int(value * 10_000), Dimension.RATIO)}`" if (value * 10_000).denominator == 1 else ""
+    return f"in a product, write `({value})`{ratio}"
 
 
 def _written(found: Exact, unit: str | None) -> str:

@@ -63,6 +63,10 @@ class Vehicles(Zones):
         """`elevation 408 m above sea within 5 m`."""
         return Part("elevation", span, (altitude, within))
 
+    def return_at(self, span: Span, altitude: Quantity) -> Part:
+        """`return at 30 m`."""
+        return Part("return", span, altitude)
+
     def vehicle(self, span: Span, name: Name, *given: Part) -> None:
         """`vehicle quad { ... }`."""
         self.undotted(name, "vehicle")
@@ -90,6 +94,7 @@ class Vehicles(Zones):
                 utc_offset=found["clock"].value if "clock" in found else None,
                 elevation=elevation,
                 elevation_within=elevation_within,
+                return_altitude=found["return"].value if "return" in found else None,
             ),
             name,
         )

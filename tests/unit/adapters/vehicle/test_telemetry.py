@@ -50,6 +50,21 @@ def test_reads_what_the_policy_declares(message: Any, values: dict[int, int | No
     assert all(value is None or type(value) is int for value in read.values())
 
 
+def test_a_vehicle_that_crosses_longitude_180_goes_on_where_it_was() -> None:
+    there = replace(PROJECTION, longitude=1_799_999_000)
+    east = Telemetry(replace(POLICY, projection=there))
+    here = Telemetry(POLICY)
+    for step in range(-3000, 3000, 250):
+        crossing = there.longitude + step
+        wrapped = crossing - 3_600_000_000 if crossing > 1_800_000_000 else crossing
+        message = position(HOME[0], wrapped)
+        expected = position(HOME[0], PROJECTION.longitude + step)
+        assert east.read("GLOBAL_POSITION_INT", message) == here.read("GLOBAL_POSITION_INT", expected)
+        assert east.distance_from_home(HOME[0], wrapped) == here.distance_from_home(HOME[0], expected.lon)
+    beyond = dict(east.read("GLOBAL_POSITION_INT", position(HOME[0], 1_800_000_001)))
+    assert beyond[POSITION_X] is beyond[POSITION_X + 1] is None, "no longitude is beyond 180 degrees"
+
+
 def test_asks_often_enough_for_what_grows_stale_and_no_oftener_than_useful() -> None:
     intervals = Telemetry(POLICY).intervals
     assert intervals["GLOBAL_POSITION_INT"] == 125_000  # stale after 500 ms

@@ -78,7 +78,57 @@ CASES = {
         f"{GOTO} when altitude < 20 m\n{GOTO} when altitude < 20 m",
         [("E0722", f"{GOTO} when altitude < 20 m")],
     ),
-    "a forbid also acts unknown": ("forbid goto by any when battery < 20 % and battery > 30 %\n" + GOTO, []),
+    "a forbid may only be unknown": (
+        "forbid goto by any when battery < 20 % and battery > 30 %\n" + GOTO,
+        [("E0720", "battery > 30 %")],
+    ),
+    "a confirm may only be unknown": (
+        f"confirm goto when battery < 20 % and battery > 30 % by role operator within 30 s\n{GOTO}",
+        [("E0720", "battery > 30 %")],
+    ),
+    "no such fix is reported": ("degrade any when gps.fix < fix_3d to return_home", [("E0720", "gps.fix < fix_3d")]),
+    "a confirm asks no more": (
+        f"confirm goto when altitude < 20 m by role operator within 30 s\n"
+        f"confirm goto when altitude < 10 m by role operator within 40 s\n{GOTO}",
+        [("E0722", "confirm goto when altitude < 10 m by role operator within 40 s")],
+    ),
+    "a confirm asks somebody else": (
+        f"confirm goto when altitude < 20 m by role operator within 30 s\n"
+        f"confirm goto when altitude < 10 m by role pilot within 40 s\n{GOTO}",
+        [],
+    ),
+    "a confirm waits for less": (
+        f"confirm goto when altitude < 20 m by role operator within 30 s\n"
+        f"confirm goto when altitude < 10 m by role operator within 20 s\n{GOTO}",
+        [],
+    ),
+    "a degrade does no more": (
+        "degrade any when battery < 20 % to return_home\ndegrade any when battery < 10 % to return_home",
+        [("E0722", "degrade any when battery < 10 % to return_home")],
+    ),
+    "a degrade does no more, first": (
+        "degrade any when battery < 10 % to return_home\ndegrade any when battery < 20 % to return_home",
+        [("E0722", "degrade any when battery < 10 % to return_home")],
+    ),
+    "a degrade comes before another": (
+        "degrade any when battery < 10 % to return_home\ndegrade any when wind.speed > 9 m/s to emergency_land\n"
+        "degrade any when battery < 20 % to return_home",
+        [],
+    ),
+    "a degrade of one skill": (
+        "degrade goto when battery < 20 % to return_home\ndegrade any when battery < 10 % to return_home",
+        [],
+    ),
+    "a delegation gives nothing": (
+        f"{GOTO} when altitude < 30 m\npermit goto by role pilot when altitude < 30 m\n"
+        "delegate goto by role operator to role pilot when altitude < 20 m",
+        [("E0722", "delegate goto by role operator to role pilot when altitude < 20 m")],
+    ),
+    "a delegation gives something": (
+        f"{GOTO} when altitude < 30 m\npermit goto by role pilot when altitude > 15 m\n"
+        "delegate goto by role operator to role pilot when altitude < 20 m",
+        [],
+    ),
     "a forbid is dead": ("forbid goto by any when altitude < 10 m and altitude > 20 m\n" + GOTO, ["E0720"]),
     "a forbid says a part": (
         f"forbid goto by any when battery < 30 %\nforbid goto by any when battery < 20 %\n{GOTO}",
@@ -110,9 +160,9 @@ CASES = {
         f"{GOTO} when battery < 20 % for the last 3 s and battery > 30 % within the last 5 s",
         [],
     ),
-    "the same twice": (
+    "two targets at once": (
         "degrade any when battery < 20 % to return_home\ndegrade any when battery < 20 % to emergency_land",
-        [],
+        [("E0723", "degrade any when battery < 20 % to emergency_land")],
     ),
     "priorities": (
         "degrade any when battery < 20 % to return_home\ndegrade any when wind.speed > 9 m/s to emergency_land",
@@ -177,13 +227,24 @@ mission m under rules@1 on quad {
     assert read(skill + policy + mission.replace("20 m", "8 m")) == ()
 
 
+@pytest.mark.parametrize(
+    ("fields", "codes"),
+    [("WIND_COV.wind_x, WIND_COV.wind_y", ["E0720"]), ("WIND_COV.wind_x, WIND_COV.wind_y or WIND.speed", [])],
+)
+def test_what_two_components_make_is_not_below_zero(fields: str, codes: list[str]) -> None:
+    signal = f"signal gust : speed = {fields} stale after 10 s\n"
+    text = signal + POLICY.format("degrade any when gust < 0 m/s to return_home")
+    assert [each.code.id for each in read(text)] == codes
+
+
 HOURS = """
 mission m under rules@1 on quad {
   proposed by operator x for role operator
   phase departure { takeoff(altitude = 10 m) return_home() }
 }
 """
-EIGHT = 1_800_000_000 * 1_000_000 - 1_800_000_000 * 1_000_000 % 86_400_000_000 + 8 * 3_600_000_000
+#: 08:00 where the vehicle's clock is two hours ahead of UTC
+EIGHT = 1_800_000_000 * 1_000_000 - 1_800_000_000 * 1_000_000 % 86_400_000_000 + 6 * 3_600_000_000
 
 
 @pytest.mark.parametrize(("minutes", "codes"), [(0, []), (53, []), (56, ["E0718"]), (59, ["E0718"])])
@@ -192,6 +253,18 @@ def test_a_step_may_come_too_late_in_the_day(minutes: int, codes: list[str]) -> 
     issued = EIGHT + minutes * 60_000_000
     compiled = compile_program(program(text), dialect.load(), mission=None, issued_at_us=issued)
     assert [each.code.id for each in compiled.diagnostics] == codes
+
+
+@pytest.mark.parametrize(
+    ("window", "codes"),
+    [("08:00 .. 09:00", []), ("23:57 .. 00:08", []), ("08:00 .. 08:03", ["E0718"]), ("08:00 .. 08:04", ["E0718"])],
+)
+@pytest.mark.parametrize("permits", [1, 2])
+def test_some_time_of_issue_must_do(window: str, codes: list[str], permits: int) -> None:
+    permit = "permit takeoff by role operator when "
+    rules = [f"{permit}local time in {window}", f"{permit}altitude > 20 m or local time in 12:00 .. 12:02"][:permits]
+    text = POLICY.format("\n".join(rules)) + HOURS
+    assert [each.code.id for each in read(text)] == codes
 
 
 def test_a_parameter_has_values_that_are_not_permitted_between_those_that_are() -> None:

@@ -166,6 +166,15 @@ BOW = [[8.0, 47.0], [8.1, 47.1], [8.1, 47.0], [8.0, 47.1], [8.0, 47.0]]
         (collection(feature(polygon(SQUARE), id="a"), feature(POINT, id="a")), "a", "2 of its 2 features are called"),
         (collection(feature(POINT, id="a")), "a", "`/features/0/geometry` is a Point"),
         (polygon(SQUARE) | {"crs": {"properties": {"name": "EPSG:2056"}}}, None, "another reference system"),
+        (
+            {
+                "type": "Feature",
+                "properties": None,
+                "geometry": polygon(SQUARE) | {"crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}},
+            },
+            None,
+            "another reference system",
+        ),
         (polygon(), None, "`/coordinates` has no ring"),
         ({"type": "Polygon"}, None, "`/coordinates` is not an array"),
         ({"type": "MultiPolygon", "coordinates": []}, None, "`/coordinates` has no polygon"),
@@ -191,6 +200,10 @@ def test_what_holds_no_such_area_is_refused(tree: Any, name: str | None, words: 
 
 
 def test_hints_name_what_is_there() -> None:
+    assert (
+        refused(polygon(FIJI)).help
+        == "cut the area at longitude 180 into two parts of a MultiPolygon (RFC 7946, 3.1.9)"
+    )
     two = collection(feature(polygon(SQUARE), id="site"), feature(polygon(SQUARE), properties={"name": "yard"}))
     assert refused(two).help == "name one of them with `feature`: `site`, `yard`"
     assert refused(two, "sitt").help == "did you mean `site`?"

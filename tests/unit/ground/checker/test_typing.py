@@ -17,6 +17,7 @@ import "lib:skills/emergency_land.rts"
 
 signal above.sea : altitude = GLOBAL_POSITION_INT.alt  stale after 2 s
 signal satellites : count = GPS_RAW_INT.satellites_visible  stale after 2 s
+signal other.place : position = GPS_RAW_INT.lat, GPS_RAW_INT.lon  stale after 2 s
 signal heading : angle = GLOBAL_POSITION_INT.hdg  stale after 2 s
 
 skill probe(
@@ -65,6 +66,8 @@ GOOD = [
     "look in { near, far }",
     "local time in 08:00 .. 18:00",
     "local time in 22:00 .. 06:00",
+    "local time >= 19:00 or local time < 06:00 for the last 3 s",
+    "08:00 <= local time and 18:00 > local time",
     "position inside city",
     "position outside grow(school, 20 m)",
     "position inside area",
@@ -149,7 +152,12 @@ BAD = [
     ("look == grid", "E0313"),
     ("fix_3d == fix_2d", "E0204"),
     ("battery in { near }", "E0314"),
-    ("local time < 08:00", "E0314"),
+    ("local time == 08:00", "E0314"),
+    ("08:00 != local time", "E0314"),
+    ("local time < local time", "E0314"),
+    ("07:00 < 08:00", "E0314"),
+    ("local time < 8 s", "E0314"),
+    ("local time + 8 s < 08:00", "E0315"),
     ("local time in 8 s .. 9 s", "E0312"),
     ("height in 08:00 .. 09:00", "E0312"),
     ("height inside city", "E0317"),
@@ -196,7 +204,7 @@ BAD = [
     ("phase == bridge_a.entry", "E0323"),
     ("inspection == phase", "E0201"),
     ("height == phase", "E0323"),
-    ("phase < inspection", "E0314"),
+    ("phase < inspection", "E0323"),
     ("phase in a .. b", "E0323"),
     ("phase + 1 < 3", "E0315"),
     ("height in phase .. 3 m", "E0312"),
@@ -232,6 +240,30 @@ def test_it_has_a_meaning(condition: str) -> None:
 @pytest.mark.parametrize(("condition", "code"), BAD)
 def test_it_has_none_and_a_finding_says_why(condition: str, code: str) -> None:
     assert set(findings(condition)) == {code}
+
+
+HELPS = [
+    ("1.5 * wind.speed < 8 m/s", "it is a plain number; in a product, write `(3/2)`, or `150 %`"),
+    ("-/* minus */1.000001 * wind.speed < 8 m/s", "it is a plain number; in a product, write `(1000001/1000000)`"),
+    (
+        "local time == 08:00",
+        "a window, such as `local time in 08:00 .. 08:10`, or a comparison, such as `local time >=",
+    ),
+    ("local time < 8 s", "a time of day is compared with `local time`, as in `local time >= 19:00`"),
+    ("area inside area", "write a declared zone instead of `area`, in which only `position` can be"),
+    ("aim inside grow(area, 5 m)", "write a declared zone instead of `area`, in which only `position` can be"),
+    ("other.place inside city", "of all signals, it is `position` that is read as the vehicle's place"),
+    ("height inside city", "ask it of `position`, or of an argument that is a position or a zone"),
+]
+
+
+@pytest.mark.parametrize(("condition", "help"), HELPS)
+def test_the_help_says_what_would_do(condition: str, help: str) -> None:
+    def read(path: str) -> bytes:
+        return SOURCE.replace("CONDITION", condition).encode() if path == "x.rts" else Path(path).read_bytes()
+
+    (found,) = check_program(load(["x.rts"], read, str(CHECKOUT)), dialect.load())
+    assert help in (found.help or "")
 
 
 CALLED_PHASE = [

@@ -75,6 +75,8 @@ def shown(code: tuple[int, ...], policy: Policy) -> str:
                 words.append(f"*{a}")
             case Op.PHASE_IN:
                 words.append("phase{" + ",".join(policy.phases[member] for member in policy.sets[b]) + "}")
+            case Op.TIME_IN:
+                words.append(f"local[{a},{b}]")
             case Op.MONITOR:
                 words.append(f"monitor{a}")
             case Op.POSITION_IN:
@@ -83,6 +85,8 @@ def shown(code: tuple[int, ...], policy: Policy) -> str:
                 words.append(Op(op).name)
     return " ".join(words)
 
+
+H = 3_600_000_000  # us
 
 CODE = [
     ("height < 20 m", "height 20000 LT"),
@@ -106,6 +110,11 @@ CODE = [
     ("height in 10 m / 3 .. up", "height *3 10000 GE height up LE AND"),
     ("phase == inspection", "phase{inspection}"),
     ("phase != inspection", "phase{inspection} NOT"),
+    ("local time >= 19:00", f"local[{19 * H},{24 * H}]"),
+    ("19:00 < local time", f"local[{19 * H + 1},{24 * H}]"),
+    ("local time <= 00:00", "local[0,0]"),
+    ("19:00 > local time", f"local[0,{19 * H - 1}]"),
+    ("local time < 00:00 or battery > 30 %", f"local[0,{24 * H}] NOT battery 3000 GT OR"),
     ("phase in {departure, a}", "phase{departure,a}"),
     ("battery > 30 % for the last 3 s", "monitor0"),
     (

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference.sources import found, mission, policy, program, skill
+from reference.sources import findings, found, mission, policy, program, skill
 from rtshcua.adapters.vehicle import commander, streams, telemetry
 from rtshcua.ground.compiler.proofs import observation
 from rtshcua.ground.compiler.proofs.rates import COMMANDS, RATES
@@ -177,6 +177,51 @@ def test_what_takes_longer_to_observe_than_the_flight_lasts_is_never_known(windo
     assert codes(probe, policy(), mission("probe()")) == expected
     late = mission("takeoff(altitude = 20 m)", "hover()", "probe()")
     assert codes(probe, policy(), late) == []
+
+
+@pytest.mark.parametrize(
+    ("to", "message"),
+    [
+        ("30 m", []),
+        ("30001 mm", ["`rise` lasts at most 10 s, and the step takes up to 1 ms longer"]),
+        ("31200 mm", ["`rise` lasts at most 10 s, and the step takes up to 400 ms longer"]),
+        ("40 m", ["the step takes at least 13 s, and `rise` lasts at most 10 s"]),
+    ],
+)
+def test_by_how_much_a_plan_takes_too_long(to: str, message: list[str]) -> None:
+    rise = skill("rise(to: altitude in 5 m .. 60 m)", motion="climb to to", lasts="at most 10 s")
+    said = found(program(rise, policy(), mission(f"rise({to})", "return_home()")))
+    assert [words for code, words in said if code == "E0804"] == message
+
+
+LONG = "battery > 20 % for the last {}"
+RARE = "battery > 20 % within the last {}"
+
+
+@pytest.mark.parametrize(
+    ("permits", "expected"),
+    [
+        ([LONG.format("5 min")], []),
+        ([LONG.format("6 min")], ["E0717"]),
+        ([f"altitude < 30 m and ({LONG.format('6 min')} or {LONG.format('7 min')})"], ["E0717"]),
+        ([f"{LONG.format('6 min')} or battery > 90 %"], []),
+        ([RARE.format("6 min")], []),
+        ([f"not ({RARE.format('6 min')})"], ["E0717"]),
+        ([f"not ({LONG.format('6 min')} and {RARE.format('7 min')})"], []),
+        ([LONG.format("6 min"), LONG.format("7 min")], ["E0717"]),
+        ([LONG.format("6 min"), f"altitude < 10 m or {LONG.format('7 min')}"], ["E0717"]),
+        ([LONG.format("6 min"), f"altitude < 30 m and {LONG.format('3 s')}"], []),
+        ([LONG.format("6 min"), f"altitude < 10 m and {LONG.format('3 s')}"], ["E0717"]),  # not of this step
+    ],
+)
+def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected: list[str]) -> None:
+    rules = [f"permit takeoff by role operator through agent when {when}" for when in permits]
+    lines = [*rules, "permit hover, return_home, emergency_land by any", "contingency return_home, emergency_land"]
+    text = "policy rules version 1 {\n" + "\n".join(lines) + "\n}\n"
+    found = findings(program(text, mission("takeoff(altitude = 20 m)", "return_home()")))
+    about_steps = [each for each in found if each.code.id == "E0717"]
+    assert [each.code.id for each in about_steps] == expected
+    assert all(each.labels for each in about_steps)
 
 
 # ---------------------------------------------------------------- E1201 to E1203

@@ -1,15 +1,19 @@
 """Missions with parameters: what is compiled has the values that are given, what is checked has all that may be."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.render import render
+from rtshcua.ground.checker.context import Instance
 from rtshcua.ground.compiler.program import Checked, Compiled
-from rtshcua.ground.elaborate.parameters import MAX_INSTANCES, _combinations
+from rtshcua.ground.elaborate import parameters
+from rtshcua.ground.elaborate.parameters import MAX_INSTANCES, MOST_STEPS, _combinations, _instance
 from rtshcua.ground.elaborate.settings import parse_settings
+from rtshcua.model.ir.expression import Value
+from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.wire.bundle import policy_payload
 
 Compile = Callable[..., Compiled]
@@ -203,3 +207,22 @@ def test_settings_are_read_by_lines() -> None:
         ("a", "1 m"),
         ("b", "2 s"),
     ]
+
+
+def test_a_long_mission_is_checked_with_fewer_values() -> None:
+    """So that no source takes minutes: each instance is proved step by step."""
+    assert MAX_INSTANCES * 64 <= MOST_STEPS <= 1 << 13
+
+
+def test_the_steps_of_all_instances_are_bounded(check_text: Check, site: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    many = ", ".join(f"x{number}: altitude in 10 m .. 20 m = 15 m" for number in range(20))
+    made: list[Instance] = []
+
+    def counted(mission: MissionDecl, values: Mapping[str, Value]) -> Instance:
+        made.append(_instance(mission, values))
+        return made[-1]
+
+    monkeypatch.setattr(parameters, "_instance", counted)
+    monkeypatch.setattr(parameters, "MOST_STEPS", 12)
+    check_text(site + mission(f"{TWO}, {many}"))
+    assert len(made) == 3  # of four steps each

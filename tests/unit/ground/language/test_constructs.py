@@ -13,6 +13,21 @@ Read = Callable[[str], Unit]
 Plain = Callable[[Any], Any]
 
 
+@pytest.mark.parametrize(
+    ("plainly", "comma"),
+    [
+        ("zone z = circle(1 N, 2 E, 5 m)", "zone z = circle(1 N, 2 E, 5 m,)"),
+        ("zone z = corridor(1 N, 2 E, 1 N, 3 E, width 5 m)", "zone z = corridor(1 N, 2 E, 1 N, 3 E, width 5 m,)"),
+        ("skill s() { require a in {b, c} }", "skill s() { require a in {b, c,} }"),
+        ("skill s() { require phase in {b} }", "skill s() { require phase in {b, } }"),
+        ("skill s() { require position inside grow(z, 5 m) }", "skill s() { require position inside grow(z, 5 m,) }"),
+        ("skill s() { require max(a, b) < 5 m }", "skill s() { require max(a, b,) < 5 m }"),
+    ],
+)
+def test_lists_in_brackets_may_end_in_a_comma(plain: Plain, unit: Read, plainly: str, comma: str) -> None:
+    assert plain(unit(comma)) == plain(unit(plainly))
+
+
 def test_empty_text(plain: Plain, unit: Read) -> None:
     assert plain(unit("")) == {"file": "x.rts"}
     assert plain(unit(" // nothing\n/* nor * here **/ \t\r\n")) == {"file": "x.rts"}

@@ -1,0 +1,34 @@
+"""A hundred specifications, written from docs/language.md alone, are compiled, and nothing is found in any of them."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.render import render
+from rtshcua.ground.compiler.program import check_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+SPECIFICATIONS = sorted((Path(__file__).resolve().parent / "valid").glob("*.rts"))
+
+
+def findings(path: Path) -> str:
+    """What a person reads when the specification at `path` is checked."""
+    program = load([str(path)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
+    return render(check_program(program, dialect.load()), program.sources)
+
+
+def test_there_are_a_hundred_numbered_from_one() -> None:
+    assert [path.name[:4] for path in SPECIFICATIONS] == [f"{number:03}_" for number in range(1, 101)]
+
+
+def test_each_says_first_what_it_alone_is_about() -> None:
+    first_lines = [path.read_text(encoding="utf-8").splitlines()[0] for path in SPECIFICATIONS]
+    assert all(line.startswith(("// ", "/* ")) for line in first_lines)
+    assert len(set(first_lines)) == len(SPECIFICATIONS)
+
+
+@pytest.mark.parametrize("path", SPECIFICATIONS, ids=lambda path: path.stem)
+def test_nothing_is_found(path: Path) -> None:
+    assert findings(path) == ""

@@ -1,0 +1,14 @@
+"""What a `degrade` rule flies must end, for the chain comes after it."""
+
+import pytest
+
+from reference.sources import found, policy, program, skill
+
+
+@pytest.mark.parametrize(
+    ("target", "codes"),
+    [("stay", ["E0611"]), ("stay for 10 s", []), ("return_home", []), ("emergency_land", [])],
+)
+def test_the_target_of_a_degrade_rule_ends(target: str, codes: list[str]) -> None:
+    rule = f"degrade goto when battery < 30 % to {target}"
+    assert [code for code, _ in found(program(skill("stay()", lasts=""), policy(rule)))] == codes

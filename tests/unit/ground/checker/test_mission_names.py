@@ -1,0 +1,30 @@
+"""What a mission's first line and its steps name must exist, each by itself, and so must the zones of an airspace."""
+
+import pytest
+
+from reference.sources import found, mission, policy, program
+
+FLIGHT = mission("takeoff(altitude = 10 m)", "hover(10 s)", "return_home()")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "word"),
+    [
+        ("on quad", "on quod", "E0201", "`quod`"),
+        ("under rules@1", "under ruler@1", "E0201", "`ruler`"),
+        ("under rules@1", "under rules@2", "E0701", "version 2"),
+        ("hover(10 s)", "hoover(10 s)", "E0201", "`hoover`"),
+        ("by agent", "by angel", "E0709", "`angel`"),
+        ("on quad", "on rules", "E0204", "`rules`"),
+    ],
+)
+def test_a_name_that_is_not_there(old: str, new: str, code: str, word: str) -> None:
+    assert not found(program(policy(), FLIGHT))
+    (only,) = found(program(policy(), FLIGHT.replace(old, new)))
+    assert only[0] == code
+    assert word in only[1]
+
+
+@pytest.mark.parametrize("airspace", ["airspace inside nowhere", "airspace inside city outside nowhere"])
+def test_an_airspace_of_a_zone_that_is_not_there(airspace: str) -> None:
+    assert [code for code, _ in found(program(policy(airspace)))] == ["E0201"]

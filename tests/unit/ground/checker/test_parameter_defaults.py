@@ -1,0 +1,21 @@
+"""A default is an argument like any other: of the parameter's type, and in its range, both ends of which belong to it."""
+
+import pytest
+
+from reference.sources import found, program, skill
+
+
+@pytest.mark.parametrize(
+    ("parameter", "codes"),
+    [
+        ("top: altitude in 5 m .. 30 m = 5 m", []),
+        ("top: altitude in 5 m .. 30 m = 30 m", []),
+        ("top: altitude in 5 m .. 30 m = 4999 mm", ["E0605"]),
+        ("top: altitude in 5 m .. 30 m = 30001 mm", ["E0605"]),
+        ("top: altitude in 5 m .. 30 m = 5 s", ["E0310"]),
+        ("side: one of left, right = left", []),
+        ("side: one of left, right = up", ["E0313"]),
+    ],
+)
+def test_a_default(parameter: str, codes: list[str]) -> None:
+    assert [code for code, _ in found(program(skill(f"probe({parameter})")))] == codes

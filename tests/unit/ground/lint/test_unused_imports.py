@@ -1,0 +1,71 @@
+"""E1305: which imports may go, and that nothing changes when they do."""
+
+from pathlib import Path
+
+import pytest
+
+from reference.linted import CHECKOUT, HEAD, POLICY, found, program
+from rtshcua.ground.compiler.program import check_program
+from rtshcua.ground.language.load import load
+from rtshcua.ground.lint.lint import lint
+from rtshcua.mavlink import dialect
+
+TWINS = sorted(path.name for path in (CHECKOUT / "tests" / "accepted").glob("e0[1-8]*1_*.rts"))
+
+
+def test_imports() -> None:
+    assert found(HEAD + 'import "lib:skills/hover.rts"\n' + POLICY) == [("E1305", 'import "lib:skills/hover.rts"')]
+    assert found(HEAD + 'import "lib:policies/site.rts"\n' + POLICY) == [("E1305", 'import "lib:policies/site.rts"')]
+
+
+def test_an_import_is_used_for_what_it_brings_along() -> None:
+    gathered = "// gathers others\n" + HEAD
+    assert found('import "all.rts"\n' + POLICY, all=gathered) == []
+    assert found('import "all.rts"\n' + HEAD + POLICY, all=gathered) == [("E1305", 'import "all.rts"')]
+    assert found(gathered) == []
+    assert found(HEAD + 'import "none.rts"\n' + POLICY, none="// nothing yet") == [("E1305", 'import "none.rts"')]
+
+
+def test_a_library_may_bring_things_along_for_those_who_import_it() -> None:
+    site = "zone pad = circle(47.3977 N, 8.5456 E, 10 m)"
+    assert found('import "lib:skills/signals.rts"\n' + site) == []
+    assert found('import "lib:skills/signals.rts"\nimport "lib:skills/goto.rts"\n' + site) == [
+        ("E1305", 'import "lib:skills/signals.rts"')
+    ]
+
+
+def test_a_policy_needs_what_it_does_not_mention() -> None:
+    """Its missions may fly to any of its zones, and every decision reads the well-known signals."""
+    zones = "zone pad = circle(47.3977 N, 8.5456 E, 10 m)"
+    assert found(HEAD + 'import "zones.rts"\n' + POLICY, zones=zones) == []
+    assert found(HEAD + 'import "lib:skills/signals.rts"\n' + POLICY) == []
+    every = POLICY.replace("permit ret", "permit any by role operator permit ret")
+    assert [code for code, _ in found(HEAD + 'import "lib:skills/hover.rts"\n' + every)] == ["E1303"]
+
+
+def test_the_fix_deletes_the_line() -> None:
+    text = HEAD + '  import "lib:skills/hover.rts"   // for later\n' + POLICY
+    one = program({"main.rts": text})
+    (fix,) = (fix for each in lint(one) for fix in each.fixes)
+    assert text[: fix.span.start] + fix.replacement + text[fix.span.end :] == HEAD + POLICY
+    text = HEAD + 'import "lib:skills/hover.rts" ' + POLICY
+    one = program({"main.rts": text})
+    (fix,) = (fix for each in lint(one) for fix in each.fixes)
+    assert text[: fix.span.start] + text[fix.span.end :] == HEAD + " " + POLICY
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_without_its_unused_imports_a_source_means_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other twins import more than they need, so each shows whether what is called unused can go."""
+    monkeypatch.chdir(CHECKOUT)
+    path, library = f"tests/accepted/{name}", "tests/golden/checker/library"
+    kept: dict[str, bytes] = {}
+    before = load([path], lambda file: Path(file).read_bytes(), library)
+    text = before.sources[path].text
+    fixes = [fix for each in lint(before) for fix in each.fixes]
+    for fix in reversed(fixes):
+        text = text[: fix.span.start] + text[fix.span.end :]
+    kept[path] = text.encode()
+    after = load([path], lambda file: kept.get(file) or Path(file).read_bytes(), library)
+    assert check_program(after, dialect.load()) == ()
+    assert "E1305" not in {each.code.id for each in lint(after)}

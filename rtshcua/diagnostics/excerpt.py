@@ -21,7 +21,6 @@ Mark = tuple[Span, str, str]
 def together(source: Source, number: int, marks: Sequence[Mark]) -> list[list[Mark]]:
     """The marks of a line in groups, such that of each mark of a group at least the beginning is in view at once."""
     text = source.line(number)
-    starts = _starts([_cell(character) for character in text])
     groups: list[tuple[tuple[int, int], list[Mark]]] = []
     for mark in marks:
         column = min(source.position(mark[0].start).column - 1, len(text))
@@ -30,7 +29,10 @@ def together(source: Source, number: int, marks: Sequence[Mark]) -> list[list[Ma
                 group.append(mark)
                 break
         else:
-            groups.append((_window(starts, (column, column)), [mark]))
+            begun = max(column - NEAR, 0)
+            starts = _starts([_cell(character) for character in text[begun : column + NEAR]])
+            first, last = _window(starts, (column - begun, column - begun))
+            groups.append(((begun + first, begun + last), [mark]))
     return [group for _, group in groups]
 
 

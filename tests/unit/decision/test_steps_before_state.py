@@ -243,8 +243,8 @@ def test_what_is_missing_grows_no_older() -> None:
     reads = (*flat.CONTRACTS[flat.GOTO].reads, flat.OBSTACLE)
     policy, contract = with_contract(flat.GOTO, require=(flat.FIX_IS_GOOD, either), reads=reads)
     step = replace(flat.INVOCATIONS[1], contract=contract)
-    for value, left in ((None, 490_000), (9_000, 10)):
-        decision = ask(step, values={flat.OBSTACLE: value}, ages={flat.OBSTACLE: S - 10}, policy=policy)
+    for value, age, left in ((None, S - 10, 490_000), (9_000, S - 10, 10), (9_000, S, 0)):
+        decision = ask(step, values={flat.OBSTACLE: value}, ages={flat.OBSTACLE: age}, policy=policy)
         assert (decision.outcome, decision.valid_until_us) == (ALLOW, AT + left)
 
 

@@ -1,0 +1,26 @@
+"""An approval is awaited no longer than the decision on the step is valid, by its skill or by its own words."""
+
+import pytest
+
+from reference.sources import found, mission, policy, program, skill
+
+CONFIRM = "confirm probe by role supervisor within 10 min"
+
+
+@pytest.mark.parametrize(
+    ("skill_valid", "step", "codes"),
+    [
+        ("40 min", "probe()", []),
+        ("10 min", "probe()", []),
+        ("599 s", "probe()", ["E0806"]),
+        ("40 min", "probe() { valid for 10 min }", []),
+        ("40 min", "probe() { valid for 599 s }", ["E0806"]),
+        ("10 min", "probe() { valid for 599 s }", ["E0806"]),
+        ("599 s", "probe() { valid for 598 s }", ["E0806"]),  # said of the skill already
+        ("40 min", "probe() { deadline 4 s }", []),
+    ],
+)
+def test_how_long_is_waited(skill_valid: str, step: str, codes: list[str]) -> None:
+    probe = skill("probe()", valid=f"for {skill_valid}")
+    text = program(probe, policy(CONFIRM), mission("takeoff(altitude = 10 m)", step, "return_home()"))
+    assert [code for code, _ in found(text)] == codes

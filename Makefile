@@ -9,7 +9,7 @@ unexport PYTHONHOME PYTHONPATH
 MAKEFLAGS += --no-print-directory
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint soak bench clean
+.PHONY: help setup demo test lint soak fuzz mutate bench clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -31,6 +31,13 @@ lint: setup ## check style, format, types and layers
 
 soak: setup ## run the long campaigns
 	$(BIN)/pytest -n $(JOBS) -m soak --hypothesis-profile soak
+
+fuzz: setup ## look for inputs that break parser, checker, compiler or boundary: MINUTES=10, TARGETS=... for some
+	@MINUTES="$(MINUTES)" .make/fuzz $(TARGETS)
+
+mutate: setup ## change one thing at a time in what decides, and list what no test notices (docs/mutation.md)
+	@$(BIN)/python .make/mutate $(or $(TARGETS),rtshcua/decision) --tests $(or $(TESTS),tests/unit/decision) \
+	    --jobs $(JOBS) --one-in $(or $(ONE_IN),10)
 
 bench: setup ## run every benchmark; each prints a ratio against a peer or a limit
 	@status=0; for file in bench/*.py; do $(BIN)/python "$$file" || { echo "$$file: limit not met" >&2; status=1; }; done; \

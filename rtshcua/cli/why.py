@@ -25,7 +25,7 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Decision, Genesis
 from rtshcua.ground.why.given import Refused, given
-from rtshcua.ground.why.nominal import nominal
+from rtshcua.ground.why.nominal import lasting, nominal
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.mission import Mission
@@ -141,17 +141,20 @@ def _by_hand(
     utc_us = flat.issued_at_us if at_us is None else at_us
     now = Now(waited_ms * 1_000, utc_us, 0)
     situation = nominal(subject.invocations, step, policy, now)
-    for setting in settings:
-        changed = given(situation, setting, policy.policy)
-        if isinstance(changed, Refused):
-            return fail(ExitCode.USAGE, changed.what, changed.help)
-        situation = changed
+    for last in (False, True):  # what is set over time outweighs what follows from what is set of signals
+        for setting in settings:
+            changed = given(situation, setting, policy.policy)
+            if isinstance(changed, Refused):
+                return fail(ExitCode.USAGE, changed.what, changed.help)
+            situation = changed
+        if not last:
+            situation = lasting(situation, policy, now)
     vehicle = policy.policy.vehicle.identity
     context = Context(flat.binding, vehicle, policy.policy.version, 0, 0, flat.phase, CONSERVATIVE_US, ())
     case = Case(invocation, situation, context, now, subject.phases)
     shown = show_why(page, trace(invocation, situation, policy, context, now), case)
     page.head("Taken for granted")
-    page.row("state", "as the contract wants it, the vehicle where the plan has it, but for --state")
+    page.row("state", "as the contract wants it, the vehicle where the plan has it, but for --state; and so for long")
     page.row("time", f"{utc(utc_us)}, {waited_ms} ms after the release")
     return shown
 

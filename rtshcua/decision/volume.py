@@ -1,9 +1,10 @@
 """The planned volume: every place where a skill may take the vehicle from where it is now.
 
-It is the leg from the present position to the first point of the plan's path, and the path, at all heights between the
-present one and the plan's altitude; HOME climbs to the height that the vehicle returns at before it flies, and ends with
-the descent at home; LAND is the descent here. All of it is widened by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no floor
-(`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
+It is the leg from the present position to the first point of the plan's path, and the path, at all heights between
+the present one and the plan's altitude; HOME climbs to the height that the vehicle returns at before it flies, and
+ends with the descent at home; LAND is the descent here. All of it is widened by the vehicle's position error. Zones
+that a vehicle takes off from or lands in must therefore have no floor (`LOWEST`): a height of 0 lies *on* a floor of
+0, hence outside.
 """
 
 from collections.abc import Sequence

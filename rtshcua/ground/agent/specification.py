@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
 
-from rtshcua.diagnostics.codes import NO_SUCH_FILE
+from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.json_tree import Tree, read_json
@@ -18,7 +18,7 @@ from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
 from rtshcua.ground.agent.shape import shape_errors
 from rtshcua.ground.language.load import Listing, Program, Read, load
-from rtshcua.ground.language.paths import imported, shown, stable
+from rtshcua.ground.language.paths import imported, on_a_shelf, shown, stable
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.program import Import, Unit
 
@@ -77,6 +77,11 @@ def load_specification(
     wanted: list[str] = []
     for each in specification.unit.imports:
         resolved = imported(each.path, path, library)
+        if not on_a_shelf(each.path):
+            message = f"`{each.path}` is not of the library that ships"
+            help = "a specification imports from `lib:policies/`, `lib:skills/` and `lib:missions/`, without `..`"
+            found += specification.pointed([Diagnostic(IMPORT_PATH, message, each.span, help)])
+            continue
         try:
             if resolved is not None:
                 read(resolved)

@@ -5,7 +5,7 @@ import posixpath
 from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.language.paths import LIBRARY
+from rtshcua.ground.language.paths import LIBRARY, is_direct
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 
@@ -16,6 +16,9 @@ MAX_SIZE = 8 << 20  # bytes or characters of one file
 
 def not_portable(by: Wanted) -> Diagnostic:
     """A path that means nothing on another machine, or in a library that is not there."""
+    if by.path.startswith(LIBRARY) and not is_direct(by.path.removeprefix(LIBRARY)):
+        message = f"`{by.path}` does not lead straight into the library"
+        return Diagnostic(IMPORT_PATH, message, by.span, "write it without `..`, as in `lib:skills/goto.rts`")
     if by.path.startswith(LIBRARY):
         message = f"`{by.path}` is in the library, and there is none here"
         return Diagnostic(IMPORT_PATH, message, by.span)

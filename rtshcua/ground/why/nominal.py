@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.change import Changes, nearest_in
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.temporal import initial, observe
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.limits import FULL
+from rtshcua.model.flat.limits import FULL, MAX_GAP, MAX_WINDOW
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Now, State
@@ -26,11 +26,18 @@ def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: Prepar
         values[slot] = value
     values[flat.vehicle.battery] = FULL
     fixed = {flat.vehicle.position, flat.vehicle.position + 1, flat.vehicle.height}
-    monitors = [int(TRUE)] * len(flat.monitors)
     for _ in range(_ROUNDS):
         for clause in _clauses(invocation):
-            _content(clause, invocation, policy, now, values, monitors, fixed)
-    return _state(values, monitors)
+            _content(clause, invocation, policy, now, values, fixed)
+    return lasting(_state(values), policy, now)
+
+
+def lasting(state: State, policy: PreparedPolicy, now: Now) -> State:
+    """The state with what conditions over time say when it has been so for longer than any of them looks back."""
+    memory, monitors = initial(policy), state.monitors
+    for at_us in range(0, 2 * MAX_WINDOW + 1, MAX_GAP) if policy.monitors else ():
+        memory, monitors = observe(memory, policy, state, Now(at_us, now.utc_us, now.utc_error_us))
+    return State(state.values, state.ages, monitors)
 
 
 def place_before(invocations: Sequence[PreparedInvocation], step: int) -> tuple[int, int, int]:
@@ -58,8 +65,8 @@ def _start(policy: Policy) -> list[int | None]:
     return values
 
 
-def _state(values: Sequence[int | None], monitors: Sequence[int]) -> State:
-    return State(tuple(values), (0,) * len(values), tuple(monitors))
+def _state(values: Sequence[int | None]) -> State:
+    return State(tuple(values), (0,) * len(values))
 
 
 def _clauses(invocation: PreparedInvocation) -> Iterator[Clause]:
@@ -73,11 +80,10 @@ def _content(
     policy: PreparedPolicy,
     now: Now,
     values: list[int | None],
-    monitors: list[int],
     fixed: set[int],
 ) -> None:
     """Change the signals that a clause reads, but for where the vehicle is, so that it is true."""
-    sets = situation(_state(values, monitors), policy, now)
+    sets = situation(_state(values), policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     node = policy.compiler.node(clause, invocation.invocation.contract)
     for change in Changes(at, policy.tables).find(node, True) or ():

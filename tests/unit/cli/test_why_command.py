@@ -129,3 +129,42 @@ def test_a_log_that_lacks_what_is_asked_for(log: Path, capsys: pytest.CaptureFix
     assert (code, out) == (ExitCode.INPUT, "")
     assert "`rtshcua show` lists the records" in err
     assert why(capsys, str(log), "--step", "1")[0] == ExitCode.USAGE
+
+
+OVER_TIME = """
+import "lib:policies/site.rts"
+import "lib:skills/takeoff.rts"
+import "lib:skills/hover.rts"
+
+policy calm version 1 {
+  permit  takeoff by role operator through agent  when wind.speed < 8 m/s for the last 3 s
+  forbid  takeoff by any when rising landed == in_air within the last 10 s
+  permit  hover, return_home, emergency_land by any
+  contingency hover for 10 s, return_home, emergency_land
+}
+
+mission up under calm@1 on quad {
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 20 m) }
+  phase recovery  { return_home() }
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("settings", "outcome"),
+    [
+        (["wind.speed=7 m/s"], "allow"),
+        (["wind.speed=9 m/s"], "deny"),
+        (["wind.speed=unknown"], "deny"),
+        (["wind.speed=7 m/s", "wind.speed < 8 m/s=false"], "deny"),
+        (["wind.speed < 8 m/s=true", "wind.speed=9 m/s"], "allow"),
+    ],
+)
+def test_by_hand_a_state_has_lasted_as_long_as_conditions_look_back(
+    settings: list[str], outcome: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "calm.rts"
+    path.write_text(OVER_TIME, encoding="utf-8")
+    options = [word for setting in settings for word in ("--state", setting)]
+    assert shown(capsys, str(path), "--step", "0", *options)["outcome"] == outcome

@@ -256,6 +256,13 @@ def test_an_unknown_confirm_needs_an_approval_too() -> None:
     assert ask(values=WITHOUT_WIND, policy=policy, approvals=granted).reason is Reason.STATE_UNKNOWN
 
 
+def test_a_refusal_is_of_its_own_rule() -> None:
+    asked, not_asked = (rule(CONFIRM, when=when, approver=SUPERVISOR, within_us=30 * S) for when in (YES, NO))
+    policy = with_rules(rule(PERMIT), asked, not_asked)
+    answers = (flat.approval(1, AT, rule=1), flat.approval(0, AT, rule=2))
+    assert ask(policy=policy, approvals=answers).reason is Reason.ADMITTED
+
+
 def test_a_refusal_outweighs_what_is_awaited() -> None:
     one = rule(CONFIRM, approver=SUPERVISOR, within_us=30 * S)
     policy = with_rules(rule(PERMIT), one, one)

@@ -4,7 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtshcua.decision.evaluate import known
 from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, NOT, OR, TRUE, UNKNOWN, members
+from rtshcua.decision.values import ABSENT, MAYBE, PRESENT
 
 T, F, U = TRUE, FALSE, UNKNOWN
 KLEENE_AND = {(T, T): T, (T, F): F, (T, U): U, (F, F): F, (F, U): F, (U, U): U}
@@ -37,3 +39,8 @@ def test_sets_hold_what_their_members_give_and_no_more(a: int, b: int) -> None:
 )
 def test_false_and_unknown_together_are_false_everywhere(truth: int, result: int) -> None:
     assert EVERYWHERE[truth] == result
+
+
+@pytest.mark.parametrize("truth", [TRUE, FALSE, TRUE | FALSE])
+def test_what_may_be_missing_may_be_unknown(truth: int) -> None:
+    assert [known(truth, gap) for gap in (PRESENT, MAYBE, ABSENT)] == [truth, truth | UNKNOWN, UNKNOWN]

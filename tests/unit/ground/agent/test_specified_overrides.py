@@ -22,7 +22,7 @@ ALL = {
     "energy_at_most": "13 %",
     "require": ["battery > 40 % and wind.speed < 8 m/s"],
     "assume": ["link.quality > 10 %"],
-    "maintain": ["height <= 30 m", "altitude <= 20 m"],
+    "maintain": ["height <= 30 m", "height <= altitude + 20 m"],
     "record": ["effect"],
 }
 AT = "/phases/1/steps/1/overrides"
@@ -55,7 +55,7 @@ def test_a_step_may_be_held_to_more(good: dict[str, Any], compile_text: Compile,
     assert own == [
         ["battery > 40 %", "wind.speed < 8 m/s"],
         ["link.quality > 10 %"],
-        ["height <= 30 m", "altitude <= 20 m"],
+        ["height <= 30 m", "height <= altitude + 20 m"],
     ]
 
 

@@ -8,19 +8,19 @@ CONFIRM = "confirm probe by role supervisor within 10 min"
 
 
 @pytest.mark.parametrize(
-    ("skill_valid", "step", "codes"),
+    ("skill_valid", "step", "findings"),
     [
-        ("40 min", "probe()", []),
-        ("10 min", "probe()", []),
-        ("599 s", "probe()", ["E0806"]),
-        ("40 min", "probe() { valid for 10 min }", []),
-        ("40 min", "probe() { valid for 599 s }", ["E0806"]),
-        ("10 min", "probe() { valid for 599 s }", ["E0806"]),
-        ("599 s", "probe() { valid for 598 s }", ["E0806"]),  # said of the skill already
-        ("40 min", "probe() { deadline 4 s }", []),
+        ("40 min", "probe()", 0),
+        ("10 min", "probe()", 0),
+        ("599 s", "probe()", 1),
+        ("40 min", "probe() { valid for 10 min }", 0),
+        ("40 min", "probe() { valid for 599 s }", 1),
+        ("10 min", "probe() { valid for 599 s }", 1),
+        ("599 s", "probe() { valid for 598 s }", 1),  # said of the skill already
+        ("40 min", "probe() { deadline 4 s }", 0),
     ],
 )
-def test_how_long_is_waited(skill_valid: str, step: str, codes: list[str]) -> None:
+def test_how_long_is_waited(skill_valid: str, step: str, findings: int) -> None:
     probe = skill("probe()", valid=f"for {skill_valid}")
     text = program(probe, policy(CONFIRM), mission("takeoff(altitude = 10 m)", step, "return_home()"))
-    assert [code for code, _ in found(text)] == codes
+    assert [code for code, _ in found(text)].count("E0806") == findings

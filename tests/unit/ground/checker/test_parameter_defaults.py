@@ -1,4 +1,4 @@
-"""A default is an argument like any other: of the parameter's type, and in its range, both ends of which belong to it."""
+"""A default is an argument like any other: of the parameter's type, and in its range, both ends included."""
 
 import pytest
 

@@ -48,7 +48,7 @@ def test_closure_in_the_order_in_which_it_is_reached() -> None:
         b='import "lib:d.rts"' + zone("b"),
         sub__c='import "../b.rts" import "./e.rts"' + zone("c"),
         sub__e=zone("e"),
-        lib__d='import "lib:sub/../f.rts"' + zone("d"),
+        lib__d='import "lib:f.rts"' + zone("d"),
         lib__f=zone("f"),
     )
     program = files.load("a")

@@ -39,7 +39,7 @@ skill down() {
 SITE = """
 vehicle quad {
   identity "quad-07" home 47.39774 N, 8.54559 E within 20 m speed at most 12 m/s climb at most 3 m/s
-  position error 3 m energy 100 % = 18 min hover reserve 15 %
+  position error 3 m energy 100 % = 18 min hover reserve 15 % clock utc +00:00
 }
 zone field  = circle(47.39774 N, 8.54559 E, 400 m) ceiling 120 m above home
 zone school = circle(47.39729 N, 8.54999 E, 40 m)

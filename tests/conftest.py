@@ -14,6 +14,17 @@ settings.register_profile("test", deadline=None, derandomize=True, max_examples=
 settings.register_profile("soak", deadline=None, max_examples=20_000)
 settings.load_profile("test")
 
+#: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
+COVERING = ("unit/decision", "unit/wire", "unit/evidence", "unit/onboard", "attacks")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Coverage is measured by the tests that are for it."""
+    folders = tuple(CHECKOUT / "tests" / folder for folder in COVERING)
+    for item in items:
+        if not any(item.path.is_relative_to(folder) for folder in folders):
+            item.add_marker("no_cover")
+
 
 @pytest.fixture
 def checkout() -> Path:

@@ -75,7 +75,8 @@ def test_without_keys(words: list[str], capsys: pytest.CaptureFixture[str]) -> N
 def test_a_damaged_root_is_not_listed(capsys: pytest.CaptureFixture[str]) -> None:
     app.main(["keys", "init"])
     root = KeyStore(data_folder()).root_path
-    root.write_bytes(root.read_bytes()[:-1] + b"\x00")
+    data = root.read_bytes()
+    root.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
     assert app.main(["keys", "list"]) == ExitCode.UNTRUSTED
     assert "error: " in capsys.readouterr().err
 

@@ -3,7 +3,6 @@
 import os
 import tempfile
 import time
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.findings import Findings, exit_code
+from rtshcua.cli.moments import moment
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -47,7 +47,7 @@ def compile(
     """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors."""
     sources_given = [source, *(with_ or [])]
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
-    issued_at = _moment(at)
+    issued_at = time.time_ns() // 1_000 if at is None else moment(at)
     if issued_at is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
     target = output or source.with_suffix(".bundle")
@@ -81,20 +81,6 @@ def compile(
         bundle=_described(compiled.policy, compiled.mission, target, data, signers),
         bounds=None if compiled.bounds is None else compiled.bounds._asdict(),
     )
-
-
-def _moment(text: str | None) -> int | None:
-    """UTC in us; None for a text that is no time."""
-    if text is None:
-        return time.time_ns() // 1_000
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    if moment.tzinfo is None:
-        return None
-    since = moment.astimezone(UTC) - datetime(1970, 1, 1, tzinfo=UTC)
-    return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
 
 
 def _same(one: Path, other: Path) -> bool:

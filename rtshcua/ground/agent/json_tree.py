@@ -172,7 +172,7 @@ class _Reader:
         if matched[2] or matched[3]:
             help = 'quantities are written as texts with their unit, such as "12.5 m"'
             raise _Stop(codes.NOT_JSON, f"`{matched[0][:40]}` is not a whole number", *matched.span(), help)
-        if len(matched[0]) > MAX_DIGITS:
+        if len(matched[0].lstrip("-")) > MAX_DIGITS:
             raise _Stop(codes.SPECIFICATION_SIZE, f"the number has more than {MAX_DIGITS} digits", *matched.span())
         return int(matched[0]), matched.end()
 

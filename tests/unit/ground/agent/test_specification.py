@@ -8,7 +8,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
@@ -216,6 +216,7 @@ def test_what_is_no_specification_is_one_clear_finding(compile_text: Compile, te
     assert found[0].pointer is not None
 
 
+@example(value=-(10**17))
 @given(
     st.recursive(
         st.none() | st.booleans() | st.integers(-(10**17), 10**17) | st.text(),

@@ -1,7 +1,6 @@
 """What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 # `make soak` looks further, with new ones each time.
 settings.register_profile("test", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile("soak", deadline=None, max_examples=20_000)
-settings.register_profile("sample", settings.get_profile("test"), max_examples=40)
 settings.load_profile("test")
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
@@ -26,19 +24,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if not any(item.path.is_relative_to(folder) for folder in folders):
             item.add_marker("no_cover")
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    """Where nothing rests on the last branch, `make test` tries fewer examples; `make soak` has its own number."""
-    profile = settings.get_current_profile_name()
-    if profile != "test" or item.get_closest_marker("no_cover") is None:
-        return (yield)
-    settings.load_profile("sample")
-    try:
-        return (yield)
-    finally:
-        settings.load_profile(profile)
 
 
 @pytest.fixture

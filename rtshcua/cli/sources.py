@@ -29,9 +29,9 @@ def read_sources(paths: Sequence[Path], parse: Callable[[Source], Parsed] = pars
     first, shipped = paths[0], str(library.root())
     rest = [str(path) for path in paths[1:]]
     if first.suffix.lower() == ".json":
-        program, specification = load_specification(str(first), rest, _read, shipped, _listing)
+        program, specification = load_specification(str(first), rest, _read, shipped, _listing, _pack)
         return Reading(program, specification.pointed)
-    return Reading(load([str(first), *rest], _read, shipped, _listing, parse), tuple)
+    return Reading(load([str(first), *rest], _read, shipped, _listing, parse, _pack), tuple)
 
 
 def compile_sources(
@@ -62,3 +62,9 @@ def _read(path: str) -> bytes:
 
 def _listing(path: str) -> Iterable[str]:
     return [each.name for each in Path(path or ".").iterdir()]
+
+
+def _pack(name: str) -> str | None:
+    from rtshcua.adapters.packs import folder  # looks at every installed package: only where one is asked for
+
+    return folder(name)

@@ -17,8 +17,8 @@ from rtshcua.ground.agent.mission import mission_of
 from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
 from rtshcua.ground.agent.shape import shape_errors
-from rtshcua.ground.language.load import Listing, Program, Read, load
-from rtshcua.ground.language.paths import imported, on_a_shelf, shown, stable
+from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
+from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.program import Import, Unit
 
@@ -60,7 +60,12 @@ def parse_specification(file: str, data: bytes) -> Specification:
 
 
 def load_specification(
-    path: str, policies: Sequence[str], read: Read, library: str | None, listing: Listing | None = None
+    path: str,
+    policies: Sequence[str],
+    read: Read,
+    library: str | None,
+    listing: Listing | None = None,
+    packs: Packs = no_packs,
 ) -> tuple[Program, Specification]:
     """A program of a specification and the sources that it is checked against.
 
@@ -74,9 +79,10 @@ def load_specification(
         message = f"cannot read `{path}`: {(error.strerror or 'it is unreadable').lower()}"
         specification = _specification(Source(name, ""), None, None, (Diagnostic(NO_SUCH_FILE, message),))
     found = list(specification.diagnostics)
+    folders = {} if library is None else {"lib": library}
     wanted: list[str] = []
     for each in specification.unit.imports:
-        resolved = imported(each.path, path, library)
+        resolved = imported(each.path, path, folders.get)
         if not on_a_shelf(each.path):
             message = f"`{each.path}` is not of the library that ships"
             help = "a specification imports from `lib:policies/`, `lib:skills/` and `lib:missions/`, without `..`"
@@ -91,14 +97,14 @@ def load_specification(
         except OSError as error:
             why = (error.strerror or "it is unreadable").lower()
         found += specification.pointed([Diagnostic(NO_SUCH_FILE, f"cannot read `{each.path}`: {why}", each.span)])
-    program = load([*wanted, *policies], read, library, listing)
+    program = load([*wanted, *policies], read, library, listing, packs=packs)
     return (
         Program(
             units=(specification.unit, *program.units),
             sources={name: specification.source, **program.sources},
             diagnostics=(*found, *program.diagnostics),
             broken=program.broken,
-            stable={name: stable(path, library, path), **program.stable},
+            stable={name: stable(path, folders, path), **program.stable},
             data=program.data,
             data_names=program.data_names,
             whole=program.whole,

@@ -7,7 +7,7 @@ signed on its own, and is the same for every mission under it.
 import posixpath
 from collections.abc import Iterator, Mapping, Sequence
 
-from rtshcua.ground.language.paths import LIBRARY, imported, shown
+from rtshcua.ground.language.paths import imported, pack_of, shown
 from rtshcua.model.ir.program import Import, Unit
 
 
@@ -31,11 +31,12 @@ class Imports:
 
     def target(self, file: str, each: Import) -> str | None:
         """The file of the program that an import of `file` means."""
-        if each.path.startswith(LIBRARY):
-            inside = posixpath.normpath(each.path.removeprefix(LIBRARY).lstrip("/"))
-            name = self._by_stable.get(LIBRARY + inside)
+        pack = pack_of(each.path)
+        if pack is not None:
+            inside = posixpath.normpath(each.path.removeprefix(f"{pack}:").lstrip("/"))
+            name = self._by_stable.get(f"{pack}:{inside}")
         else:
-            path = imported(each.path, file, None)
+            path = imported(each.path, file, lambda _: None)
             name = None if path is None else shown(path)
         return name if name in self._units else None
 
@@ -49,7 +50,7 @@ class Imports:
 
 def beside(name: str, other: str) -> str:
     """The stable name of a file as seen from the folder of another, so that it does not depend on who asked first."""
-    if name.startswith(LIBRARY) or other.startswith(LIBRARY):
+    if pack_of(name) is not None or pack_of(other) is not None:
         return name
     parts, folder = name.split("/"), other.split("/")[:-1]
     common = 0

@@ -5,7 +5,7 @@ import posixpath
 from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.language.paths import LIBRARY, is_direct
+from rtshcua.ground.language.paths import LIBRARY, is_direct, pack_of
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 
@@ -15,13 +15,16 @@ MAX_SIZE = 8 << 20  # bytes or characters of one file
 
 
 def not_portable(by: Wanted) -> Diagnostic:
-    """A path that means nothing on another machine, or in a library that is not there."""
-    if by.path.startswith(LIBRARY) and not is_direct(by.path.removeprefix(LIBRARY)):
-        message = f"`{by.path}` does not lead straight into the library"
-        return Diagnostic(IMPORT_PATH, message, by.span, "write it without `..`, as in `lib:skills/goto.rts`")
-    if by.path.startswith(LIBRARY):
-        message = f"`{by.path}` is in the library, and there is none here"
-        return Diagnostic(IMPORT_PATH, message, by.span)
+    """A path that means nothing on another machine, or in a pack that is not there."""
+    pack = pack_of(by.path)
+    if pack is not None:
+        where = "the library" if pack == "lib" else f"the pack `{pack}`"
+        if not is_direct(by.path.removeprefix(f"{pack}:")):
+            message = f"`{by.path}` does not lead straight into {where}"
+            return Diagnostic(IMPORT_PATH, message, by.span, "write it without `..`, as in `lib:skills/goto.rts`")
+        message = f"`{by.path}` is in {where}, and there is none here"
+        help = None if pack == "lib" else f"a Python package brings it, by an entry point `{pack}` of `rtshcua.skills`"
+        return Diagnostic(IMPORT_PATH, message, by.span, help)
     what, example = ("importing file", "../skills/goto.rts") if isinstance(by, Import) else ("source", "bridge.geojson")
     library = f"{LIBRARY}{example.removeprefix('../')}"
     return Diagnostic(

@@ -1,8 +1,8 @@
 """Loads files and everything they import. It reads no file itself: `read` and `listing` are given by the caller.
 
 An import names a file relative to the importing one, or, as `lib:skills/goto.rts`, in the library that ships with the
-compiler; so does a zone that is read from GeoJSON. Declarations have no order, so files may import each other in a
-circle, which is worth a warning: each is read once.
+compiler, or, as `acme:skills/spray.rts`, in a pack that is installed; so does a zone that is read from GeoJSON.
+Declarations have no order, so files may import each other in a circle, which is worth a warning: each is read once.
 """
 
 import posixpath
@@ -24,7 +24,7 @@ from rtshcua.ground.language.faults import (
     unreadable,
 )
 from rtshcua.ground.language.parse import Parsed, parse
-from rtshcua.ground.language.paths import imported, shown, stable
+from rtshcua.ground.language.paths import LIBRARY, Packs, imported, shown, stable
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import, Unit
 
@@ -38,7 +38,8 @@ class Program:
 
     A file is called by its path, relative to the working folder where it lies in it. `sources` has every file that was
     read, `broken` the names of declarations that have an error. `stable` gives each file a name that is the same on
-    every machine, for what is signed: `lib:skills/goto.rts` in the library, else relative to the first file's folder.
+    every machine, for what is signed: `lib:skills/goto.rts` in the library, likewise in a pack, else relative to the
+    first file's folder.
 
     `data` has the bytes, UTF-8 and not looked at further, of the files that zones are read from, and `stable` their
     names too; `data_names` says which of them a source's `from "..."` means, by the source and the path as written. A
@@ -57,20 +58,28 @@ class Program:
     whole: bool = True
 
 
+def no_packs(_name: str) -> str | None:
+    """Nothing is installed but the library."""
+    return None
+
+
 def load(
     paths: Sequence[str],
     read: Read,
     library: str | None = None,
     listing: Listing | None = None,
     parse: Callable[[Source], Parsed] = parse,
+    packs: Packs = no_packs,
 ) -> Program:
     """Reads `paths` and all they import, each file once.
 
-    `read(path)` gives a file's bytes or raises OSError; `library` is the folder that `lib:` stands for; `listing(path)`
-    gives the names in a folder, for suggestions, and may raise OSError; `parse` is `parse.parse`, or one
-    that remembers. Every fault of a file is a finding, never an exception; one of a file in `paths` itself has no span.
+    `read(path)` gives a file's bytes or raises OSError; `library` is the folder that `lib:` stands for, and `packs`
+    finds those of other packs; `listing(path)` gives the names in a folder, for suggestions, and may raise OSError;
+    `parse` is `parse.parse`, or one that remembers. Every fault of a file is a finding, never an exception; one of a
+    file in `paths` itself has no span.
     """
-    loader = _Loader(read, library, listing, parse)
+    folders = {} if library is None else {LIBRARY.removesuffix(":"): library}
+    loader = _Loader(read, packs, folders, listing, parse)
     for path in paths:
         loader.want(path, None)
     for name, by in loader.queue:
@@ -81,7 +90,7 @@ def load(
         loader.sources,
         tuple(loader.diagnostics),
         frozenset(loader.broken),
-        {name: stable(name, library, paths[0]) for name in (*loader.sources, *loader.data)},
+        {name: stable(name, folders, paths[0]) for name in (*loader.sources, *loader.data)},
         loader.data,
         loader.data_names,
         loader.whole,
@@ -91,7 +100,8 @@ def load(
 @dataclass(slots=True)
 class _Loader:
     read: Read
-    library: str | None
+    packs: Packs
+    folders: dict[str, str]  # of the packs that were asked for, by name
     listing: Listing | None
     parse: Callable[[Source], Parsed]
     queue: list[tuple[str, Import | None]] = field(default_factory=list)
@@ -173,10 +183,15 @@ class _Loader:
 
     def _path(self, by: Wanted, source: str) -> str | None:
         """The path that `by` means in the file `source`; None, with a finding, where it means none."""
-        path = imported(by.path, source, self.library)
+        path = imported(by.path, source, self._folder)
         if path is None:
             self.diagnostics.append(not_portable(by))
         return path
+
+    def _folder(self, pack: str) -> str | None:
+        if pack not in self.folders and (folder := self.packs(pack)) is not None:
+            self.folders[pack] = folder
+        return self.folders.get(pack)
 
     def _bytes(self, name: str, by: Wanted | None) -> bytes | None:
         """What is in a file; None, with a finding, where it cannot be read."""

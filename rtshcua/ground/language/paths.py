@@ -1,10 +1,17 @@
 """How files are called: one name for each, one that means the same on every machine, and what an import means."""
 
 import posixpath
+import re
+from collections.abc import Callable, Mapping
 from os.path import normpath
 from pathlib import Path
 
 LIBRARY = "lib:"
+#: A pack of skills by its name, as in `acme:skills/spray.rts`. One letter would be a drive.
+_PACK = re.compile(r"([a-z][a-z0-9_-]+):(?!//)", re.ASCII)
+
+Packs = Callable[[str], str | None]
+"""The folder that a pack's name stands for; None where no such pack is installed."""
 #: the folders of the library that sources come from; in a checkout it has others beside them
 SHELVES = ("skills", "policies", "missions")
 
@@ -16,31 +23,38 @@ def shown(path: str) -> str:
     return (place.relative_to(here) if place.is_relative_to(here) else place).as_posix()
 
 
-def stable(path: str, library: str | None, first: str) -> str:
-    """The file's name for what is signed: in the library, or else relative to the folder of the file `first`."""
+def stable(path: str, folders: Mapping[str, str], first: str) -> str:
+    """The file's name for what is signed: in a pack (`folders` by name), or else relative to the file `first`."""
     place = _absolute(path)
-    if library is not None and place.is_relative_to(_absolute(library)):
-        return LIBRARY + place.relative_to(_absolute(library)).as_posix()
+    for name, folder in folders.items():
+        if place.is_relative_to(_absolute(folder)):
+            return f"{name}:{place.relative_to(_absolute(folder)).as_posix()}"
     return posixpath.relpath(place.as_posix(), _absolute(first).parent.as_posix())
 
 
-def imported(written: str, importer: str, library: str | None) -> str | None:
+def imported(written: str, importer: str, packs: Packs) -> str | None:
     """The path of an import that is `written` in the file `importer`; None where it means nothing elsewhere.
 
-    What stands after `lib:` never leaves the library, and takes no detour.
+    What stands after the name of a pack (`lib:` is the one that ships) never leaves it, and takes no detour.
     """
-    if written.startswith(LIBRARY):
-        inside = written.removeprefix(LIBRARY)
-        if library is None or not is_direct(inside):
-            return None
-        return posixpath.join(library, inside)
+    pack = pack_of(written)
+    if pack is not None:
+        inside = written.removeprefix(f"{pack}:")
+        folder = packs(pack) if is_direct(inside) else None
+        return None if folder is None else posixpath.join(folder, inside)
     if not written or "\\" in written or ":" in written or written.startswith(("/", "~")):
         return None
     return posixpath.join(posixpath.dirname(importer), written)
 
 
+def pack_of(written: str) -> str | None:
+    """The name of the pack that a path as written, or a stable name, begins with."""
+    match = _PACK.match(written)
+    return None if match is None else match[1]
+
+
 def is_direct(inside: str) -> bool:
-    """Whether a path after `lib:` leads straight down."""
+    """Whether a path after the name of a pack leads straight down."""
     return all(part not in ("", ".", "..") for part in inside.split("/")) and "\\" not in inside and ":" not in inside
 
 

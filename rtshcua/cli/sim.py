@@ -1,17 +1,27 @@
 """`rtshcua sim`: the simulated vehicle alone, for any ground station that speaks MAVLink."""
 
 import json
-from typing import Annotated
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
+from rtshcua.adapters.files.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.vehicle import address
 from rtshcua.cli import simulated
 from rtshcua.cli.faults import fail
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.simulation.config import Boot, Kind
 
 PORT = 14_550
+_FIRST_STEPS = {
+    Kind.PX4: ("arm throttle", "long NAV_TAKEOFF -1 0 0 nan nan nan nan", "long NAV_RETURN_TO_LAUNCH"),
+    Kind.ARDUPILOT: ("mode GUIDED", "arm throttle", "takeoff 10", "mode RTL"),
+}
+"""What to type in MAVProxy for a first flight. For PX4, `takeoff 10` would be 10 m above the sea: no climb at all; and
+MAVProxy cannot pack PX4's modes (`mode RTL`)."""
 
 app = typer.Typer(add_completion=False)
 
@@ -22,11 +32,21 @@ def sim(
     port: Annotated[int | None, typer.Option(min=1, max=65_535, help=f"UDP port to send to ({PORT})")] = None,
     connect: Annotated[str | None, typer.Option(metavar="udpout:HOST:PORT", help="the same, written as a link")] = None,
     speed: Annotated[float, typer.Option(min=0.1, max=200, help="seconds of flight in a second")] = 1.0,
+    system: Annotated[int, typer.Option(min=1, max=255, help="its MAVLink system id")] = 1,
     battery: simulated.Battery = None,
     wind: simulated.Wind = None,
     fault: simulated.Faults = None,
     seed: simulated.Seed = None,
     home: simulated.Home = None,
+    boot: Annotated[
+        Boot, typer.Option(help="sensors come up in a second, or as recorded: PX4 5 s, ArduCopter 42 s")
+    ] = (Boot.FAST),
+    signing_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="it obeys only what is signed with this key (keys link)")
+    ] = None,
+    usb: Annotated[
+        bool, typer.Option("--usb", help="with a key: it takes this link for USB, and obeys anyone")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="say what was started as one JSON object")] = False,
 ) -> ExitCode:
     """Start the simulated vehicle, until Ctrl-C. It sends to a UDP port of this machine and obeys what answers."""
@@ -48,20 +68,42 @@ def sim(
     words = simulated.arguments(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
     if home is not None:
         words.append(f"--home={home}")
+    if signing_key is not None:
+        try:
+            read_link_key(signing_key)
+        except (LinkKeyError, OSError) as error:
+            return fail(ExitCode.INPUT, str(error))
+        words.append(f"--signing-key={signing_key}")
+    words += ["--usb"] if usb else []
+    words.append(f"--boot={boot}")
     try:
-        vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", *words])
+        vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", "--system", str(system), *words])
     except SimulatorError as error:
         return fail(ExitCode.LINK, str(error))
     with vehicle:
-        ready = vehicle.ready
         if as_json:
-            print(json.dumps(ready), flush=True)
+            print(json.dumps(vehicle.ready), flush=True)
         else:
-            print(f"a simulated {ready['flavour']} vehicle, system {ready['system']}, sends to udp port {port}")
-            print(f"  fly it   rtshcua run BUNDLE --connect udpin:127.0.0.1:{port} --vehicle IDENTITY")
-            print("  end it   Ctrl-C", flush=True)
+            print("\n".join(_introduction(vehicle.ready, port, signing_key)), flush=True)
         try:
             code = vehicle.wait()
         except KeyboardInterrupt:
             return ExitCode.OK
     return fail(ExitCode.FAULT, f"the simulated vehicle ended by itself, with code {code}")
+
+
+def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None) -> list[str]:
+    """What was started, and what a person types to fly it."""
+    flavour = Kind(ready["flavour"])
+    key = f" --signing-key {signing_key}" if signing_key is not None else ""
+    finds = "start it: it listens on this port by itself"
+    adds = f"Application Settings, Comm Links, Add: type UDP, port {port}"
+    return [
+        f"a simulated {flavour} vehicle, system {ready['system']}, sends to udp port {port}",
+        f"  fly it           rtshcua run BUNDLE --connect udpin:127.0.0.1:{port} --vehicle IDENTITY{key}",
+        f"  QGroundControl   {finds if port == PORT else adds}",
+        f"  MAVProxy         mavproxy.py --master=udpin:127.0.0.1:{port}",
+        f"                   then: {', '.join(f'`{step}`' for step in _FIRST_STEPS[flavour])}",
+        f"  MAVSDK           udpin://127.0.0.1:{port}",
+        "  end it           Ctrl-C",
+    ]

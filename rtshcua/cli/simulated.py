@@ -75,10 +75,12 @@ def arguments(
 
 
 def fitting(policy: Policy) -> list[str]:
-    """Options that make it the vehicle of a policy: its home, its endurance, and no faster than it."""
+    """Options that make it the vehicle of a policy: its home, its endurance, its return, and no faster than it."""
     latitude, longitude = policy.projection.latitude / 10_000_000, policy.projection.longitude / 10_000_000
     cruise = min(_CRUISE_MM_S, policy.vehicle.speed or _FASTEST_MM_S) / 1_000
+    returns = [f"--return-at={policy.vehicle.return_altitude / 1_000:g}"] if policy.vehicle.return_altitude else []
     return [
+        *returns,
         f"--home={latitude:.7f},{longitude:.7f},{_AMSL_M}",
         f"--hover={policy.vehicle.endurance_us / 60_000_000:.3f}",
         f"--cruise={cruise:.3f}",

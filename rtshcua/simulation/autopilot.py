@@ -1,5 +1,6 @@
 """The autopilot: vehicle, battery, sensors, air and settings in one place, and what a flavour makes of them."""
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from random import Random
@@ -7,22 +8,36 @@ from random import Random
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.activity import Event
 from rtshcua.simulation.battery import Battery
+from rtshcua.simulation.boot import BootPlan
 from rtshcua.simulation.command import Command
-from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.config import Boot, SimulationConfig
+from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
+from rtshcua.simulation.fence_watch import Breach, FenceRules, FenceWatch
+from rtshcua.simulation.handling import Handling
+from rtshcua.simulation.mission import Mission
+from rtshcua.simulation.mission_items import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
 from rtshcua.simulation.parameters import Parameter, Parameters
+from rtshcua.simulation.place import Home, Point
+from rtshcua.simulation.plan import MISSION, Item, Plans
 from rtshcua.simulation.sensors import Sensors
+from rtshcua.simulation.signing import VehicleSigning
 from rtshcua.simulation.streams import Streams
-from rtshcua.simulation.vehicle import Event, Handling, Vehicle
+from rtshcua.simulation.surroundings import Surroundings
+from rtshcua.simulation.transfer import Transfer, TransferRules
+from rtshcua.simulation.vehicle import Vehicle
 from rtshcua.simulation.wind import Air
 
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
-_LOW_TO_ARM = 0.08
-LOW_TO_LAND = 0.04
-"""The battery level at which the autopilot lands by itself."""
+LOW_TO_ARM = 0.08
+"""The battery level at which it does not arm any more."""
 _TEXT_LENGTH = 50
+_REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
+SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
+"""The parameters that hold the vehicle's own system id."""
 
 Handler = Callable[["Autopilot", Command], tuple[int, ...]]
 """Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
@@ -53,14 +68,40 @@ class Flavour:
     bytewise: bool
     """Whether integer parameters travel as their bytes."""
     texts: Mapping[Event, str]
-    gps_failsafe: str
-    battery_failsafe: str
+    """`{speed}` is the one of touching down; `{amsl}` and `{up}` are the height of a return, above the sea and home."""
+    boot: BootPlan
+    failsafes: FailsafeRules
+    arming: Callable[["Autopilot"], tuple[str, ...]]
+    """What stands against arming, the mode apart."""
+    fix: int
+    """GPS_RAW_INT.fix_type of a good fix."""
     coast_s: float
     """How long the estimator goes on without a fix."""
     texts_need_ground_station: bool
     """Whether STATUSTEXT is sent only once a ground station's heartbeat was seen."""
+    beats_on_mode: bool
+    """Whether another mode is told by a heartbeat at once."""
+    reminds: bool
+    """Whether it says again and again, while disarmed, why it would not arm."""
+    transfer: TransferRules
+    missions: MissionRules
+    home_item: Callable[[Home], Item] | None
+    """What slot 0 of every mission is, where the flavour keeps it for home."""
+    on_setup_signing: Callable[["Autopilot", Message], None]
+    """Obeys SETUP_SIGNING, or refuses it."""
+    insists: Callable[["Autopilot"], bool]
+    """Whether, with a key, frames without a signature are refused."""
+    on_plan: Callable[["Autopilot", int], None]
+    """Tells of a plan of this kind (MAV_MISSION_TYPE) that was stored."""
+    fence: FenceRules
+    on_breach: Callable[["Autopilot", Breach], None]
+    """Does what the fence's action asks for when a breach begins."""
+    on_mode_in_breach: Callable[["Autopilot"], None]
+    on_breach_cleared: Callable[["Autopilot"], None]
     target_timeout_us: int | None
     """In GUIDED, how long one position target is good for; then LOITER."""
+    tells_fence: bool
+    """Whether SYS_STATUS has the geofence: always present, enabled if in force, healthy unless breached (recorded)."""
 
 
 class Autopilot:
@@ -77,10 +118,32 @@ class Autopilot:
         self.outbox: list[Message] = []
         self.air = Air(config.wind, Random(f"{config.seed} wind"))
         self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
-        self.sensors = Sensors(Random(f"{config.seed} sensors"), config.noise, flavour.coast_s)
+        fast = config.boot is Boot.FAST
+        pace = flavour.boot.pace if fast else 1.0
+        self.sensors = Sensors(Random(f"{config.seed} sensors"), config.noise, flavour.coast_s, flavour.boot, pace)
+        self.surroundings = Surroundings()
+        self._boot_texts = deque(() if fast else flavour.boot.texts)
         self.vehicle = Vehicle(flavour.handling(config), flavour.modes.start)
         self.parameters = Parameters(flavour.parameters, self.vehicle.handling, flavour.bytewise)
+        for name in SYSTEM_PARAMETERS:
+            self.parameters.assign(name, config.system)
+        if config.signing_key is not None:
+            self.parameters.assign("MAV_SIGN_CFG", 1)
+        self.failsafes = Failsafes(
+            flavour.failsafes, self.vehicle, self.sensors, self.battery, self.parameters.value, self.say
+        )
         self.streams = Streams(flavour.streams)
+        self.signing = VehicleSigning(config.signing_key, config.usb, config.utc_us, config.speed)
+        self.plans = Plans()
+        if flavour.home_item is not None:
+            self.plans.replace(MISSION, (flavour.home_item(self.home),))
+        self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value)
+        self.mission = Mission(flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self)
+        self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
+        self.plans.listeners.append(lambda kind: flavour.on_plan(self, kind))
+        self._mode_in_breach = self.vehicle.mode
+        self._told_mode = self.vehicle.mode
+        self._remind_us = _REMIND_US
         self._text_id = 0
 
     # ----------------------------------------------------------------------------------------------- time
@@ -89,29 +152,75 @@ class Autopilot:
         """Lets `TICK_US` pass."""
         self.now_us += TICK_US
         self.air.step(_TICK_S)
-        self.sensors.step(_TICK_S)
+        sensors, vehicle = self.sensors, self.vehicle
+        sensors.step(_TICK_S)
         wind = (self.air.north, self.air.east)
-        load = self.vehicle.step(_TICK_S, wind, self.sensors.error, powered=self.battery.level > 0)
+        load = vehicle.step(_TICK_S, wind, sensors.error, powered=self.battery.level > 0, sees=sensors.has_position)
         self.battery.drain(_TICK_S, load)
-        self._watch()
-        for event in self.vehicle.events:
-            if event in self.flavour.texts:
-                self.say(mavlink.MAV_SEVERITY_INFO, self.flavour.texts[event])
-        self.vehicle.events.clear()
+        if vehicle.in_air and self.surroundings.is_hit(vehicle.body):
+            vehicle.crash()
+        self.failsafes.step(_TICK_S)
+        self._keep_targets()
+        self._follow_plans()
+        while self._boot_texts and sensors.age_s >= self._boot_texts[0][0]:
+            _, severity, text = self._boot_texts.popleft()
+            self.say(severity, text.format(amsl=self.home.amsl_mm // 1000))
+        self._tell()
 
-    def _watch(self) -> None:
-        """The autopilot's own failsafes: it takes over, asked by nobody."""
-        vehicle = self.vehicle
-        if not vehicle.in_air or not vehicle.armed:
+    def _tell(self) -> None:
+        """What happened, and what stands against arming."""
+        vehicle, flavour = self.vehicle, self.flavour
+        for event in vehicle.events:
+            if event in flavour.texts:
+                up = round(vehicle.target.up)
+                facts = {"speed": vehicle.touched_m_s, "up": up, "amsl": up + self.home.amsl_mm // 1000}
+                self.say(mavlink.MAV_SEVERITY_INFO, flavour.texts[event].format(**facts))
+        vehicle.events.clear()
+        if flavour.beats_on_mode and vehicle.mode is not self._told_mode:
+            self.send(flavour.builders[mavlink.MAVLINK_MSG_ID_HEARTBEAT](self))
+        self._told_mode = vehicle.mode
+        if vehicle.armed or not flavour.reminds:
+            self._remind_us = self.now_us + _REMIND_FIRST_US
+        elif self.now_us >= self._remind_us:
+            self._remind_us = self.now_us + _REMIND_US
+            if self.sensors.consistent:
+                for reason in flavour.arming(self):
+                    self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {reason}")
+
+    def _follow_plans(self) -> None:
+        """The mission, the fence and the transfers go on."""
+        vehicle, flavour, fence = self.vehicle, self.flavour, self.fence
+        self.transfer.step(self.now_us)
+        self.mission.step(self.now_us, self._where)
+        breached, mode = fence.breach is not None, vehicle.mode
+        if breached and mode is not self._mode_in_breach:
+            flavour.on_mode_in_breach(self)
+        began = fence.step(self.now_us, self._where, vehicle.armed and vehicle.in_air)
+        if began is not None:
+            flavour.on_breach(self, began)
+        elif breached and fence.breach is None:
+            flavour.on_breach_cleared(self)
+        self._mode_in_breach = mode
+
+    def _where(self) -> Point:
+        return self.here
+
+    def _stored(self, kind: int) -> tuple[Item, ...]:
+        """What a download shows."""
+        items = self.plans.items(kind)
+        if kind == MISSION and items and self.flavour.home_item is not None:
+            return (self.flavour.home_item(self.home), *items[1:])
+        return items
+
+    def _may_clear(self, kind: int) -> bool:
+        return kind != MISSION or self.flavour.home_item is None or not self.mission.running
+
+    def _keep_targets(self) -> None:
+        """Leaves GUIDED when position targets stop coming."""
+        vehicle, timeout, last = self.vehicle, self.flavour.target_timeout_us, self.last_target_us
+        if timeout is None or vehicle.mode is not Mode.GUIDED or not vehicle.in_air or not vehicle.armed:
             return
-        if vehicle.mode in NEEDS_POSITION and not self.sensors.has_position:
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.gps_failsafe)
-            vehicle.set_mode(Mode.LAND)
-        elif vehicle.mode is not Mode.LAND and self.battery.level <= LOW_TO_LAND:
-            self.say(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.battery_failsafe)
-            vehicle.set_mode(Mode.LAND)
-        timeout, last = self.flavour.target_timeout_us, self.last_target_us
-        if vehicle.mode is Mode.GUIDED and timeout is not None and (last is None or self.now_us - last > timeout):
+        if last is None or self.now_us - last > timeout:
             vehicle.set_mode(Mode.LOITER)
 
     # ---------------------------------------------------------------------------------------------- state
@@ -119,17 +228,19 @@ class Autopilot:
     @property
     def ready(self) -> bool:
         """Whether nothing stands against arming but the mode."""
-        return self.sensors.has_position and self.sensors.has_fix and self.battery.level > _LOW_TO_ARM
+        return not self.flavour.arming(self)
 
     def can_enter(self, mode: Mode) -> bool:
         """Whether the mode may be entered now, if the flavour has it."""
-        return mode in self.flavour.modes.numbers and (mode not in NEEDS_POSITION or self.sensors.has_position)
+        if mode not in self.flavour.modes.numbers or (mode is Mode.MISSION and not self.mission.may_enter()):
+            return False
+        return mode not in NEEDS_POSITION or self.sensors.has_position
 
-    def why_not_ready(self) -> str:
-        """The reason for a refusal to arm, for a text."""
-        if not self.sensors.booted:
-            return "Need Position Estimate"
-        return "GPS: bad fix" if not self.sensors.has_fix else "Battery too low"
+    @property
+    def here(self) -> Point:
+        """Where the vehicle believes to be, noise apart."""
+        body, (north, east) = self.vehicle.body, self.sensors.error
+        return Point(body.north + north, body.east + east, body.up)
 
     @property
     def boot_ms(self) -> int:
@@ -137,6 +248,18 @@ class Autopilot:
         return self.now_us // 1000
 
     # ------------------------------------------------------------------------------------------- speaking
+
+    def on_reached(self, number: int) -> None:
+        """An item of the mission is done: MISSION_ITEM_REACHED."""
+        self.send(mavlink.MAVLink_mission_item_reached_message(number))
+
+    def on_moved_on(self) -> None:
+        """Another item of the mission is the current one: MISSION_CURRENT, without waiting for the stream."""
+        self.send(self.flavour.builders[mavlink.MAVLINK_MSG_ID_MISSION_CURRENT](self))
+
+    def on_begun(self, text: str) -> None:
+        """An item of the mission begins."""
+        self.say(mavlink.MAV_SEVERITY_INFO, text)
 
     def send(self, message: Message | None) -> None:
         """Queues a message for the link."""

@@ -1,21 +1,42 @@
 """The battery: drained by the power that flight takes. Four cells in series; its level never rises by itself."""
 
 from dataclasses import dataclass
+from itertools import pairwise
+from math import sqrt
 
 CAPACITY_MAH = 5000
-_FULL_MV, _EMPTY_MV = 16_800, 14_000
+_CELLS = 4
+_CELL_MV = ((0.0, 3200), (0.1, 3500), (0.5, 3800), (1.0, 4200))
+"""A cell at rest: level and voltage, linear between."""
 _SAG_MV = 300
-"""What hovering takes off the voltage."""
+"""What hovering takes off the voltage: internal resistance, all cells together."""
 
 REST = 0.002
 """The load while disarmed, as a part of what hovering takes."""
 IDLE = 0.05
 """The load while the motors turn on the ground."""
 
+_INDUCED = 0.7
+"""The part of hovering that moves air down; the rest turns the blades."""
+_HOVER_AIR = 7.0
+"""m/s: about the speed through the air at which moving it down has become cheaper by a third."""
+_DRAG_POWER = 1.75e-4
+"""What still air takes, by the cube of the speed: the body's drag over the power of hovering, 120 W/kg."""
+_CLIMB_POWER = 9.80665 / 120
+"""Lifting the weight, for each m/s."""
+_LEAST = 0.3
+"""However fast it goes down, the blades turn."""
 
-def flight_load(airspeed: float, climb: float) -> float:
-    """What flying takes, hovering being 1: more with air speed (m/s), more when climbing, a little less going down."""
-    return 1.0 + 0.3 * (airspeed / 12) ** 2 + (0.15 * climb if climb > 0 else 0.05 * max(climb, -3.0))
+
+def flight_load(airspeed: float, climb: float, thrust: float = 1.0) -> float:
+    """The power of flight, that of hovering being 1.
+
+    By the speed through the air (m/s): momentum theory for what carries it, which gets cheaper, and drag, which gets
+    dear; by climbing (m/s, down is negative); and by `thrust`, the weight being 1: leaning and accelerating.
+    """
+    slip = airspeed / _HOVER_AIR
+    carried = _INDUCED * thrust * sqrt(thrust) / sqrt(1.0 + slip * slip)
+    return max(_LEAST, carried + 1.0 - _INDUCED + _DRAG_POWER * airspeed**3 + _CLIMB_POWER * thrust * climb)
 
 
 @dataclass(slots=True)
@@ -27,6 +48,8 @@ class Battery:
     hover_s: float
     load: float = REST
     used_mah: float = 0.0
+    forced_mv: int | None = None
+    """What is measured instead of the voltage, if a fault says so."""
 
     def drain(self, dt: float, load: float) -> None:
         """Takes out what `load` needs for `dt` seconds."""
@@ -39,6 +62,10 @@ class Battery:
         """Finds that no more than `level` is left."""
         self.level = min(self.level, level)
 
+    def measure(self, millivolts: int) -> None:
+        """From now on this voltage is measured, whatever the level."""
+        self.forced_mv = millivolts
+
     @property
     def percent(self) -> int:
         """`battery_remaining` of BATTERY_STATUS: rounded down, so that it never promises what is not there."""
@@ -47,7 +74,11 @@ class Battery:
     @property
     def millivolts(self) -> int:
         """The voltage under the present load."""
-        return round(_EMPTY_MV + (_FULL_MV - _EMPTY_MV) * self.level - _SAG_MV * self.load)
+        if self.forced_mv is not None:
+            return self.forced_mv
+        below, above = next(pair for pair in pairwise(_CELL_MV) if self.level <= pair[1][0])
+        part = (self.level - below[0]) / (above[0] - below[0])
+        return round(_CELLS * (below[1] + part * (above[1] - below[1])) - _SAG_MV * self.load)
 
     @property
     def centiamperes(self) -> int:

@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
 from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.questions import AVAILABLE_MODES, available_modes
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
@@ -22,6 +23,8 @@ def request_message(refused: int) -> Handler:
     """MAV_CMD_REQUEST_MESSAGE; `refused` answers for a message that the vehicle does not have."""
 
     def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
+        if whole(command.p1) == AVAILABLE_MODES:
+            return (ACCEPTED if available_modes(a, whole(command.p2)) else refused,)
         build = a.flavour.builders.get(whole(command.p1))
         if build is None:
             return (refused,)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.wind import Wind
@@ -18,6 +19,15 @@ class Kind(StrEnum):
     ARDUPILOT = "ardupilot"
 
 
+class Boot(StrEnum):
+    """How long sensors and estimator take to come up."""
+
+    FAST = "fast"
+    """All of it in a second, and without the texts: for tests and demonstrations."""
+    RECORDED = "recorded"
+    """As the real one does: PX4 in 5 s, ArduCopter in 42 s."""
+
+
 @dataclass(frozen=True, slots=True)
 class SimulationConfig:
     """All that can be chosen; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
@@ -30,10 +40,21 @@ class SimulationConfig:
     """How long a full battery hovers."""
     cruise_mm_s: int = 5_000
     max_speed_mm_s: int = 12_000
+    return_mm: int = 30_000
+    """The height above home that a return climbs to, as its owner has set it; ArduCopter comes with 15 m."""
     wind: Wind = Wind()
     seed: int = 1
     noise: bool = True
+    boot: Boot = Boot.FAST
     faults: tuple[Fault, ...] = ()
+    signing_key: bytes | None = None
+    """The key of the link from the start; else SETUP_SIGNING may bring one."""
+    usb: bool = False
+    """Whether the vehicle takes the link for USB, on which it obeys without a signature."""
+    utc_us: int = 0
+    """The time of day at the start, for the time stamps of signing; microseconds since 1970."""
+    speed: int = 100
+    """Seconds of flight in a second outside, times 100: the time stamps of signing follow the time outside."""
 
     def __post_init__(self) -> None:
         """Raises ValueError for what no vehicle could be."""
@@ -45,5 +66,11 @@ class SimulationConfig:
             raise ValueError("hover time is more than nothing")
         if not 0 < self.cruise_mm_s <= self.max_speed_mm_s <= 15_000:
             raise ValueError("cruise speed is more than 0 and at most the greatest speed, which is at most 15000 mm/s")
+        if self.signing_key is not None and len(self.signing_key) != KEY_OCTETS:
+            raise ValueError(f"a key for signing has {KEY_OCTETS} octets")
+        if self.speed <= 0:
+            raise ValueError("speed is more than nothing")
+        if not 2_000 <= self.return_mm <= 1_000_000:
+            raise ValueError("a return climbs to a height from 2000 to 1000000 mm")
         if not -850_000_000 <= self.home.latitude <= 850_000_000 or abs(self.home.longitude) > 1_800_000_000:
             raise ValueError("home is between 85 degrees south and north, and 180 degrees west and east")

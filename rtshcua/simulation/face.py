@@ -5,12 +5,15 @@ from collections.abc import Callable, Mapping
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Codec, Message, Received
+from rtshcua.simulation import plan_face, questions
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message
 from rtshcua.simulation.command_rules import UNSUPPORTED
 from rtshcua.simulation.telemetry import radio_status
 
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
+FENCE_PREFIXES = ("FENCE_", "GF_")
+"""How the names of the parameters begin that make the fence another one."""
 RADIO = mavlink.MAV_COMP_ID_TELEMETRY_RADIO
 _RADIO_INTERVAL_US = 1_000_000
 
@@ -34,7 +37,7 @@ class Face:
         """Obeys what a datagram holds; the frames that answer it. Never raises, whatever the bytes."""
         for received in self._codec.parse(datagram):
             handler = _HANDLERS.get(received.name)
-            if handler is not None and self._is_for_me(received.message):
+            if handler is not None and self._is_for_me(received.message) and self._is_trusted(received):
                 handler(self._autopilot, received)
         return self._collect()
 
@@ -54,9 +57,13 @@ class Face:
         component = getattr(message, "target_component", 0)
         return system in (0, self._system) and component in (0, COMPONENT)
 
+    def _is_trusted(self, received: Received) -> bool:
+        a = self._autopilot
+        return not a.signing.on or a.signing.lets_in(received, a.now_us, optional=not a.flavour.insists(a))
+
     def _collect(self) -> list[bytes]:
-        outbox = self._autopilot.outbox
-        frames = [self._codec.pack(message) for message in outbox]
+        a, outbox = self._autopilot, self._autopilot.outbox
+        frames = [a.signing.seal(self._codec.pack(message), a.now_us) for message in outbox]
         outbox.clear()
         return frames
 
@@ -104,6 +111,12 @@ def _param_list(a: Autopilot, _: Received) -> None:
 def _param_set(a: Autopilot, received: Received) -> None:
     m = received.message
     a.send(a.parameters.write(m.param_id, m.param_value, m.param_type))
+    if m.param_id.startswith(FENCE_PREFIXES):
+        a.fence.settings_changed()
+
+
+def _setup_signing(a: Autopilot, received: Received) -> None:
+    a.flavour.on_setup_signing(a, received.message)
 
 
 def _timesync(a: Autopilot, received: Received) -> None:
@@ -117,18 +130,6 @@ def _ping(a: Autopilot, received: Received) -> None:
         a.send(mavlink.MAVLink_ping_message(m.time_usec, m.seq, received.system, received.component))
 
 
-def _mission_list(a: Autopilot, received: Received) -> None:
-    """This vehicle keeps no mission, no fence and no rally points: it says at once that there are none."""
-    kind = received.message.mission_type
-    a.send(mavlink.MAVLink_mission_count_message(received.system, received.component, 0, kind))
-
-
-def _mission_upload(a: Autopilot, received: Received) -> None:
-    kind = received.message.mission_type
-    result = mavlink.MAV_MISSION_UNSUPPORTED
-    a.send(mavlink.MAVLink_mission_ack_message(received.system, received.component, result, kind))
-
-
 _HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
     "HEARTBEAT": _heartbeat,
     "COMMAND_LONG": _command,
@@ -139,8 +140,9 @@ _HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
     "PARAM_REQUEST_READ": _param_read,
     "PARAM_REQUEST_LIST": _param_list,
     "PARAM_SET": _param_set,
+    "SETUP_SIGNING": _setup_signing,
     "TIMESYNC": _timesync,
     "PING": _ping,
-    "MISSION_REQUEST_LIST": _mission_list,
-    "MISSION_COUNT": _mission_upload,
+    **plan_face.HANDLERS,
+    **questions.HANDLERS,
 }

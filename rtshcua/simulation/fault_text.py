@@ -8,7 +8,9 @@ from typing import Any
 
 from rtshcua.simulation.faults import (
     BatteryLevel,
+    BatteryVoltage,
     Fault,
+    GpsGlitch,
     GpsJump,
     GpsLoss,
     LinkDelay,
@@ -16,6 +18,7 @@ from rtshcua.simulation.faults import (
     LinkQuality,
     LinkSilence,
     Obstacle,
+    Pillar,
     PilotMode,
     WindStep,
 )
@@ -24,19 +27,23 @@ from rtshcua.simulation.modes import Mode
 KINDS: Mapping[str, type[Fault]] = {
     "battery": BatteryLevel,
     "gps-loss": GpsLoss,
+    "battery-voltage": BatteryVoltage,
     "gps-jump": GpsJump,
+    "gps-glitch": GpsGlitch,
     "wind": WindStep,
     "link-delay": LinkDelay,
     "link-loss": LinkLoss,
     "link-silence": LinkSilence,
     "link-quality": LinkQuality,
     "obstacle": Obstacle,
+    "pillar": Pillar,
     "pilot": PilotMode,
 }
 
 # How a field's name ends tells its unit; what may be written, and how many of the field's unit it is.
 _UNITS: tuple[tuple[str, Mapping[str, int]], ...] = (
     ("_us", {"us": 1, "ms": 1000, "s": 1_000_000, "min": 60_000_000}),
+    ("_mv", {"mV": 1, "V": 1000}),
     ("_mm_s", {"mm/s": 1, "m/s": 1000}),
     ("_mm", {"mm": 1, "m": 1000}),
     ("_deg", {"deg": 1}),

@@ -31,6 +31,24 @@ class GpsJump:
 
 
 @dataclass(frozen=True, slots=True)
+class GpsGlitch:
+    """The receiver alone is off by this; the estimator does not believe it, and gives up after a while."""
+
+    at_us: int
+    north_mm: int
+    east_mm: int
+    for_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryVoltage:
+    """This voltage is measured from now on, whatever the battery holds."""
+
+    at_us: int
+    voltage_mv: int
+
+
+@dataclass(frozen=True, slots=True)
 class WindStep:
     """The mean wind changes to this speed, from this direction; gusts end unless given."""
 
@@ -74,10 +92,25 @@ class LinkQuality:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """Something stands ahead of the vehicle, at this distance."""
+    """The sensor sees something ahead at this distance, and goes on seeing it there wherever the vehicle goes."""
 
     at_us: int
     distance_mm: int
+    for_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Pillar:
+    """A round thing stands in the world, from the ground up: what is seen of it depends on where the vehicle is.
+
+    The place of its middle, and its height, are from home. Who flies into it crashes.
+    """
+
+    at_us: int
+    north_mm: int
+    east_mm: int
+    radius_mm: int
+    height_mm: int
     for_us: int | None = None
 
 
@@ -93,11 +126,14 @@ Fault = (
     BatteryLevel
     | GpsLoss
     | GpsJump
+    | GpsGlitch
+    | BatteryVoltage
     | WindStep
     | LinkDelay
     | LinkLoss
     | LinkSilence
     | LinkQuality
     | Obstacle
+    | Pillar
     | PilotMode
 )

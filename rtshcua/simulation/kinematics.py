@@ -1,36 +1,54 @@
-"""How the vehicle moves: a point of limited speed and acceleration that tracks a target. Metres, seconds, radians."""
+"""How the vehicle moves: a body that leans to accelerate, in moving air, and tracks a target. Metres, seconds, radians.
+
+It plans its speed so that it can stop at the target, leans towards the speed it wants, no faster than it can turn and
+no further than it may lean, and learns from where it drifts how much it must lean against the wind.
+"""
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan, atan2, cos, hypot, pi, sin, sqrt, tan
 
 GRAVITY = 9.80665
-ACCELERATION = 4.0
-"""What the motors can give sideways, m/s^2."""
-BRAKING = 2.0
-"""What braking in front of a target plans with: less than `ACCELERATION`, so that it never overshoots."""
-CLIMB_ACCELERATION = 3.0
 MAX_AIRSPEED = 18.0
-"""More wind than this carries the vehicle away."""
+"""More wind than this carries the vehicle away: then it leans as far as it may, and that is not enough."""
+MAX_LEAN = 35 * pi / 180
+_MOST = GRAVITY * tan(MAX_LEAN)
+_ROTOR_DRAG = 0.15
+"""Deceleration of still air by the speed through it, 1/s: what the blades meet."""
+_BODY_DRAG = (_MOST / MAX_AIRSPEED - _ROTOR_DRAG) / MAX_AIRSPEED
+"""The same by its square, 1/m: what the body meets."""
+JERK = 12.0
+"""How fast acceleration changes, m/s^3: what turning the body takes."""
+_CLIMB_JERK = 12.0
+_LEARN_S = 1.0
+"""How long it takes to learn what the wind does."""
+_FOLLOW = 2.0
+"""Acceleration asked for by speed that is missing, 1/s."""
 MAX_FALL = 15.0
 YAW_RATE = pi / 2
 
-_GAIN = 1.2
-"""Near the target, speed is this many times the distance, 1/s."""
 
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """How speed is planned in front of a place: a root of the distance, as for an even deceleration; linear near it.
 
-def approach_speed(distance: float) -> float:
-    """The greatest speed from which the vehicle still stops at `distance`: linear near the target, a root beyond."""
-    linear = BRAKING / _GAIN**2
-    if distance <= linear:
-        return distance * _GAIN
-    return sqrt(2 * BRAKING * (distance - linear / 2))
+    `braking` in m/s^2; near the place speed is `gain` (1/s) times the distance.
+    """
 
+    braking: float
+    gain: float
 
-def stopping_distance(speed: float) -> float:
-    """The inverse of `approach_speed`: how far ahead the place is where a vehicle of that speed can stop."""
-    if speed <= BRAKING / _GAIN:
-        return speed / _GAIN
-    return speed * speed / (2 * BRAKING) + BRAKING / _GAIN**2 / 2
+    def speed(self, distance: float) -> float:
+        """The greatest speed from which the vehicle still stops at `distance`."""
+        linear = self.braking / self.gain**2
+        if distance <= linear:
+            return distance * self.gain
+        return sqrt(2 * self.braking * (distance - linear / 2))
+
+    def distance(self, speed: float) -> float:
+        """The inverse of `speed`: how far ahead the place is where a vehicle of that speed can stop."""
+        if speed <= self.braking / self.gain:
+            return speed / self.gain
+        return speed * speed / (2 * self.braking) + self.braking / self.gain**2 / 2
 
 
 @dataclass(slots=True)
@@ -46,57 +64,107 @@ class Body:
     yaw: float = 0.0
     roll: float = 0.0
     pitch: float = 0.0
+    a_up: float = 0.0
+    """The present acceleration upwards."""
+    lean_north: float = 0.0
+    lean_east: float = 0.0
+    """The acceleration that leaning gives."""
+    _trim_north: float = 0.0
+    _trim_east: float = 0.0
+    """The part of it that is to hold against the wind."""
 
     def track(
-        self, dt: float, target: tuple[float, float], speed: float, climb: float, wind: tuple[float, float]
+        self,
+        dt: float,
+        want: tuple[float, float],
+        most: float,
+        climb: float,
+        climb_most: float,
+        wind: tuple[float, float],
     ) -> None:
-        """One step towards `target` (north, east) at up to `speed`, climbing at `climb` m/s (down is negative).
+        """One step towards the ground velocity `want` (north, east), accelerating by at most `most`.
 
-        `wind` is the velocity of the air. What of the wanted ground speed needs more air speed than the vehicle has,
-        it does not get.
+        `climb` is the wanted speed upwards, reached by at most `climb_most`; `wind` is the velocity of the air.
         """
-        to_north, to_east = target[0] - self.north, target[1] - self.east
-        distance = hypot(to_north, to_east)
-        wanted = min(speed, approach_speed(distance))
-        air_north, air_east = -wind[0], -wind[1]
-        if distance > 0:
-            air_north += to_north / distance * wanted
-            air_east += to_east / distance * wanted
-        airspeed = hypot(air_north, air_east)
-        if airspeed > MAX_AIRSPEED:
-            air_north *= MAX_AIRSPEED / airspeed
-            air_east *= MAX_AIRSPEED / airspeed
-        d_north, d_east = air_north + wind[0] - self.v_north, air_east + wind[1] - self.v_east
-        change = hypot(d_north, d_east)
-        if change > ACCELERATION * dt:
-            d_north *= ACCELERATION * dt / change
-            d_east *= ACCELERATION * dt / change
-        d_up = max(-CLIMB_ACCELERATION * dt, min(CLIMB_ACCELERATION * dt, climb - self.v_up))
-        self._move(dt, d_north, d_east, d_up)
-        self._lean(dt, d_north / dt, d_east / dt)
+        ask_north = (want[0] - self.v_north) * _FOLLOW
+        ask_east = (want[1] - self.v_east) * _FOLLOW
+        much = hypot(ask_north, ask_east)
+        if much > most:
+            ask_north *= most / much
+            ask_east *= most / much
+        self._fly(dt, ask_north + self._trim_north, ask_east + self._trim_east, wind)
+        self._climb(dt, climb, climb_most)
+
+    def drift(self, dt: float, climb: float, climb_most: float, wind: tuple[float, float]) -> None:
+        """One step held level: without a position the vehicle goes where the air goes."""
+        self._fly(dt, 0.0, 0.0, wind)
+        self._climb(dt, climb, climb_most)
+
+    @property
+    def thrust(self) -> float:
+        """What the motors carry, the weight being 1."""
+        return sqrt((GRAVITY + self.a_up) ** 2 + self.lean_north**2 + self.lean_east**2) / GRAVITY
 
     def fall(self, dt: float) -> None:
         """One step without thrust."""
-        self._move(dt, 0.0, 0.0, max(-GRAVITY * dt, -MAX_FALL - self.v_up))
+        self.a_up = max(-GRAVITY, (-MAX_FALL - self.v_up) / dt)
+        self._move(dt, 0.0, 0.0)
+        self._rise(dt)
+
+    def crash(self) -> None:
+        """What it flew into stops it."""
+        self.v_north = self.v_east = self.lean_north = self.lean_east = 0.0
 
     def stop(self) -> None:
         """Standing on the ground."""
-        self.up = self.v_north = self.v_east = self.v_up = self.roll = self.pitch = 0.0
+        self.up = self.v_north = self.v_east = self.v_up = self.roll = self.pitch = self.a_up = 0.0
+        self.lean_north = self.lean_east = self._trim_north = self._trim_east = 0.0
 
-    def _move(self, dt: float, d_north: float, d_east: float, d_up: float) -> None:
+    def turn(self, dt: float, yaw: float) -> None:
+        """Turns the nose towards `yaw`, as fast as it goes."""
+        away = (yaw - self.yaw + pi) % (2 * pi) - pi
+        self.yaw = (self.yaw + max(-YAW_RATE * dt, min(YAW_RATE * dt, away)) + pi) % (2 * pi) - pi
+
+    def _fly(self, dt: float, ask_north: float, ask_east: float, wind: tuple[float, float]) -> None:
+        much = hypot(ask_north, ask_east)
+        if much > _MOST:
+            ask_north *= _MOST / much
+            ask_east *= _MOST / much
+        change_north, change_east = ask_north - self.lean_north, ask_east - self.lean_east
+        change = hypot(change_north, change_east)
+        if change > JERK * dt:
+            change_north *= JERK * dt / change
+            change_east *= JERK * dt / change
+        self.lean_north += change_north
+        self.lean_east += change_east
+        air_north, air_east = wind[0] - self.v_north, wind[1] - self.v_east
+        drag = _ROTOR_DRAG + _BODY_DRAG * hypot(air_north, air_east)
+        drag_north, drag_east = drag * air_north, drag * air_east
+        learn = dt / _LEARN_S
+        self._trim_north += (-drag_north - self._trim_north) * learn
+        self._trim_east += (-drag_east - self._trim_east) * learn
+        self._move(dt, (self.lean_north + drag_north) * dt, (self.lean_east + drag_east) * dt)
+        north, east = cos(self.yaw), sin(self.yaw)
+        self.pitch = -atan((self.lean_north * north + self.lean_east * east) / GRAVITY)
+        self.roll = atan((self.lean_east * north - self.lean_north * east) / GRAVITY)
+
+    def _climb(self, dt: float, climb: float, most: float) -> None:
+        ask = max(-most, min(most, (climb - self.v_up) * 2 * _FOLLOW))
+        self.a_up += max(-_CLIMB_JERK * dt, min(_CLIMB_JERK * dt, ask - self.a_up))
+        self._rise(dt)
+
+    def _rise(self, dt: float) -> None:
+        self.up += (self.v_up + self.a_up * dt / 2) * dt
+        self.v_up += self.a_up * dt
+
+    def _move(self, dt: float, d_north: float, d_east: float) -> None:
         # The mean of old and new velocity: exact while the acceleration is constant.
         self.north += (self.v_north + d_north / 2) * dt
         self.east += (self.v_east + d_east / 2) * dt
-        self.up += (self.v_up + d_up / 2) * dt
         self.v_north += d_north
         self.v_east += d_east
-        self.v_up += d_up
 
-    def _lean(self, dt: float, a_north: float, a_east: float) -> None:
-        """Attitude as the acceleration needs it; the nose turns to where the vehicle goes."""
-        if hypot(self.v_north, self.v_east) > 1.0:
-            turn = (atan2(self.v_east, self.v_north) - self.yaw + pi) % (2 * pi) - pi
-            self.yaw = (self.yaw + max(-YAW_RATE * dt, min(YAW_RATE * dt, turn)) + pi) % (2 * pi) - pi
-        forward = a_north * cos(self.yaw) + a_east * sin(self.yaw)
-        right = a_east * cos(self.yaw) - a_north * sin(self.yaw)
-        self.pitch, self.roll = -forward / GRAVITY, right / GRAVITY
+
+def heading(north: float, east: float) -> float:
+    """The direction of a velocity, as a yaw."""
+    return atan2(east, north)

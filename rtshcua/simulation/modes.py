@@ -20,6 +20,10 @@ class Mode(StrEnum):
     """Climbs, then loiters (AUTO.TAKEOFF; ArduCopter takes off in GUIDED)."""
     GUIDED = "guided"
     """Flies to position targets as they come (OFFBOARD, GUIDED)."""
+    MISSION = "mission"
+    """Flies the mission that was uploaded (AUTO.MISSION, AUTO)."""
+    ORBIT = "orbit"
+    """Circles a place (PX4 only)."""
     BRAKE = "brake"
     """Stops and stays (ArduCopter only)."""
     RETURN = "return"
@@ -29,7 +33,7 @@ class Mode(StrEnum):
 
 
 NEEDS_POSITION = frozenset(
-    {Mode.POSITION, Mode.LOITER, Mode.TAKEOFF, Mode.GUIDED, Mode.BRAKE, Mode.RETURN},
+    {Mode.POSITION, Mode.LOITER, Mode.TAKEOFF, Mode.GUIDED, Mode.MISSION, Mode.ORBIT, Mode.BRAKE, Mode.RETURN},
 )
 """Modes that cannot be entered without a position estimate."""
 
@@ -46,6 +50,10 @@ class ModeTable:
     """The mode after boot."""
     armable: frozenset[Mode]
     """The modes in which arming is not refused."""
+    blind: int
+    """What `base_mode` loses while the vehicle lands without a position."""
+    stands_by: bool
+    """Whether HEARTBEAT tells that it stands by until it lifts off, armed or not."""
     names: Mapping[Mode, str]
     """What the flavour calls them in its texts."""
 

@@ -7,8 +7,13 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Message
-from rtshcua.simulation.vehicle import Handling
+from rtshcua.simulation.handling import Handling
 
+INT8 = mavlink.MAV_PARAM_TYPE_INT8
+INT16 = mavlink.MAV_PARAM_TYPE_INT16
+INT32 = mavlink.MAV_PARAM_TYPE_INT32
+REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
+_UNNUMBERED = 65_535
 _LEAST = 0.1
 """No speed or height is set lower than this: the model has no vehicle that stands still in the air or dives."""
 
@@ -18,7 +23,7 @@ class Parameter:
     """A parameter: its type, and what it sets in `Handling`, if anything, in how many parts of a metre or second."""
 
     name: str
-    integer: bool = False
+    type: int = REAL32
     attribute: str | None = None
     scale: int = 1
     value: float = 0.0
@@ -42,13 +47,24 @@ class Parameters:
 
     def all(self) -> Iterator[Message]:
         """PARAM_VALUE of each."""
-        return (self._message(name) for name in self._names)
+        return (self._message(name, listed=True) for name in self._names)
 
     def read(self, name: str, index: int) -> Message | None:
         """PARAM_VALUE of the one at `index`, or of that name if `index` is -1; None if there is none."""
         if index >= 0:
             name = self._names[index] if index < len(self._names) else ""
-        return self._message(name) if name in self._table else None
+        return self._message(name, listed=index >= 0) if name in self._table else None
+
+    def value(self, name: str) -> float:
+        """What one is now; it is in the table."""
+        return self._values[name]
+
+    def assign(self, name: str, value: float) -> Message | None:
+        """The vehicle itself sets one, if it has it; PARAM_VALUE with what it is now."""
+        if name not in self._table:
+            return None
+        self._values[name] = value
+        return self._message(name)
 
     def write(self, name: str, raw: float, type_: int) -> Message | None:
         """Sets one, and gives PARAM_VALUE with what it is now; None if there is none of that name."""
@@ -57,7 +73,7 @@ class Parameters:
             return None
         value = self._decode(raw, type_)
         if value == value and abs(value) < 1e9:  # NaN and nonsense change nothing
-            self._values[name] = float(round(value)) if parameter.integer else value
+            self._values[name] = value if parameter.type == REAL32 else float(round(value))
             if parameter.attribute is not None:
                 setattr(self._handling, parameter.attribute, max(_LEAST, self._values[name] / parameter.scale))
         return self._message(name)
@@ -67,11 +83,10 @@ class Parameters:
             return float(struct.unpack("<i", struct.pack("<f", raw))[0])
         return raw
 
-    def _message(self, name: str) -> Message:
+    def _message(self, name: str, listed: bool = False) -> Message:
+        """PARAM_VALUE. ArduCopter tells a parameter's number only in a list."""
         value, parameter = self._values[name], self._table[name]
-        type_ = mavlink.MAV_PARAM_TYPE_INT32 if parameter.integer else mavlink.MAV_PARAM_TYPE_REAL32
-        if parameter.integer and self._bytewise:
+        if parameter.type != REAL32 and self._bytewise:
             value = struct.unpack("<f", struct.pack("<i", int(value)))[0]
-        return mavlink.MAVLink_param_value_message(
-            name.encode(), value, type_, len(self._names), self._names.index(name)
-        )
+        number = self._names.index(name) if listed or self._bytewise else _UNNUMBERED
+        return mavlink.MAVLink_param_value_message(name.encode(), value, parameter.type, len(self._names), number)

@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the simulated vehicle until it is told to end; the exit code."""
     options = parser().parse_args(arguments)
     try:
-        config = config_of(options)
+        config = config_of(options, time.time_ns() // 1000)
     except ValueError as error:
         sys.stderr.write(f"error: {error}\n")
         return EXIT_USAGE

@@ -5,8 +5,10 @@ from math import atan2, degrees, hypot
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Message
-from rtshcua.simulation.autopilot import LOW_TO_LAND, Autopilot, Builder
-from rtshcua.simulation.sensors import RANGE_MAX_MM, RANGE_MIN_MM
+from rtshcua.simulation.autopilot import Autopilot, Builder
+from rtshcua.simulation.failsafe import LOW_TO_LAND
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
 
 GOOD_FLAGS, LOST_FLAGS = 0x33F, 0x025
 """ESTIMATOR_STATUS_FLAGS and EKF_STATUS_FLAGS share these bits: all well; only attitude and height (as recorded)."""
@@ -27,42 +29,54 @@ def heartbeat(a: Autopilot) -> Message:
     """HEARTBEAT: mode, armed or not, and state."""
     vehicle, modes = a.vehicle, a.flavour.modes
     base = modes.base[vehicle.mode] | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0)
-    if not a.sensors.booted:
-        status = mavlink.MAV_STATE_BOOT
-    elif vehicle.armed and (not a.sensors.has_position or a.battery.level <= LOW_TO_LAND):
+    if vehicle.blind and vehicle.mode is Mode.LAND:
+        base &= ~modes.blind
+    active = vehicle.armed and (vehicle.in_air or not modes.stands_by)
+    booting = a.sensors.booting
+    if booting is not None:
+        status = booting
+    elif a.failsafes.low_voltage or (vehicle.armed and _in_danger(a)):
         status = mavlink.MAV_STATE_CRITICAL
     else:
-        status = mavlink.MAV_STATE_ACTIVE if vehicle.armed else mavlink.MAV_STATE_STANDBY
+        status = mavlink.MAV_STATE_ACTIVE if active else mavlink.MAV_STATE_STANDBY
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_QUADROTOR, a.flavour.autopilot, base, modes.numbers[vehicle.mode], status, 3
     )
 
 
-def sys_status(a: Autopilot) -> Message:
+def _in_danger(a: Autopilot) -> bool:
+    return not a.sensors.has_position or a.battery.level <= LOW_TO_LAND or a.fence.critical
+
+
+def sys_status(a: Autopilot) -> Message | None:
     """SYS_STATUS: which sensors are healthy, and the battery."""
-    healthy = _SENSORS
+    if not a.sensors.answers:
+        return None
+    present = _SENSORS | (mavlink.MAV_SYS_STATUS_GEOFENCE if a.flavour.tells_fence else 0)
+    enabled = present if a.fence.in_force else _SENSORS
+    healthy = present
+    if a.fence.breach is not None:
+        healthy &= ~mavlink.MAV_SYS_STATUS_GEOFENCE
     if not a.sensors.has_fix:
         healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
-    if not a.sensors.has_position:
+    if not a.sensors.consistent:
         healthy &= ~mavlink.MAV_SYS_STATUS_AHRS
+    if a.failsafes.low_voltage:
+        healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     if not a.vehicle.armed and not a.ready:
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     battery = a.battery
     return mavlink.MAVLink_sys_status_message(
-        _SENSORS, _SENSORS, healthy, 250, battery.millivolts, battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
+        present, enabled, healthy, 250, battery.millivolts, battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
     )
 
 
 def gps_raw_int(a: Autopilot) -> Message:
     """GPS_RAW_INT: what the receiver measures, with its noise; the last place again while there is no fix."""
     sensors, body = a.sensors, a.vehicle.body
-    fixed = sensors.has_fix
-    if not sensors.booted:
-        fix_type, satellites = mavlink.GPS_FIX_TYPE_NO_FIX, 0
-    elif fixed:
-        fix_type, satellites = mavlink.GPS_FIX_TYPE_3D_FIX, 10
-    else:
-        fix_type, satellites = mavlink.GPS_FIX_TYPE_NO_FIX, 3
+    if not sensors.receives:
+        return mavlink.MAVLink_gps_raw_int_message(a.now_us, 0, 0, 0, 0, 65_535, 65_535, 65_535, 65_535, 0)
+    fix_type, satellites = (a.flavour.fix, 10) if sensors.has_fix else (mavlink.GPS_FIX_TYPE_NO_FIX, 3)
     point = sensors.fix(body)
     latitude, longitude = a.home.globe(point.north, point.east)
     amsl = a.home.amsl_mm + round(point.up * 1000)
@@ -75,12 +89,14 @@ def gps_raw_int(a: Autopilot) -> Message:
 
 def global_position_int(a: Autopilot) -> Message | None:
     """GLOBAL_POSITION_INT: the estimate. It goes on as if nothing had happened when the fix is lost, as recorded."""
-    if not a.sensors.booted:
+    body, sensors = a.vehicle.body, a.sensors
+    if not sensors.tells_position:
         return None
-    body = a.vehicle.body
-    point = a.sensors.estimate(body)
+    if not sensors.receives:
+        return mavlink.MAVLink_global_position_int_message(a.boot_ms, 0, 0, 0, 0, 0, 0, 0, 0)
+    point = sensors.estimate(body)
     latitude, longitude = a.home.globe(point.north, point.east)
-    up = round(point.up * 1000)
+    up = round(point.up * 1000) if sensors.has_origin else 0
     return mavlink.MAVLink_global_position_int_message(
         a.boot_ms,
         latitude,
@@ -142,7 +158,7 @@ def battery_status(a: Autopilot) -> Message:
 
 def home_position(a: Autopilot) -> Message | None:
     """HOME_POSITION, once there is one."""
-    if not a.sensors.booted:
+    if not a.sensors.has_origin:
         return None
     home = a.home
     return mavlink.MAVLink_home_position_message(
@@ -152,16 +168,33 @@ def home_position(a: Autopilot) -> Message | None:
 
 def distance_sensor(a: Autopilot) -> Message:
     """DISTANCE_SENSOR looking ahead; its greatest distance if nothing is there."""
-    seen = RANGE_MAX_MM if a.sensors.obstacle_mm is None else min(a.sensors.obstacle_mm, RANGE_MAX_MM)
+    seen = a.surroundings.ahead(a.vehicle.body)
     return mavlink.MAVLink_distance_sensor_message(
         a.boot_ms,
-        RANGE_MIN_MM // 10,
-        RANGE_MAX_MM // 10,
-        seen // 10,
+        int(RANGE_MIN_M * 100),
+        int(RANGE_MAX_M * 100),
+        int((RANGE_MAX_M if seen is None else seen) * 100),
         mavlink.MAV_DISTANCE_SENSOR_LASER,
         0,
         mavlink.MAV_SENSOR_ROTATION_NONE,
         255,
+    )
+
+
+def obstacle_distance(a: Autopilot) -> Message:
+    """OBSTACLE_DISTANCE all around, from ahead clockwise; a centimetre more than its greatest distance is nothing."""
+    furthest = int(RANGE_MAX_M * 100)
+    seen = a.surroundings.around(a.vehicle.body)
+    return mavlink.MAVLink_obstacle_distance_message(
+        a.now_us,
+        mavlink.MAV_DISTANCE_SENSOR_LASER,
+        [furthest + 1 if distance is None else int(distance * 100) for distance in seen],
+        360 // SECTORS,
+        int(RANGE_MIN_M * 100),
+        furthest,
+        360 / SECTORS,
+        0.0,
+        mavlink.MAV_FRAME_BODY_FRD,
     )
 
 
@@ -182,5 +215,6 @@ COMMON: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: home_position,
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
+    mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE: obstacle_distance,
 }
 """Those that both flavours stream alike, by number."""

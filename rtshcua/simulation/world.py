@@ -4,9 +4,8 @@ Time moves in ticks of 20 ms, however it is asked to advance, so that the same c
 the same times give the same bytes.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from math import hypot
@@ -14,24 +13,12 @@ from random import Random
 
 from rtshcua.simulation.autopilot import TICK_US, Autopilot
 from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.effects import effects
 from rtshcua.simulation.face import Face
-from rtshcua.simulation.faults import (
-    BatteryLevel,
-    Fault,
-    GpsJump,
-    GpsLoss,
-    LinkDelay,
-    LinkLoss,
-    LinkQuality,
-    LinkSilence,
-    Obstacle,
-    PilotMode,
-    WindStep,
-)
+from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.flavours import FLAVOURS
 from rtshcua.simulation.link import Link
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.wind import Wind
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +36,8 @@ class Truth:
     in_air: bool
     mode: Mode
     battery: int
+    crashed: bool
+    """Whether it flew into something."""
 
 
 class Simulation:
@@ -60,7 +49,7 @@ class Simulation:
         self._up = Link(Random(f"{config.seed} uplink"))
         self._down = Link(Random(f"{config.seed} downlink"))
         self._now_us = 0
-        self._events: list[tuple[int, int, Callable[[], None]]] = []
+        self._events: list[tuple[int, int, Callable[[], object]]] = []
         self._order = count()
         for fault in config.faults:
             self.inject(fault)
@@ -100,7 +89,7 @@ class Simulation:
 
     def inject(self, fault: Fault) -> None:
         """Adds a fault; one whose time is over happens at the next tick."""
-        for at_us, effect in self._effects(fault):
+        for at_us, effect in effects(fault, self._autopilot, (self._up, self._down)):
             heappush(self._events, (at_us, next(self._order), effect))
 
     def truth(self) -> Truth:
@@ -118,6 +107,7 @@ class Simulation:
             vehicle.in_air,
             vehicle.mode,
             round(self._autopilot.battery.level * 10_000),
+            vehicle.crashed,
         )
 
     def _deliver(self, now_us: int) -> None:
@@ -128,49 +118,3 @@ class Simulation:
     def _happen(self, now_us: int) -> None:
         while self._events and self._events[0][0] <= now_us:
             heappop(self._events)[2]()
-
-    def _effects(self, fault: Fault) -> Iterator[tuple[int, Callable[[], None]]]:
-        """When a fault begins, and ends if it does, and what happens then."""
-        a = self._autopilot
-        match fault:
-            case BatteryLevel(at_us, level):
-                yield at_us, partial(a.battery.cap, level / 10_000)
-            case GpsLoss(at_us, for_us):
-                yield at_us, a.sensors.lose_fix
-                if for_us is not None:
-                    yield at_us + for_us, a.sensors.find_fix
-            case GpsJump(at_us, north_mm, east_mm):
-                yield at_us, partial(a.sensors.jump, north_mm / 1000, east_mm / 1000)
-            case WindStep(at_us, speed_mm_s, from_deg, gust_mm_s):
-                yield at_us, partial(a.air.set, Wind(speed_mm_s, from_deg, gust_mm_s))
-            case LinkDelay(at_us, delay_us):
-                yield at_us, partial(self._link, delay_us=delay_us)
-            case LinkLoss(at_us, loss):
-                yield at_us, partial(self._link, loss=loss, quality=10_000 - loss)
-            case LinkSilence(at_us, for_us):
-                yield at_us, partial(self._link, silent=True)
-                if for_us is not None:
-                    yield at_us + for_us, partial(self._link, silent=False)
-            case LinkQuality(at_us, quality):
-                yield at_us, partial(self._link, quality=quality)
-            case Obstacle(at_us, distance_mm, for_us):
-                yield at_us, partial(a.sensors.see, distance_mm)
-                if for_us is not None:
-                    yield at_us + for_us, partial(a.sensors.see, None)
-            case PilotMode(at_us, mode):
-                yield at_us, partial(a.vehicle.set_mode, mode)
-
-    def _link(
-        self,
-        delay_us: int | None = None,
-        loss: int | None = None,
-        silent: bool | None = None,
-        quality: int | None = None,
-    ) -> None:
-        """Changes both directions in what is given, and what the radio tells of them."""
-        for link in (self._up, self._down):
-            link.delay_us = link.delay_us if delay_us is None else delay_us
-            link.loss = link.loss if loss is None else loss
-            link.silent = link.silent if silent is None else silent
-        if quality is not None:
-            self._autopilot.link_quality = quality

@@ -85,10 +85,12 @@ def test_it_flies_out_and_home(flavour: str) -> None:
     with Station("--flavour", flavour, "--speed", "40", "--wind", "4,270,1", "--cruise", "8") as s:
         px4 = flavour == "px4"
         s.until(lambda _: True, "HEARTBEAT")
-        for number in (24, 33, 245, 242):
+        for number in (1, 24, 33, 245, 242, 230 if px4 else 193):
             s.command(511, number, 100_000)
         home = s.until(lambda _: True, "HOME_POSITION")
         s.until(lambda m: m.fix_type >= 3, "GPS_RAW_INT")
+        s.until(lambda m: m.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS, "ESTIMATOR_STATUS" if px4 else "EKF_STATUS_REPORT")
+        s.until(lambda m: m.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK, "SYS_STATUS")
 
         amsl = home.altitude / 1000
         if not px4:
@@ -193,6 +195,8 @@ def test_busy_port_is_said_plainly() -> None:
         (["--port", "14550", "--home", "1,2"], "`1,2` is not LAT,LON,AMSL"),
         (["--port", "14550", "--home=-89,2,3"], "home is between 85 degrees"),
         (["--port", "14550", "--fault", "rain"], "no such fault: `rain`"),
+        (["--port", "14550", "--signing-key", "/nowhere"], "cannot read `/nowhere`"),
+        (["--port", "14550", "--signing-key", "/dev/null"], "`/dev/null` holds no key"),
     ],
 )
 def test_bad_options(options: list[str], message: str) -> None:

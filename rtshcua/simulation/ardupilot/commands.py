@@ -1,7 +1,7 @@
 """ArduCopter's commands. Altitudes are relative to home unless the frame says otherwise; a refusal is FAILED."""
 
 from collections.abc import Mapping
-from math import isfinite
+from math import isfinite, radians
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -46,8 +46,8 @@ def _arm_disarm(a: Autopilot, command: Command) -> tuple[int, ...]:
         if vehicle.armed or forced or (a.ready and vehicle.mode in MODES.armable):
             vehicle.arm()
             return (ACCEPTED,)
-        reason = f"{MODES.names[vehicle.mode]} mode not armable" if a.ready else a.why_not_ready()
-        a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {reason}")
+        for reason in a.flavour.arming(a) or (f"{MODES.names[vehicle.mode]} mode not armable",):
+            a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {reason}")
         return (FAILED,)
     if whole(command.p1) != 0:
         return (UNSUPPORTED,)
@@ -77,16 +77,18 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     up = _up(a, command.frame, command.altitude)
     if command.latitude is None or command.longitude is None or up is None:
         return (DENIED,)
-    vehicle = a.vehicle
+    vehicle, target = a.vehicle, Point(*a.home.local(command.latitude, command.longitude), up)
     if vehicle.mode is not Mode.GUIDED:
         if whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE == 0:
             return (DENIED,)
         if not a.can_enter(Mode.GUIDED):
             return (FAILED,)
         vehicle.set_mode(Mode.GUIDED)
+    if not a.fence.allows(target):
+        return (FAILED,)
     if command.p1 > 0:
         vehicle.speed = command.p1
-    vehicle.go_to(Point(*a.home.local(command.latitude, command.longitude), up))
+    vehicle.go_to(target)
     return (ACCEPTED,)
 
 
@@ -98,8 +100,16 @@ def _pause(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def _yaw(a: Autopilot, _: Command) -> tuple[int, ...]:
-    return (ACCEPTED,) if a.vehicle.mode is Mode.GUIDED else (FAILED,)
+def _yaw(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """Parameter 4: whether the angle is from north, or from where the nose points; then parameter 3 says which way."""
+    vehicle = a.vehicle
+    if vehicle.mode is not Mode.GUIDED:
+        return (FAILED,)
+    if isfinite(command.p1):
+        relative = command.p4 == 1
+        nose = radians(-command.p1 if relative and command.p3 < 0 else command.p1)
+        vehicle.turn_to(nose + (vehicle.body.yaw if relative else 0.0))
+    return (ACCEPTED,)
 
 
 def _set_mode(a: Autopilot, command: Command) -> tuple[int, ...]:
@@ -132,7 +142,9 @@ def on_position_target(a: Autopilot, message: Message) -> None:
     """
     up = _up(a, message.coordinate_frame, message.alt)
     if a.vehicle.mode is Mode.GUIDED and up is not None and not message.type_mask & 0b111:
-        a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up))
+        target = Point(*a.home.local(message.lat_int, message.lon_int), up)
+        if a.fence.allows(target):
+            a.vehicle.go_to(target)
 
 
 def on_data_stream(a: Autopilot, stream: int, rate_hz: int) -> None:
@@ -141,8 +153,27 @@ def on_data_stream(a: Autopilot, stream: int, rate_hz: int) -> None:
         a.streams.set(number, 1_000_000 // rate_hz if rate_hz > 0 else -1)
 
 
-def _mission_start(_a: Autopilot, _command: Command) -> tuple[int, ...]:
-    return (FAILED,)  # there is no mission to start
+def _mission_start(a: Autopilot, _: Command) -> tuple[int, ...]:
+    """Enters AUTO and lets the mission leave the ground; as recorded, its first item is told twice. It does not arm."""
+    if not a.can_enter(Mode.MISSION) or not a.mission.start():
+        return (FAILED,)
+    if a.vehicle.armed:
+        a.mission.tell_current()
+    a.vehicle.set_mode(Mode.MISSION)
+    return (ACCEPTED,)
+
+
+def _set_current(a: Autopilot, command: Command) -> tuple[int, ...]:
+    return (ACCEPTED,) if a.mission.select(whole(command.p1)) else (FAILED,)
+
+
+def _fence_enable(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """DO_FENCE_ENABLE: the same as setting FENCE_ENABLE."""
+    if whole(command.p1) not in (0, 1):
+        return (FAILED,)
+    a.send(a.parameters.assign("FENCE_ENABLE", whole(command.p1)))
+    a.fence.settings_changed()
+    return (ACCEPTED,)
 
 
 COMMANDS: Mapping[int, Handler] = {
@@ -157,6 +188,8 @@ COMMANDS: Mapping[int, Handler] = {
     mavlink.MAV_CMD_CONDITION_YAW: _yaw,
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
+    mavlink.MAV_CMD_DO_FENCE_ENABLE: _fence_enable,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval(DENIED, say_why=True),
     mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(FAILED),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,

@@ -1,16 +1,37 @@
 """ArduCopter's parameters, as far as this vehicle has them, and how it flies."""
 
 from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.parameters import Parameter
-from rtshcua.simulation.vehicle import Handling
+from rtshcua.simulation.handling import Agility, Handling
+from rtshcua.simulation.kinematics import Approach
+from rtshcua.simulation.parameters import INT8, INT16, INT32, Parameter
 
 PARAMETERS = (
-    Parameter("DISARM_DELAY", integer=True, attribute="idle_disarm_s"),
-    Parameter("FENCE_ENABLE", integer=True),
-    Parameter("LAND_SPEED", attribute="land_speed", scale=100),
-    Parameter("RTL_ALT", attribute="return_up", scale=100),
-    Parameter("SYSID_MYGCS", integer=True, value=255),
-    Parameter("SYSID_THISMAV", integer=True, value=1),
+    Parameter("ARMING_CHECK", INT32, value=1),
+    Parameter("BATT_CAPACITY", INT32, value=5000),
+    Parameter("BATT_CRT_VOLT"),
+    Parameter("BATT_FS_CRT_ACT", INT8),
+    Parameter("BATT_FS_LOW_ACT", INT8),
+    Parameter("BATT_LOW_VOLT", value=10.5),
+    Parameter("BATT_MONITOR", INT8, value=4),
+    Parameter("DISARM_DELAY", INT8, attribute="idle_disarm_s"),
+    Parameter("FENCE_ACTION", INT8, value=1),
+    Parameter("FENCE_ALT_MAX", value=100),
+    Parameter("FENCE_ENABLE", INT8),
+    Parameter("FENCE_RADIUS", value=300),
+    Parameter("FENCE_TOTAL", INT8),
+    Parameter("FENCE_TYPE", INT8, value=7),
+    Parameter("FRAME_CLASS", INT8, value=1),
+    Parameter("FS_EKF_ACTION", INT8, value=1),
+    Parameter("FS_GCS_ENABLE", INT8),
+    Parameter("FS_THR_ENABLE", INT8),
+    Parameter("LAND_SPEED", INT16, attribute="land_speed", scale=100),
+    Parameter("MIS_RESTART", INT8),
+    Parameter("MIS_TOTAL", INT16, value=1),
+    Parameter("RALLY_TOTAL", INT8),
+    Parameter("RTL_ALT", INT32, attribute="return_up", scale=100),
+    Parameter("SYSID_MYGCS", INT16, value=255),
+    Parameter("SYSID_THISMAV", INT16, value=1),
+    Parameter("WPNAV_RADIUS", value=200),
     Parameter("WPNAV_SPEED", attribute="cruise", scale=100),
     Parameter("WPNAV_SPEED_DN", attribute="descent", scale=100),
     Parameter("WPNAV_SPEED_UP", attribute="climb", scale=100),
@@ -18,16 +39,36 @@ PARAMETERS = (
 """In the order of their indices."""
 
 
+_AGILITY = Agility(
+    acceleration=2.5,
+    approach=Approach(braking=1.25, gain=1.0),
+    stop=Approach(braking=3.0, gain=1.0),
+    climb_acceleration=1.1,
+    climb_approach=Approach(braking=0.55, gain=1.0),
+    takeoff_acceleration=1.2,
+    takeoff_within=0.1,
+    spool_s=2.2,
+    ramp_s=1.3,
+    land_detect_s=1.8,
+    land_braking=0.55,
+    return_wait_s=5.0,
+)
+"""As measured on recorded flights of ArduCopter 4.7."""
+
+
 def handling(config: SimulationConfig) -> Handling:
     """ArduCopter's defaults."""
     return Handling(
+        agility=_AGILITY,
         cruise=config.cruise_mm_s / 1000,
         max_speed=config.max_speed_mm_s / 1000,
         climb=2.5,
         descent=1.5,
+        takeoff_climb=2.5,
         land_speed=0.5,
         land_below=10.0,
-        return_up=15.0,
+        return_up=config.return_mm / 1000,
         takeoff_up=2.5,
-        landed_disarm_s=1.0,
+        landed_disarm_s=0.3,
+        forgets_speed=True,
     )

@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Builder
+from rtshcua.simulation.mission_telemetry import mission_current
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS
 
 _CAPABILITIES = (
@@ -13,8 +14,17 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
 _VERSION = 4 << 24 | 7 << 16
+
+
+_FIRST_FLAGS = 0x0A7
+"""As recorded: attitude and height, and held to be at rest."""
+_GLITCHING = 1 << 15
+"""EKF_GPS_GLITCHING of ArduPilot's EKF_STATUS_FLAGS; the dialect does not have it."""
 
 
 def _extended_sys_state(a: Autopilot) -> Message:
@@ -22,16 +32,25 @@ def _extended_sys_state(a: Autopilot) -> Message:
 
 
 def _ekf_status_report(a: Autopilot) -> Message | None:
-    if not a.sensors.booted:
+    sensors = a.sensors
+    if not sensors.answers:
         return None
-    flags = GOOD_FLAGS if a.sensors.has_position else LOST_FLAGS
+    if not sensors.has_attitude:
+        flags = 0 if sensors.initialised else mavlink.EKF_UNINITIALIZED
+    elif not sensors.locates:
+        flags = _FIRST_FLAGS
+    else:
+        flags = GOOD_FLAGS if sensors.has_position else LOST_FLAGS
+    if sensors.glitching:
+        flags |= _GLITCHING
     return mavlink.MAVLink_ekf_status_report_message(flags, 0.008, 0.005, 0.001, 0.006, 0.0)
 
 
 def _wind(a: Autopilot) -> Message | None:
-    if not a.sensors.booted:
+    if not a.sensors.locates:
         return None
-    return mavlink.MAVLink_wind_message(a.air.from_degrees, a.air.speed, 0.0)
+    # -180 degrees and no speed are what a copter without an estimate of the wind reports; this one has one
+    return mavlink.MAVLink_wind_message(a.air.from_degrees if a.air.speed else 0.0, a.air.speed, 0.0)
 
 
 def _autopilot_version(_: Autopilot) -> Message:
@@ -44,6 +63,7 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status_report,
     mavlink.MAVLINK_MSG_ID_WIND: _wind,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
 }
 
 DEFAULT: Mapping[int, int] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000}
@@ -53,6 +73,7 @@ _GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
         mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
     ),
     mavlink.MAV_DATA_STREAM_POSITION: (mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,),
     mavlink.MAV_DATA_STREAM_EXTRA1: (mavlink.MAVLINK_MSG_ID_ATTITUDE,),

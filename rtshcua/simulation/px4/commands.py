@@ -28,6 +28,8 @@ from rtshcua.simulation.px4.modes import MODES, number_of
 
 _STREAM_US = 500_000
 """OFFBOARD is entered only while position targets come faster than this (2 Hz)."""
+_ORBIT_M = 10.0
+"""The radius of an orbit that names none."""
 _AMSL_FRAMES = {mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT}
 _RELATIVE_FRAMES = {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
 
@@ -38,8 +40,8 @@ def _arm_disarm(a: Autopilot, command: Command) -> tuple[int, ...]:
         if a.vehicle.armed or forced or (a.ready and a.vehicle.mode in MODES.armable):
             a.vehicle.arm()
             return (ACCEPTED,)
-        reason = f"mode {MODES.names[a.vehicle.mode]}" if a.ready else a.why_not_ready()
-        a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arming denied: {reason}")
+        for reason in a.flavour.arming(a) or (f"mode {MODES.names[a.vehicle.mode]}",):
+            a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arming denied: {reason}")
         return (TEMPORARILY_REJECTED,)
     if whole(command.p1) != 0:
         return (UNSUPPORTED,)
@@ -75,14 +77,18 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     if not vehicle.in_air:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Reposition ignored: not flying")
         return (ACCEPTED,)
-    if command.p1 > 0:
-        vehicle.speed = command.p1
     here = vehicle.target
     north, east = here.north, here.east
     if command.latitude is not None and command.longitude is not None:
         north, east = a.home.local(command.latitude, command.longitude)
     up = command.altitude - a.home.amsl_mm / 1000
-    vehicle.go_to(Point(north, east, up if isfinite(up) else here.up))
+    target = Point(north, east, up if isfinite(up) else here.up)
+    if not a.fence.allows(target):
+        a.say(mavlink.MAV_SEVERITY_CRITICAL, "Reposition is outside geofence\t")
+        return (ACCEPTED,)
+    if command.p1 > 0:
+        vehicle.speed = command.p1
+    vehicle.go_to(target)
     return (ACCEPTED,)
 
 
@@ -92,6 +98,23 @@ def _change_altitude(a: Autopilot, command: Command) -> tuple[int, ...]:
         return (TEMPORARILY_REJECTED,)
     a.vehicle.set_mode(Mode.LOITER)
     a.vehicle.go_to(Point(a.vehicle.target.north, a.vehicle.target.east, up))
+    return (ACCEPTED,)
+
+
+def _orbit(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """Around the place it names, or around where the vehicle is. As recorded, nobody looks at the fence."""
+    vehicle = a.vehicle
+    if not a.can_enter(Mode.ORBIT) or not vehicle.in_air:
+        return (TEMPORARILY_REJECTED,)
+    vehicle.set_mode(Mode.ORBIT)
+    here, up = a.here, command.altitude - a.home.amsl_mm / 1000
+    north, east = here.north, here.east
+    if command.latitude is not None and command.longitude is not None:
+        north, east = a.home.local(command.latitude, command.longitude)
+    if command.p2 > 0:
+        vehicle.speed = command.p2
+    centre = Point(north, east, up if isfinite(up) else here.up)
+    vehicle.circle(centre, command.p1 if isfinite(command.p1) and command.p1 else _ORBIT_M)
     return (ACCEPTED,)
 
 
@@ -110,7 +133,10 @@ def _enter_number(a: Autopilot, number: int) -> bool:
     if mode is Mode.GUIDED and (a.last_target_us is None or a.now_us - a.last_target_us > _STREAM_US):
         a.say(mavlink.MAV_SEVERITY_WARNING, "Offboard denied: no offboard signal")
         return False
-    a.vehicle.set_mode(mode)
+    vehicle = a.vehicle
+    if mode is Mode.TAKEOFF and vehicle.takeoff_up is None:
+        vehicle.takeoff_up = vehicle.body.up + vehicle.handling.takeoff_up
+    vehicle.set_mode(mode)
     return True
 
 
@@ -137,8 +163,15 @@ def on_data_stream(_a: Autopilot, _stream: int, _rate_hz: int) -> None:
     """REQUEST_DATA_STREAM: PX4 does not know it; its streams run unasked."""
 
 
-def _mission_start(_a: Autopilot, _command: Command) -> tuple[int, ...]:
-    return (DENIED,)  # there is no mission to start
+def _mission_start(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """Also arms. Denied while the mission was not judged, or judged not to be flyable; there is no reason given."""
+    if not a.mission.start(whole(command.p1) if command.p1 > 0 else None):
+        return (DENIED,)
+    if not a.can_enter(Mode.MISSION) or not (a.vehicle.armed or a.ready):
+        return (TEMPORARILY_REJECTED,)
+    a.vehicle.set_mode(Mode.MISSION)
+    a.vehicle.arm()
+    return (ACCEPTED,)
 
 
 COMMANDS: Mapping[int, Handler] = {
@@ -150,6 +183,7 @@ COMMANDS: Mapping[int, Handler] = {
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: change_speed,
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
+    mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval(FAILED, say_why=False),

@@ -1,36 +1,74 @@
 """PX4's parameters, as far as this vehicle has them, and how it flies."""
 
 from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.handling import Agility, Handling
+from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.parameters import Parameter
-from rtshcua.simulation.vehicle import Handling
+from rtshcua.simulation.parameters import INT32, Parameter
 
 PARAMETERS = (
+    Parameter("BAT1_CAPACITY", value=5000),
+    Parameter("BAT1_N_CELLS", INT32, value=4),
+    Parameter("BAT_CRIT_THR", value=0.07),
+    Parameter("BAT_EMERGEN_THR", value=0.05),
+    Parameter("BAT_LOW_THR", value=0.15),
     Parameter("COM_DISARM_LAND", attribute="landed_disarm_s"),
     Parameter("COM_DISARM_PRFLT", attribute="idle_disarm_s"),
-    Parameter("COM_LOW_BAT_ACT", integer=True, value=3),
-    Parameter("MAV_SYS_ID", integer=True, value=1),
+    Parameter("COM_LOW_BAT_ACT", INT32, value=3),
+    Parameter("COM_RC_IN_MODE", INT32, value=4),
+    Parameter("GF_ACTION", INT32, value=2),
+    Parameter("GF_MAX_HOR_DIST"),
+    Parameter("GF_MAX_VER_DIST"),
+    Parameter("MAV_COMP_ID", INT32, value=1),
+    Parameter("MAV_SIGN_CFG", INT32),
+    Parameter("MAV_SYS_ID", INT32, value=1),
+    Parameter("MAV_TYPE", INT32, value=2),
+    Parameter("MIS_DIST_1WP", value=10_000),
     Parameter("MIS_TAKEOFF_ALT", attribute="takeoff_up"),
     Parameter("MPC_LAND_SPEED", attribute="land_speed"),
     Parameter("MPC_XY_CRUISE", attribute="cruise"),
     Parameter("MPC_Z_VEL_MAX_DN", attribute="descent"),
     Parameter("MPC_Z_VEL_MAX_UP", attribute="climb"),
+    Parameter("NAV_ACC_RAD", value=2),
+    Parameter("NAV_DLL_ACT", INT32),
+    Parameter("NAV_RCL_ACT", INT32, value=2),
     Parameter("RTL_RETURN_ALT", attribute="return_up"),
+    Parameter("SYS_AUTOSTART", INT32, value=4001),
 )
 """In the order of their indices."""
+
+
+_AGILITY = Agility(
+    acceleration=2.5,
+    approach=Approach(braking=0.75, gain=0.95),
+    stop=Approach(braking=2.0, gain=0.95),
+    climb_acceleration=1.5,
+    climb_approach=Approach(braking=0.7, gain=0.6),
+    takeoff_acceleration=0.8,
+    takeoff_within=0.8,
+    spool_s=1.5,
+    ramp_s=2.2,
+    land_detect_s=4.0,
+    home_within=2.0,
+    land_braking=0.2,
+)
+"""As measured on recorded flights of PX4 v1.16."""
 
 
 def handling(config: SimulationConfig) -> Handling:
     """PX4's defaults."""
     return Handling(
+        agility=_AGILITY,
         cruise=config.cruise_mm_s / 1000,
         max_speed=config.max_speed_mm_s / 1000,
         climb=3.0,
         descent=1.5,
-        land_speed=0.7,
+        takeoff_climb=1.5,
+        land_speed=0.6,
         land_below=5.0,
-        return_up=30.0,
+        return_up=config.return_mm / 1000,
         takeoff_up=2.5,
         after_takeoff=Mode.LOITER,
         after_landing=Mode.LOITER,
+        lifts_to_targets=True,
     )

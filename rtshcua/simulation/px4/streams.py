@@ -7,15 +7,19 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Builder
+from rtshcua.simulation.mission_telemetry import mission_current
 from rtshcua.simulation.telemetry import COMMON, LOST_FLAGS
 
-_GOOD_FLAGS = 0x3FF
-"""As recorded from PX4 v1.16 in good health."""
+_BOOT_FLAGS, _FIRST_FLAGS, _GOOD_FLAGS = 0x480, 0x0E5, 0x3FF
+"""As recorded from PX4 v1.16: at first, when it knows its attitude, and in good health on the ground."""
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
 _VERSION = 1 << 24 | 16 << 16 | 0xFF
 
@@ -25,14 +29,24 @@ def _extended_sys_state(a: Autopilot) -> Message:
 
 
 def _estimator_status(a: Autopilot) -> Message | None:
-    if not a.sensors.booted:
+    sensors = a.sensors
+    if not sensors.initialised:
         return None
-    flags = _GOOD_FLAGS if a.sensors.has_position else LOST_FLAGS
+    if not sensors.has_attitude:
+        flags = _BOOT_FLAGS
+    elif not sensors.locates:
+        flags = _FIRST_FLAGS
+    else:
+        flags = _GOOD_FLAGS if sensors.has_position else LOST_FLAGS
+        if a.vehicle.armed:
+            flags &= ~mavlink.ESTIMATOR_CONST_POS_MODE
+    if sensors.glitching:
+        flags |= mavlink.ESTIMATOR_GPS_GLITCH
     return mavlink.MAVLink_estimator_status_message(a.now_us, flags, 0.06, 0.04, 0.03, 0.06, 0.005, nan, 0.3, 0.3)
 
 
 def _wind_cov(a: Autopilot) -> Message | None:
-    if not a.sensors.booted:
+    if not a.sensors.locates:
         return None
     return mavlink.MAVLink_wind_cov_message(
         a.now_us, a.air.north, a.air.east, 0.0, 0.1, 0.0, a.home.amsl_mm / 1000 + a.vehicle.body.up, 0.5, 0.5
@@ -49,6 +63,7 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _estimator_status,
     mavlink.MAVLINK_MSG_ID_WIND_COV: _wind_cov,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
 }
 
 DEFAULT: Mapping[int, int] = {
@@ -64,5 +79,6 @@ DEFAULT: Mapping[int, int] = {
     mavlink.MAVLINK_MSG_ID_WIND_COV: 500_000,
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: 100_000,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 2_000_000,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 1_000_000,
 }
 """The streams that run from boot, and their intervals in microseconds."""

@@ -4,10 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.simulation import faults
 from rtshcua.simulation.fault_text import parse_fault
 from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.wind import Wind
 
 S = 1_000_000
 
@@ -49,7 +51,9 @@ def test_low_battery_refuses_to_arm(pilot: Callable[..., Any], flavour: str) -> 
     p = pilot(flavour, battery=500).ready()
     p.mode(Mode.LOITER)
     assert p.arm() == [1 if p.px4 else 4]
-    assert "Battery too low" in p.texts()[-1]
+    assert p.texts()[-1] == (
+        "Arming denied: battery too low" if p.px4 else "Arm: Battery 1 below minimum arming capacity"
+    )
 
 
 def test_gps_loss_shows_at_once_and_the_autopilot_lands_later(flying: Any) -> None:
@@ -72,7 +76,7 @@ def test_short_gps_loss_passes(flying: Any) -> None:
     flying.mode(Mode.LOITER)
     inject(flying, faults.GpsLoss, 2 * S)
     flying.wait(4)
-    assert flying.last("GPS_RAW_INT").fix_type == 3
+    assert flying.last("GPS_RAW_INT").fix_type == (3 if flying.px4 else 6)
     assert flying.truth.mode is Mode.LOITER
 
 
@@ -185,6 +189,12 @@ def test_faults_from_the_configuration_happen_when_they_should(pilot: Callable[.
         ("link-silence,at=1s", faults.LinkSilence(S)),
         ("link-quality,at=1s,quality=20%", faults.LinkQuality(S, 2_000)),
         ("obstacle,at=1s,distance=3m,for=4s", faults.Obstacle(S, 3_000, 4 * S)),
+        ("battery-voltage,at=1s,voltage=10.2V", faults.BatteryVoltage(S, 10_200)),
+        ("gps-glitch,at=1s,north=50m,east=-3m", faults.GpsGlitch(S, 50_000, -3_000)),
+        (
+            "pillar,at=0s,north=1m,east=-2m,radius=500mm,height=30m,for=2min",
+            faults.Pillar(0, 1_000, -2_000, 500, 30_000, 120 * S),
+        ),
         ("pilot,at=1s,mode=altitude", faults.PilotMode(S, Mode.ALTITUDE)),
         ("pilot,at=1s", faults.PilotMode(S, Mode.POSITION)),
     ],
@@ -210,3 +220,71 @@ def test_fault_texts(text: str, expected: faults.Fault) -> None:
 def test_bad_fault_texts(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         parse_fault(text)
+
+
+def test_a_glitch_is_not_believed_and_then_nothing_is(flying: Any) -> None:
+    flying.mode(Mode.LOITER)
+    estimator = "ESTIMATOR_STATUS" if flying.px4 else "EKF_STATUS_REPORT"
+    before = flying.last("GLOBAL_POSITION_INT").lat
+    inject(flying, faults.GpsGlitch, 50_000, 0, 3 * S)
+    flying.wait(2)
+    assert flying.last("GPS_RAW_INT").lat - before > 3_500
+    assert abs(flying.last("GLOBAL_POSITION_INT").lat - before) < 200
+    assert flying.last(estimator).flags & (1 << 10 if flying.px4 else 1 << 15)
+    flying.wait(2)
+    assert abs(flying.last("GPS_RAW_INT").lat - before) < 200
+    assert not flying.last(estimator).flags & (1 << 10 if flying.px4 else 1 << 15)
+    assert flying.truth.mode is Mode.LOITER
+    inject(flying, faults.GpsGlitch, 50_000, 0)
+    flying.wait(10)
+    assert flying.truth.mode is Mode.LAND
+
+
+def test_without_a_position_it_lands_where_the_wind_carries_it(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour, wind=Wind(5_000, 270))
+    p.take_off(20)
+    p.mode(Mode.LOITER)
+    p.wait(3)
+    held = p.truth
+    assert abs(held.east_mm) < 1_500
+    inject(p, faults.GpsLoss, 9 * S)
+    p.wait(14)
+    assert p.truth.mode is Mode.LAND
+    assert p.truth.east_mm > held.east_mm + 10_000
+    assert ("EKF Failsafe Cleared" in p.texts()) is not p.px4
+
+
+def test_low_voltage_is_told_after_a_while_and_changes_nothing_by_default(pilot: Callable[..., Any]) -> None:
+    p = pilot("ardupilot")
+    p.long(511, 1, 100_000)
+    p.take_off(15)
+    inject(p, faults.BatteryVoltage, 10_200)
+    p.wait(9)
+    assert p.last("SYS_STATUS").voltage_battery == 10_200
+    assert not any("attery" in text for text in p.texts())
+    p.wait(2)
+    assert p.texts()[-1] == "Battery Failsafe"
+    assert p.texts()[-2].startswith("Battery 1 is low 10.20V used ")
+    assert (p.truth.mode, p.last("HEARTBEAT").system_status) == (Mode.GUIDED, 5)
+    p.mode(Mode.LAND)
+    p.until(lambda: not p.truth.armed)
+    p.mode(Mode.GUIDED)
+    assert p.arm() == [4]
+    assert p.texts()[-2:] == ["Arm: Battery 1 low voltage failsafe", "Arm: Battery failsafe"]
+
+
+def test_the_voltage_that_is_low_is_a_parameter(pilot: Callable[..., Any]) -> None:
+    p = pilot("ardupilot", battery=3_000)
+    p.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_LOW_VOLT", 14.7, 9))
+    p.take_off(15)
+    assert "Battery Failsafe" in p.texts(), "it sags below under load"
+
+
+@pytest.mark.parametrize(("action", "mode"), [(1, Mode.LAND), (2, Mode.RETURN)])
+def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, mode: Mode) -> None:
+    p = pilot("ardupilot")
+    p.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_FS_LOW_ACT", action, 9))
+    p.take_off(15)
+    inject(p, faults.BatteryVoltage, 10_200)
+    p.wait(11)
+    assert p.truth.mode is mode

@@ -80,6 +80,26 @@ def test_hold_keeps_the_place_in_wind(pilot: Callable[..., Any], flavour: str) -
     assert abs(p.truth.east_mm - start.east_mm) < 1_000
 
 
+@pytest.mark.parametrize(("speed_m_s", "within_m"), [(2, 2.5), (4, 5.5), (8, 18), (12, 38)])
+def test_told_to_stay_it_stops_in_time(
+    pilot: Callable[..., Any], flavour: str, speed_m_s: int, within_m: float
+) -> None:
+    p = pilot(flavour, cruise_mm_s=speed_m_s * 1000, noise=False)
+    p.take_off(20)
+    p.go_to(400, 0, 20)
+    p.wait(15)
+    assert p.truth.speed_mm_s > speed_m_s * 950
+    start = p.truth.north_mm
+    p.mode(Mode.LOITER if p.px4 else Mode.BRAKE)
+    furthest = start
+    for _ in range(120):
+        p.wait(0.1)
+        furthest = max(furthest, p.truth.north_mm)
+    assert within_m * 600 < furthest - start < within_m * 1000
+    assert furthest - p.truth.north_mm < 300, "it hardly comes back"
+    assert p.truth.speed_mm_s < 150
+
+
 def test_telemetry_agrees_with_the_truth(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour)
     for number in (33, 24, 74):

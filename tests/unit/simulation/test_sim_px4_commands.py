@@ -84,7 +84,7 @@ def test_takeoff_while_disarmed_only_changes_the_mode_and_arming_starts_it(px4: 
     assert (px4.truth.mode, px4.truth.in_air) == (Mode.TAKEOFF, False)
     assert px4.arm() == [0]
     px4.until(lambda: px4.truth.mode is Mode.LOITER)
-    assert abs(px4.truth.up_mm - 10_000) < 600
+    assert abs(px4.truth.up_mm - 10_000) < 900, "the mode changes a little before the height is reached"
 
 
 def test_takeoff_altitude_is_above_sea(px4: Any) -> None:

@@ -92,6 +92,7 @@ def test_stream_rates_of_px4(pilot: Callable[..., Any]) -> None:
         "WIND_COV": 2,
         "DISTANCE_SENSOR": 10,
         "HOME_POSITION": 0.5,
+        "MISSION_CURRENT": 1,
         "RADIO_STATUS": 1,
     }
 
@@ -133,11 +134,12 @@ def test_it_runs_a_hundred_times_faster_than_real_time(pilot: Callable[..., Any]
 
 def test_no_position_before_it_is_ready(pilot: Callable[..., Any]) -> None:
     p = pilot("px4")
-    p.wait(0.9)
-    assert not {"GLOBAL_POSITION_INT", "HOME_POSITION", "ESTIMATOR_STATUS"} & {f.name for f in p.seen}
-    assert p.last("GPS_RAW_INT").fix_type == 1
+    p.wait(0.3)
+    assert not {"GLOBAL_POSITION_INT", "HOME_POSITION", "WIND_COV"} & {f.name for f in p.seen}
+    p.wait(0.6)
     prearm = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    assert not p.last("SYS_STATUS").onboard_control_sensors_health & prearm
+    assert p.last("HEARTBEAT").system_status == mavlink.MAV_STATE_UNINIT
+    assert all(not f.message.onboard_control_sensors_health & prearm for f in p.seen if f.name == "SYS_STATUS")
     p.wait(1.5)
     assert p.last("GPS_RAW_INT").fix_type == 3
     assert p.last("SYS_STATUS").onboard_control_sensors_health & prearm

@@ -1,0 +1,109 @@
+"""The autopilot's own failsafes: it takes over, asked by nobody."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rtshcua.simulation.battery import Battery
+from rtshcua.simulation.modes import NEEDS_POSITION, Mode
+from rtshcua.simulation.sensors import Sensors
+from rtshcua.simulation.vehicle import Vehicle
+
+LOW_TO_LAND = 0.04
+"""The battery level at which the autopilot lands by itself."""
+_LOW_VOLTAGE_S = 10.0
+"""How long the voltage must be low."""
+_MEASURES_S = 0.5
+"""How often the voltage is looked at."""
+_BACK_S = 0.6
+"""How long the position must be back."""
+
+Text = tuple[int, str]
+"""Severity and text."""
+
+
+@dataclass(frozen=True, slots=True)
+class FailsafeRules:
+    """What a flavour says, and when it acts."""
+
+    position: tuple[Text, ...]
+    """Said when it lands because it does not know where it is."""
+    position_after_s: float
+    """How long after the estimator gave up."""
+    land_pause_s: float
+    """How long it stays up after it decided to land."""
+    position_back: Text | None
+    level: Text
+    """Said when it lands because the battery is empty."""
+    low_voltage: str | None
+    """The parameter with the voltage below which the battery is found to be low."""
+    low_action: str | None
+    """The parameter that says what happens then: 0 nothing, 1 land, 2 return."""
+    low_text: str
+
+
+class Failsafes:
+    """Watches one vehicle. `parameter` reads one by name, `say` sends a text."""
+
+    def __init__(
+        self,
+        rules: FailsafeRules,
+        vehicle: Vehicle,
+        sensors: Sensors,
+        battery: Battery,
+        parameter: Callable[[str], float],
+        say: Callable[[int, str], None],
+    ) -> None:
+        self._rules = rules
+        self._vehicle = vehicle
+        self._sensors = sensors
+        self._battery = battery
+        self._parameter = parameter
+        self._say = say
+        self._without_s = self._low_s = self._back_s = self._measured_s = 0.0
+        self._lands_blind = False
+        self.low_voltage = False
+        """Whether the battery was found to be low by its voltage."""
+
+    def step(self, dt: float) -> None:
+        """Lets `dt` seconds pass."""
+        vehicle, battery = self._vehicle, self._battery
+        self._measured_s += dt
+        if self._measured_s >= _MEASURES_S:
+            self._watch_voltage(self._measured_s)
+            self._measured_s = 0.0
+        if not vehicle.in_air or not vehicle.armed:
+            self._lands_blind = False
+            return
+        self._watch_position(dt)
+        if vehicle.mode is not Mode.LAND and battery.level <= LOW_TO_LAND:
+            self._say(*self._rules.level)
+            vehicle.set_mode(Mode.LAND)
+
+    def _watch_position(self, dt: float) -> None:
+        has_position = self._sensors.has_position
+        self._without_s = 0.0 if has_position else self._without_s + dt
+        self._back_s = self._back_s + dt if has_position else 0.0
+        if self._vehicle.mode in NEEDS_POSITION and self._without_s > self._rules.position_after_s:
+            for text in self._rules.position:
+                self._say(*text)
+            self._vehicle.set_mode(Mode.LAND)
+            self._vehicle.wait(self._rules.land_pause_s)
+            self._lands_blind = True
+        elif self._lands_blind and self._back_s >= _BACK_S:
+            self._lands_blind = False
+            if self._rules.position_back is not None:
+                self._say(*self._rules.position_back)
+
+    def _watch_voltage(self, dt: float) -> None:
+        rules = self._rules
+        if rules.low_voltage is None or rules.low_action is None or self.low_voltage:
+            return
+        volts = self._battery.millivolts / 1000
+        self._low_s = self._low_s + dt if volts < self._parameter(rules.low_voltage) else 0.0
+        if self._low_s >= _LOW_VOLTAGE_S:
+            self.low_voltage = True
+            self._say(4, f"Battery 1 is low {volts:.2f}V used {self._battery.used_mah:.0f} mAh")
+            self._say(4, rules.low_text)
+            mode = {1: Mode.LAND, 2: Mode.RETURN}.get(round(self._parameter(rules.low_action)))
+            if mode is not None and self._vehicle.in_air:
+                self._vehicle.set_mode(mode)

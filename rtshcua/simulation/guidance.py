@@ -1,0 +1,66 @@
+"""From places to velocities: what the autopilot asks of the body. Metres, seconds, radians."""
+
+from math import atan2, copysign, cos, hypot, sin, sqrt
+
+from rtshcua.simulation.handling import Agility, Handling
+from rtshcua.simulation.kinematics import Approach, Body
+
+LEAD_S = 0.4
+"""How much earlier it begins to slow down than the plan says: what leaning back takes."""
+_SPARE = 1.4
+"""How much harder than planned it may brake, to keep to the plan."""
+ARRIVED_M, ARRIVED_M_S = 0.5, 0.4
+"""Nearer and slower than this, it is there."""
+_NEAR_M = 0.1
+"""So near the target, speed towards it means nothing."""
+_PULL = 0.5
+"""On a circle, speed towards it for each metre off it, 1/s."""
+
+
+def towards(body: Body, north: float, east: float, speed: float, approach: Approach) -> tuple[float, float]:
+    """The velocity to fly to a place (north, east), at up to `speed`, so that it stops there."""
+    north -= body.north
+    east -= body.east
+    distance = hypot(north, east)
+    if distance == 0:
+        return 0.0, 0.0
+    # Where it will be by the time that it has turned over, so that it does not slow down too late.
+    closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
+    speed = min(speed, approach.speed(max(distance - closing * LEAD_S, 0.0)))
+    return north / distance * speed, east / distance * speed
+
+
+def hardest(agility: Agility, approach: Approach) -> float:
+    """The most that it may accelerate, in m/s^2."""
+    return max(agility.acceleration, approach.braking * _SPARE)
+
+
+def is_above(body: Body, north: float, east: float, within: float) -> bool:
+    """Whether it is over a place: so near, and standing unless that leaves room to stop."""
+    if hypot(north - body.north, east - body.east) >= within:
+        return False
+    return within > ARRIVED_M or hypot(body.v_north, body.v_east) < ARRIVED_M_S
+
+
+def around(body: Body, north: float, east: float, radius: float, speed: float) -> tuple[float, float]:
+    """The velocity to circle a place at `radius`, clockwise seen from above if that is positive."""
+    north, east = body.north - north, body.east - east
+    angle = atan2(east, north)
+    off = max(-speed, min(speed, (abs(radius) - hypot(north, east)) * _PULL))
+    along = copysign(sqrt(speed * speed - off * off), radius)
+    return off * cos(angle) - along * sin(angle), off * sin(angle) + along * cos(angle)
+
+
+def climb_rate(up: float, target: float, handling: Handling, taking_off: bool) -> float:
+    """The rate of climb to reach a height and stop there."""
+    away = target - up
+    fastest = handling.climb if away > 0 else handling.descent
+    if taking_off:
+        fastest = min(fastest, handling.takeoff_climb)
+    return copysign(min(fastest, handling.agility.climb_approach.speed(abs(away))), away)
+
+
+def landing_rate(body: Body, handling: Handling) -> float:
+    """The rate of climb, below nothing, of a landing: slow enough where the last part begins."""
+    above = max(0.0, body.up + body.v_up * LEAD_S - handling.land_below)
+    return -min(handling.descent, sqrt(handling.land_speed**2 + 2 * handling.agility.land_braking * above))

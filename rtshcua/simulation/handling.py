@@ -1,0 +1,63 @@
+"""How a flavour's vehicle flies: what parameters may change, and what they may not."""
+
+from dataclasses import dataclass
+
+from rtshcua.simulation.kinematics import Approach
+from rtshcua.simulation.modes import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Agility:
+    """How hard the autopilot flies its vehicle. Accelerations in m/s^2, times in seconds."""
+
+    acceleration: float
+    approach: Approach
+    """How it slows down in front of a target."""
+    stop: Approach
+    """How it slows down when told to stay."""
+    climb_acceleration: float
+    climb_approach: Approach
+    """How it slows down in front of a height."""
+    takeoff_acceleration: float
+    takeoff_within: float
+    """So near its height, in metres, a takeoff is over."""
+    spool_s: float
+    """How long after arming it does not lift off, whatever it is told."""
+    ramp_s: float
+    """From there, or from the command, to lifting off."""
+    land_detect_s: float
+    """How long it stands before it knows that it has landed."""
+    land_braking: float
+    """How it slows down above the height where the last part of a landing begins."""
+    home_within: float = 0.5
+    """So near home, in metres, a return has come home."""
+    return_wait_s: float = 0.0
+    """How long it hovers over home before it descends."""
+
+
+@dataclass(slots=True)
+class Handling:
+    """How it flies; parameters may change it. Speeds in m/s, heights in metres above home, times in seconds."""
+
+    agility: Agility
+    cruise: float
+    max_speed: float
+    climb: float
+    descent: float
+    takeoff_climb: float
+    land_speed: float
+    """The rate of descent below `land_below`."""
+    land_below: float
+    return_up: float
+    """The height of the way home."""
+    takeoff_up: float
+    """The height of a takeoff that names none."""
+    idle_disarm_s: float = 10.0
+    landed_disarm_s: float = 2.0
+    """From knowing that it has landed."""
+    after_takeoff: Mode | None = None
+    after_landing: Mode | None = None
+    forgets_speed: bool = False
+    """Whether another mode flies at the cruise speed again."""
+    lifts_to_targets: bool = False
+    """Whether a target makes it lift off when it stands armed."""

@@ -1,0 +1,281 @@
+"""Flies an uploaded mission, item by item, while the mode is MISSION."""
+
+from collections.abc import Callable
+from math import hypot, isfinite
+from typing import Protocol
+
+from rtshcua.simulation.activity import Landed
+from rtshcua.simulation.mission_items import (
+    DELAY,
+    JUMP,
+    LAND,
+    LOITER,
+    NAVIGATION,
+    RETURN,
+    SPEED,
+    TAKEOFF,
+    WAYPOINT,
+    WAYPOINTS,
+    MissionRules,
+    State,
+)
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.place import Home, Point
+from rtshcua.simulation.plan import AMSL_FRAMES, FENCE, MISSION, Item, Plans
+from rtshcua.simulation.vehicle import Vehicle
+
+_ARRIVED_UP_M = 1.0
+
+
+class Listener(Protocol):
+    """Who is told how a mission goes."""
+
+    def on_reached(self, number: int) -> None:
+        """Item `number` is done."""
+
+    def on_moved_on(self) -> None:
+        """Another item is the current one, or the mission's state is another."""
+
+    def on_begun(self, text: str) -> None:
+        """An item begins, in the flavour's words."""
+
+
+class Mission:
+    """The mission of one vehicle, and how far it is."""
+
+    def __init__(
+        self,
+        rules: MissionRules,
+        plans: Plans,
+        vehicle: Vehicle,
+        home: Home,
+        allows: Callable[[Point], bool],
+        listener: Listener,
+    ) -> None:
+        self._rules = rules
+        self._plans = plans
+        self._vehicle = vehicle
+        self._home = home
+        self._allows = allows
+        self._listener = listener
+        self._judge_at_us: int | None = None
+        self._now_us = 0
+        self._begun = False
+        self._arrived_us: int | None = None
+        self._started = False
+        self._entered = False
+        self._jumps: dict[int, int] = {}
+        self.current = 0
+        """The item that is flown, or would be next."""
+        self.valid = False
+        """Whether the vehicle would fly it."""
+        self.state = State.NO_MISSION
+        plans.listeners.append(self._plan_changed)
+
+    # -------------------------------------------------------------------------------------------- from outside
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        """All items, home in slot 0 included where the flavour has it."""
+        return self._plans.items(MISSION)
+
+    @property
+    def running(self) -> bool:
+        """Whether it is flown now."""
+        return self._vehicle.mode is Mode.MISSION and self.state is State.ACTIVE
+
+    def may_enter(self) -> bool:
+        """Whether the mode may be entered now."""
+        return self.valid and self._rules.may_enter(self.items, self._vehicle)
+
+    def start(self, first: int | None = None) -> bool:
+        """MISSION_START: lets it leave the ground, from item `first`, if given. False if there is none to start."""
+        if not self.valid or (first is not None and not self.select(first)):
+            return False
+        if self.state is State.COMPLETE:
+            self._rewind()
+        self._started = True
+        return True
+
+    def select(self, number: int) -> bool:
+        """MISSION_SET_CURRENT: another item is the current one. False if there is no such item."""
+        if not 0 <= number < len(self.items):
+            return False
+        self.current = max(number, self._rules.first)
+        self._begun, self._arrived_us = False, None
+        if self.state is State.COMPLETE:
+            self.state = State.NOT_STARTED
+        self._listener.on_moved_on()
+        return True
+
+    def tell_current(self) -> None:
+        """Says which item begins, if it is one that takes time and the flavour says so."""
+        item = self.items[self.current]
+        text = self._rules.text(self.current, item) if item.command in NAVIGATION else None
+        if text is not None:
+            self._listener.on_begun(text)
+
+    def _plan_changed(self, kind: int) -> None:
+        if kind == MISSION:
+            self._rewind()
+            self._judge_at_us = self._now_us + self._rules.judged_us
+            if not self._rules.judged_us:
+                self._judge()
+        elif kind == FENCE and self._rules.judged_us and self.state in (State.UNKNOWN, State.NOT_STARTED):
+            self._judge_at_us = self._now_us + self._rules.judged_us
+
+    def _judge(self) -> None:
+        self._judge_at_us = None
+        self.valid = self._rules.judge(self.items, self._vehicle, self._home, self._allows)
+        if len(self.items) <= self._rules.first:
+            self.state = State.NO_MISSION
+        else:
+            self.state = State.NOT_STARTED if self.valid else State.UNKNOWN
+        if not self.valid and self._vehicle.mode is Mode.MISSION:
+            self._vehicle.set_mode(Mode.LOITER)
+        self._listener.on_moved_on()
+
+    def _rewind(self) -> None:
+        self.current = min(self._rules.first, max(0, len(self.items) - 1))
+        self._begun, self._arrived_us, self._started = False, None, False
+        self._jumps.clear()
+        if self.state is State.COMPLETE:
+            self.state = State.NOT_STARTED
+
+    # ------------------------------------------------------------------------------------------------- in time
+
+    def step(self, now_us: int, where: Callable[[], Point]) -> None:
+        """Goes on with the mission if the mode is MISSION; `where` tells where the vehicle believes to be."""
+        self._now_us = now_us
+        if self._judge_at_us is not None and now_us >= self._judge_at_us:
+            self._judge()
+        vehicle = self._vehicle
+        if vehicle.mode is not Mode.MISSION:
+            self._entered = False
+            if self.state is State.ACTIVE:
+                self.state = State.PAUSED
+                self._begun, self._arrived_us = False, None
+                self._listener.on_moved_on()
+            return
+        if not self._entered:
+            self._entered = True
+            if self.state is State.COMPLETE:
+                self._rewind()
+        if not vehicle.armed or self.state is State.COMPLETE:
+            return
+        if not self.valid:
+            return
+        if not vehicle.in_air and not self._begun and self._rules.waits_for_start and not self._started:
+            return
+        if self.state is not State.ACTIVE:
+            self.state = State.ACTIVE
+            self._listener.on_moved_on()
+        here = where()
+        for _ in range(len(self.items)):
+            if not self._step_item(self.items[self.current], here):
+                return
+
+    def _step_item(self, item: Item, here: Point) -> bool:
+        """Begins the current item, or looks whether it is done; whether the next may be looked at already."""
+        if not self._begun:
+            self._begun, self._arrived_us = True, None
+            self.tell_current()
+            self._begin(item, here)
+        if not self._is_done(item, here):
+            return False
+        if item.command in NAVIGATION or self._rules.tells_all:
+            self._listener.on_reached(self.current)
+        return self._advance(item)
+
+    def _advance(self, item: Item) -> bool:
+        self._begun = False
+        following = self.current + 1
+        if item.command == JUMP:
+            done = self._jumps.get(self.current, 0)
+            if (item.p2 < 0 or done < item.p2) and self._rules.first <= item.p1 < len(self.items):
+                self._jumps[self.current] = done + 1
+                following = int(item.p1)
+        if following < len(self.items) and (item.command != RETURN or not self._rules.return_is_mode):
+            self.current = following
+            self._listener.on_moved_on()
+            return True
+        self.state = State.COMPLETE
+        self._started = False
+        if self._vehicle.in_air and self._vehicle.mode is Mode.MISSION:
+            if self._rules.after is not None:
+                self._vehicle.set_mode(self._rules.after)
+            else:
+                self._vehicle.hold()
+        self._listener.on_moved_on()
+        return False
+
+    def _begin(self, item: Item, here: Point) -> None:
+        vehicle, command = self._vehicle, item.command
+        if command == TAKEOFF or (command in WAYPOINTS and not vehicle.in_air):
+            self._climb(self._up(item, here))
+        elif command in WAYPOINTS:
+            vehicle.go_to(self._place(item, here))
+        elif command == LAND and item.has_place:
+            vehicle.go_to(Point(*self._home.local(item.x, item.y), here.up))
+        elif command == LAND:
+            vehicle.land_here()
+        elif command == RETURN and self._rules.return_is_mode:
+            vehicle.set_mode(Mode.RETURN)
+        elif command == RETURN:
+            vehicle.return_home()
+        elif command == SPEED and item.p2 > 0:
+            vehicle.speed = item.p2
+
+    def _climb(self, up: float) -> None:
+        vehicle = self._vehicle
+        if not vehicle.in_air or up > vehicle.body.up:
+            vehicle.takeoff_up = up if up > 0 else vehicle.handling.takeoff_up
+            vehicle.climb()
+
+    def _is_done(self, item: Item, here: Point) -> bool:
+        vehicle, command = self._vehicle, item.command
+        climbing = not vehicle.in_air or vehicle.landed is Landed.TAKEOFF
+        if command == TAKEOFF:
+            return not climbing
+        if command in WAYPOINTS:
+            if climbing:
+                return False
+            place = self._place(item, here)
+            if vehicle.target != place:  # on the ground it had to climb first
+                vehicle.go_to(place)
+            return self._has_arrived(item, place, here) and command != LOITER and self._has_waited(item.p1)
+        if command == DELAY:
+            return self._has_waited(item.p1)
+        if command == LAND:
+            if item.has_place and vehicle.landed is Landed.IN_AIR and self._is_near(vehicle.target, here):
+                vehicle.land_here()
+            return not vehicle.in_air
+        return command != RETURN or self._rules.return_is_mode or not vehicle.in_air
+
+    def _has_arrived(self, item: Item, place: Point, here: Point) -> bool:
+        """Whether it is there, or was: gusts may carry it off while it waits."""
+        if self._arrived_us is not None:
+            return True
+        accept = item.p2 if item.command == WAYPOINT and item.p2 > 0 else self._rules.accept_m
+        return self._is_near(place, here, accept) and abs(place.up - here.up) < _ARRIVED_UP_M
+
+    def _is_near(self, place: Point, here: Point, accept_m: float | None = None) -> bool:
+        away = hypot(place.north - here.north, place.east - here.east)
+        return away < (self._rules.accept_m if accept_m is None else accept_m)
+
+    def _has_waited(self, seconds: float) -> bool:
+        if self._arrived_us is None:
+            self._arrived_us = self._now_us
+        return not seconds > 0 or self._now_us - self._arrived_us >= seconds * 1_000_000
+
+    def _place(self, item: Item, here: Point) -> Point:
+        """Where an item is; without a place it is here, over the ground."""
+        up = self._up(item, here)
+        if not item.has_place:
+            return Point(self._vehicle.target.north, self._vehicle.target.east, up)
+        return Point(*self._home.local(item.x, item.y), up)
+
+    def _up(self, item: Item, here: Point) -> float:
+        if not isfinite(item.z):
+            return here.up
+        return item.z - self._home.amsl_mm / 1000 if item.frame in AMSL_FRAMES else item.z

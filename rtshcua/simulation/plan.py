@@ -1,0 +1,90 @@
+"""What is uploaded before a flight: missions, fences and rally points, as items of the MAVLink mission protocol.
+
+https://mavlink.io/en/services/mission.html
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message
+
+MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+FENCE = mavlink.MAV_MISSION_TYPE_FENCE
+RALLY = mavlink.MAV_MISSION_TYPE_RALLY
+ALL = mavlink.MAV_MISSION_TYPE_ALL
+KINDS = (MISSION, FENCE, RALLY)
+
+AMSL_FRAMES = frozenset({mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT})
+RELATIVE_FRAMES = frozenset({mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT})
+PLACELESS_FRAME = mavlink.MAV_FRAME_MISSION
+_LARGEST_E7 = 1_800_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One item; the place in 1e-7 degree, the altitude `z` in metres above what `frame` (MAV_FRAME) says."""
+
+    command: int
+    frame: int
+    p1: float = 0.0
+    p2: float = 0.0
+    p3: float = 0.0
+    p4: float = 0.0
+    x: int = 0
+    y: int = 0
+    z: float = 0.0
+    autocontinue: int = 1
+
+    @property
+    def has_place(self) -> bool:
+        """Whether it names a place: latitude and longitude of nothing mean none."""
+        return self.frame != PLACELESS_FRAME and (self.x, self.y) != (0, 0)
+
+
+def from_message(message: Message) -> Item | None:
+    """The item in a MISSION_ITEM_INT, or in a MISSION_ITEM with its degrees; None if its place is no place."""
+    m = message
+    if m.get_type() == "MISSION_ITEM":
+        scale = 1.0 if m.frame == PLACELESS_FRAME else 1e7
+        if not isfinite(m.x) or not isfinite(m.y):
+            return None
+        x, y = round(m.x * scale), round(m.y * scale)
+    else:
+        x, y = m.x, m.y
+    if m.frame != PLACELESS_FRAME and (abs(x) > _LARGEST_E7 // 2 or abs(y) > _LARGEST_E7):
+        return None
+    if not -(2**31) <= x < 2**31 or not -(2**31) <= y < 2**31:
+        return None
+    return Item(m.command, m.frame, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.autocontinue)
+
+
+def to_message(item: Item, sequence: int, kind: int, to: tuple[int, int], whole: bool) -> Message:
+    """The item as MISSION_ITEM_INT if `whole`, else as the older MISSION_ITEM; `to` is (system, component)."""
+    parts = (item.p1, item.p2, item.p3, item.p4)
+    head = (*to, sequence, item.frame, item.command, 0, item.autocontinue, *parts)
+    if whole:
+        return mavlink.MAVLink_mission_item_int_message(*head, item.x, item.y, item.z, kind)
+    scale = 1.0 if item.frame == PLACELESS_FRAME else 1e-7
+    return mavlink.MAVLink_mission_item_message(*head, item.x * scale, item.y * scale, item.z, kind)
+
+
+class Plans:
+    """What is stored of each kind. Whoever wants to know of changes adds itself to `listeners`."""
+
+    def __init__(self) -> None:
+        self._items: dict[int, tuple[Item, ...]] = dict.fromkeys(KINDS, ())
+        self.listeners: list[Callable[[int], None]] = []
+        """Called with the kind after each change."""
+
+    def items(self, kind: int) -> tuple[Item, ...]:
+        """The items of a kind, in order."""
+        return self._items[kind]
+
+    def replace(self, kind: int, items: Sequence[Item]) -> None:
+        """Stores other items in place of all of that kind."""
+        self._items[kind] = tuple(items)
+        for listener in self.listeners:
+            listener(kind)

@@ -1,0 +1,74 @@
+"""What ground stations ask beyond commands: the list of modes, files, logs. What is not there is refused at once.
+
+QGroundControl asks for all of them when it connects, and waits seconds for each answer that does not come.
+"""
+
+import struct
+from collections.abc import Callable, Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message, Received
+from rtshcua.simulation.autopilot import Autopilot
+from rtshcua.simulation.modes import Mode
+
+AVAILABLE_MODES = 435
+"""The message is not in the dialect: https://mavlink.io/en/messages/common.html#AVAILABLE_MODES."""
+_CRC_EXTRA = 134
+_LAYOUT = struct.Struct("<IIBBB35s")
+
+_STANDARD: Mapping[Mode, int] = {
+    Mode.POSITION: 1, Mode.ALTITUDE: 4, Mode.RETURN: 5, Mode.MISSION: 6, Mode.LAND: 7, Mode.TAKEOFF: 8
+}  # fmt: skip
+"""MAV_STANDARD_MODE; others have none (0)."""
+
+_NAK, _UNKNOWN_COMMAND = 129, 7
+"""MAV_FTP_OPCODE and MAV_FTP_ERR."""
+_FTP_SIZE = 251
+
+
+class _AvailableModes(mavlink.MAVLink_message):  # type: ignore[misc]
+    """AVAILABLE_MODES, packed by hand."""
+
+    id = AVAILABLE_MODES
+
+    def __init__(self, payload: bytes) -> None:
+        super().__init__(AVAILABLE_MODES, "AVAILABLE_MODES")
+        self._bytes = payload
+
+    def pack(self, mav: Message, force_mavlink1: bool = False) -> Message:
+        """The frame."""
+        return self._pack(mav, _CRC_EXTRA, self._bytes, force_mavlink1=force_mavlink1)
+
+
+def available_modes(a: Autopilot, number: int) -> bool:
+    """Queues the mode of this number, counted from 1, or all of them for 0; False if there is none of that number."""
+    modes = a.flavour.modes
+    listed = list(modes.numbers.items())
+    if not 0 <= number <= len(listed):
+        return False
+    for index, (mode, custom) in enumerate(listed, start=1):
+        if number in (0, index):
+            name = modes.names[mode].encode()
+            a.send(_AvailableModes(_LAYOUT.pack(custom, 0, len(listed), index, _STANDARD.get(mode, 0), name)))
+    return True
+
+
+def _file(a: Autopilot, received: Received) -> None:
+    """FILE_TRANSFER_PROTOCOL: there are no files."""
+    m = received.message
+    sequence, session, opcode = struct.unpack_from("<HBB", bytes(m.payload))
+    head = struct.pack("<HBBBBBBIB", (sequence + 1) % 65_536, session, _NAK, 1, opcode, 0, 0, 0, _UNKNOWN_COMMAND)
+    payload = list(head.ljust(_FTP_SIZE, b"\0"))
+    a.send(mavlink.MAVLink_file_transfer_protocol_message(0, received.system, received.component, payload))
+
+
+def _logs(a: Autopilot, _: Received) -> None:
+    """LOG_REQUEST_LIST: there are no logs."""
+    a.send(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+
+
+HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
+    "FILE_TRANSFER_PROTOCOL": _file,
+    "LOG_REQUEST_LIST": _logs,
+}

@@ -1,0 +1,55 @@
+"""MAVLink 2 signing, the vehicle's end: https://mavlink.io/en/guide/message_signing.html.
+
+Once a key is set (SETUP_SIGNING, or from the start) all that the autopilot sends is signed, and what is not rightly
+signed has no effect and gets no answer, as recorded from ArduCopter on its second channel. Two things are let in all
+the same: RADIO_STATUS, which radios do not sign, and everything on a link that is taken for USB.
+"""
+
+from typing import Final
+
+from rtshcua.mavlink.frames import Message, Received
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
+
+_UNSIGNED: Final = frozenset({"RADIO_STATUS", "RADIO"})
+_FULL_SPEED: Final = 100
+_LATEST: Final = 1 << 47
+"""No key begins with a later time stamp (in the year 2059): they have 48 bits, and must not run out in flight."""
+
+
+class VehicleSigning:
+    """One vehicle's key, if it has one. `usb`: the link is taken for USB; `speed`: see `SimulationConfig.speed`."""
+
+    def __init__(self, key: bytes | None, usb: bool, utc_us: int, speed: int) -> None:
+        self._usb = usb
+        self._speed = speed
+        self._link: SignedLink | None = None
+        if key is not None:
+            self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US), 0)
+
+    @property
+    def on(self) -> bool:
+        """Whether there is a key."""
+        return self._link is not None
+
+    def lets_in(self, received: Received, now_us: int, optional: bool) -> bool:
+        """Whether a frame may have an effect; `optional` means that the vehicle does not insist on signatures."""
+        link = self._link
+        if link is None:
+            return True
+        return link.accept(received.frame, self._clock(now_us)) or (optional or self._usb or received.name in _UNSIGNED)
+
+    def set_up(self, message: Message, now_us: int) -> None:
+        """SETUP_SIGNING: another key and the first time stamp, or none at all if the key is nothing but zeros."""
+        key = bytes(message.secret_key)
+        if any(key):
+            first = min(message.initial_timestamp, _LATEST)
+            self._link = SignedLink(key, State(first, {}), EPOCH_US, self._clock(now_us))
+        else:
+            self._link = None
+
+    def seal(self, frame: bytes, now_us: int) -> bytes:
+        """The frame as it leaves: signed, if there is a key."""
+        return frame if self._link is None else self._link.sign(frame, self._clock(now_us))
+
+    def _clock(self, now_us: int) -> int:
+        return now_us * _FULL_SPEED // self._speed

@@ -1,0 +1,224 @@
+"""The mission protocol: uploads, downloads and clearing, one at a time, as (system, component) of the vehicle.
+
+What PX4 and ArduCopter do differently is in `TransferRules`; each has them in its `plans.py`. An upload takes effect
+as a whole when its last item has come.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.plan import ALL, KINDS, Item, Plans, from_message, to_message
+
+ACCEPTED: int = mavlink.MAV_MISSION_ACCEPTED
+ERROR: int = mavlink.MAV_MISSION_ERROR
+UNSUPPORTED: int = mavlink.MAV_MISSION_UNSUPPORTED
+UNSUPPORTED_FRAME: int = mavlink.MAV_MISSION_UNSUPPORTED_FRAME
+
+Peer = tuple[int, int]
+"""(system, component) of the other end."""
+
+
+@dataclass(frozen=True, slots=True)
+class TransferRules:
+    """How a flavour speaks the protocol."""
+
+    learns_int: bool
+    """Whether it asks with MISSION_REQUEST_INT once it has seen an item of that form; else always the legacy way."""
+    retry_us: int
+    abort_us: int
+    on_abort: int | None
+    """What it acknowledges an upload with that it gives up; None for silence."""
+    out_of_order: int | None
+    """What it answers an item that it did not ask for; None for silence."""
+    busy: int
+    """What it answers a second upload with, by another sender."""
+    opens_downloads: bool
+    """Whether items can be asked for only after MISSION_REQUEST_LIST, and are then sent again unasked if need be."""
+    capacity: Mapping[int, int]
+    check: Callable[[int, int, Item], int]
+    """(kind, number, item) to MAV_MISSION_RESULT: what it says to an item."""
+    check_all: Callable[[int, tuple[Item, ...]], int]
+    """(kind, items) to MAV_MISSION_RESULT: what it says when all have come."""
+
+
+@dataclass(slots=True)
+class _Upload:
+    peer: Peer
+    kind: int
+    count: int
+    heard_us: int
+    asked_us: int
+    items: list[Item] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Download:
+    peer: Peer
+    kind: int
+    heard_us: int
+    sent_us: int
+    whole: bool = True
+    next: int = 0
+
+
+class Transfer:
+    """One vehicle's end. `stored` gives what a download of a kind shows; `may_clear` whether a kind may be emptied."""
+
+    def __init__(
+        self,
+        rules: TransferRules,
+        plans: Plans,
+        send: Callable[[Message], None],
+        stored: Callable[[int], tuple[Item, ...]],
+        may_clear: Callable[[int], bool],
+    ) -> None:
+        self._rules = rules
+        self._plans = plans
+        self._send = send
+        self._stored = stored
+        self._may_clear = may_clear
+        self._upload: _Upload | None = None
+        self._download: _Download | None = None
+        self._asks_int = False
+
+    # --------------------------------------------------------------------------------------------- upload
+
+    def count(self, peer: Peer, kind: int, count: int, now_us: int) -> None:
+        """MISSION_COUNT: an upload begins."""
+        upload, rules = self._upload, self._rules
+        if kind not in KINDS:
+            return self._ack(peer, UNSUPPORTED, kind)
+        if upload is not None and upload.peer != peer:
+            return self._ack(peer, rules.busy, kind)
+        if count > rules.capacity[kind]:
+            return self._ack(peer, mavlink.MAV_MISSION_NO_SPACE, kind)
+        self._download = None
+        if count == 0:
+            self._upload = None
+            return self._clear(peer, (kind,), kind)
+        self._upload = _Upload(peer, kind, count, now_us, now_us)
+        return self._ask(self._upload, now_us)
+
+    def item(self, peer: Peer, message: Message, now_us: int) -> None:
+        """MISSION_ITEM or MISSION_ITEM_INT: the one asked for is kept, and the next one asked for."""
+        upload, rules, kind = self._upload, self._rules, message.mission_type
+        expected = upload is not None and (upload.peer, upload.kind) == (peer, kind)
+        if upload is None or not expected or message.seq != len(upload.items):
+            if rules.out_of_order is not None:
+                self._ack(peer, rules.out_of_order, kind)
+            return
+        self._asks_int = rules.learns_int and message.get_type() == "MISSION_ITEM_INT"
+        item = from_message(message)
+        result = mavlink.MAV_MISSION_INVALID_PARAM5_X if item is None else rules.check(kind, message.seq, item)
+        if item is None or result != ACCEPTED:
+            self._upload = None
+            self._ack(peer, result, kind)
+            return
+        upload.items.append(item)
+        upload.heard_us = now_us
+        if len(upload.items) < upload.count:
+            self._ask(upload, now_us)
+        else:
+            self._upload = None
+            self._store(peer, kind, tuple(upload.items))
+
+    def _store(self, peer: Peer, kind: int, items: tuple[Item, ...]) -> None:
+        result = self._rules.check_all(kind, items)
+        self._ack(peer, result, kind)
+        if result == ACCEPTED:
+            self._plans.replace(kind, items)
+
+    def clear_all(self, peer: Peer, kind: int) -> None:
+        """MISSION_CLEAR_ALL."""
+        if kind != ALL and kind not in KINDS:
+            return self._ack(peer, UNSUPPORTED, kind)
+        if self._upload is not None:
+            return self._ack(peer, self._rules.busy, kind)
+        return self._clear(peer, KINDS if kind == ALL else (kind,), kind)
+
+    def _clear(self, peer: Peer, kinds: tuple[int, ...], named: int) -> None:
+        allowed = all(self._may_clear(kind) for kind in kinds)
+        self._ack(peer, ACCEPTED if allowed else ERROR, named)
+        for kind in kinds if allowed else ():
+            self._plans.replace(kind, ())
+
+    def _ask(self, upload: _Upload, now_us: int) -> None:
+        upload.asked_us = now_us
+        kind = mavlink.MAVLink_mission_request_message
+        if self._asks_int:
+            kind = mavlink.MAVLink_mission_request_int_message
+        self._send(kind(*upload.peer, len(upload.items), upload.kind))
+
+    # ------------------------------------------------------------------------------------------- download
+
+    def request_list(self, peer: Peer, kind: int, now_us: int) -> None:
+        """MISSION_REQUEST_LIST: how many items there are."""
+        if self._upload is not None:
+            return self._ack(peer, self._rules.busy, kind)
+        if kind not in KINDS:
+            return self._ack(peer, UNSUPPORTED, kind)
+        if self._rules.opens_downloads and self._stored(kind):
+            self._download = _Download(peer, kind, now_us, now_us)
+        return self._send(mavlink.MAVLink_mission_count_message(*peer, len(self._stored(kind)), kind))
+
+    def request(self, peer: Peer, message: Message, now_us: int) -> None:
+        """MISSION_REQUEST or MISSION_REQUEST_INT: one item, in the form that was asked for."""
+        kind, number = message.mission_type, message.seq
+        whole = message.get_type() == "MISSION_REQUEST_INT"
+        items = self._stored(kind) if kind in KINDS else ()
+        if number >= len(items):
+            return self._ack(peer, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)
+        download = self._download
+        if self._rules.opens_downloads:
+            if download is None or (download.peer, download.kind) != (peer, kind):
+                return self._ack(peer, ERROR, kind)
+            download.heard_us, download.sent_us, download.next, download.whole = now_us, now_us, number + 1, whole
+        return self._send_item(peer, kind, number, whole)
+
+    def acknowledged(self, peer: Peer, result: int, now_us: int) -> None:
+        """MISSION_ACK: the other end has what it wanted, or gives up, or wants to be asked in the other form."""
+        if self._download is not None and self._download.peer == peer:
+            self._download = None
+        upload = self._upload
+        if upload is None or upload.peer != peer or result == ACCEPTED:
+            return
+        if result == UNSUPPORTED and self._rules.learns_int:
+            self._asks_int = not self._asks_int
+            self._ask(upload, now_us)
+        else:
+            self._upload = None
+
+    def _send_item(self, peer: Peer, kind: int, number: int, whole: bool) -> None:
+        self._send(to_message(self._stored(kind)[number], number, kind, peer, whole))
+
+    # ----------------------------------------------------------------------------------------------- time
+
+    def step(self, now_us: int) -> None:
+        """Asks again for what did not come, and gives up what came to nothing."""
+        rules, upload, download = self._rules, self._upload, self._download
+        if upload is not None:
+            if now_us - upload.heard_us > rules.abort_us:
+                self._upload = None
+                if rules.on_abort is not None:
+                    self._ack(upload.peer, rules.on_abort, upload.kind)
+            elif now_us - upload.asked_us > rules.retry_us:
+                self._ask(upload, now_us)
+        if download is not None:
+            if now_us - download.heard_us > rules.abort_us:
+                self._download = None
+            elif now_us - download.sent_us > rules.retry_us:
+                self._send_again(download, now_us)
+
+    def _send_again(self, download: _Download, now_us: int) -> None:
+        download.sent_us = now_us
+        count = len(self._stored(download.kind))
+        if download.next == 0:
+            self._send(mavlink.MAVLink_mission_count_message(*download.peer, count, download.kind))
+        elif download.next <= count:
+            self._send_item(download.peer, download.kind, download.next - 1, download.whole)
+
+    def _ack(self, peer: Peer, result: int, kind: int) -> None:
+        self._send(mavlink.MAVLink_mission_ack_message(*peer, result, kind))

@@ -1,0 +1,156 @@
+"""A recorded flight through the driver and the state monitor, as the runtime would have seen it."""
+
+import lzma
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from math import cos, radians
+from pathlib import Path
+
+from msgspec.structs import replace
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua import library
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.cli.sources import compile_sources
+from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.mavlink import tlog
+from rtshcua.mavlink.frames import Codec, Received
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import SHIFT, Projection
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.ports import Command, Event, Readings
+from rtshcua.onboard.runtime.monitor import StateMonitor
+
+TRACES = Path(__file__).resolve().parents[1] / "traces"
+SECOND = 1_000_000
+TICK_US = 50_000
+#: monotonic time of the autopilot's start
+START_US = 5_000_000
+
+
+@cache
+def shipped_policy() -> Policy:
+    """The policy of the shipped missions, with all the signals that one of them needs."""
+    compiled, _ = compile_sources([library.root() / "missions" / "one_bridge.rts"], mission=None, issued_at_us=0)
+    assert compiled.policy is not None
+    return compiled.policy
+
+
+def at_home(latitude: int, longitude: int) -> Policy:
+    """That policy for a vehicle that lives elsewhere (1e-7 degree)."""
+    north = round(11.1319491 * (1 << SHIFT))
+    east = round(11.1319491 * cos(radians(latitude / 1e7)) * (1 << SHIFT))
+    return replace(shipped_policy(), projection=Projection(latitude, longitude, east, north))
+
+
+@dataclass
+class Recorded:
+    """One flight. `late_us` is when the first frame came, in us after the autopilot's start (the page's second 0).
+
+    The recording holds only what the vehicle sent, and to another client. So nothing answers what the driver asks:
+    `parameters` are told to it instead, and its fence is left alone. `commands` are begun at their second, as if the
+    recorded client's had been ours.
+    """
+
+    name: str
+    late_us: int
+    policy: Policy
+    parameters: dict[str, float]
+    commands: Sequence[tuple[float, Command]] = ()
+    events: list[tuple[float, Event]] = field(default_factory=list)
+    states: list[dict[str, int | None]] = field(default_factory=list)
+    sent: list[tuple[float, Received]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        prepared = prepare(self.policy)
+        assert not isinstance(prepared, Malformed)
+        self._monitor = StateMonitor(prepared)
+        self._frames = FrameSession()
+        self.driver = Driver(self.policy, self._frames, fence=False)
+        self._reader = Codec(0, 0)
+        self._now_us = START_US
+        self.states.append(self._state())
+        waiting = list(self.commands)
+        for entry in self._entries():
+            while self._now_us < entry.at_us:
+                next_us = min(entry.at_us, self._now_us + TICK_US)
+                self._pass(next_us, waiting)
+            heard = self.driver.receive(entry.frame, self._now_us)
+            self._take(heard.events)
+            self._sent(heard.answers)
+
+    @property
+    def second(self) -> float:
+        return (self._now_us - START_US) / SECOND
+
+    def of(self, *kinds: type[Event]) -> list[tuple[float, Event]]:
+        """The events of these kinds, and when they came."""
+        return [(at, event) for at, event in self.events if isinstance(event, kinds)]
+
+    def first(self, kind: type[Event]) -> float:
+        """When the first of a kind came."""
+        return self.of(kind)[0][0]
+
+    def known(self, signal: str) -> list[tuple[int, int]]:
+        """The stretches of seconds, from and to, at each of which a signal was known and not stale."""
+        stretches: list[tuple[int, int]] = []
+        for second, state in enumerate(self.states):
+            if state[signal] is None:
+                continue
+            if stretches and stretches[-1][1] == second - 1:
+                stretches[-1] = (stretches[-1][0], second)
+            else:
+                stretches.append((second, second))
+        return stretches
+
+    def _entries(self) -> Iterator[tlog.Entry]:
+        data = lzma.decompress((TRACES / f"{self.name}.tlog.xz").read_bytes())
+        first_us: int | None = None
+        for entry in tlog.read(data):
+            first_us = entry.at_us if first_us is None else first_us
+            yield tlog.Entry(START_US + self.late_us + entry.at_us - first_us, entry.frame)
+
+    def _pass(self, to_us: int, waiting: list[tuple[float, Command]]) -> None:
+        before_us, self._now_us = self._now_us, to_us
+        events, frames = self.driver.tick(to_us)
+        self._take(events)
+        self._sent(frames)
+        while waiting and waiting[0][0] <= self.second:
+            begun = waiting.pop(0)[1]
+            self._frames.open(begun, to_us)
+            events, frames = self.driver.begin(begun, to_us)
+            self._take(events)
+            self._sent(frames)
+        if (before_us - START_US) // SECOND < (to_us - START_US) // SECOND:
+            self.states.append(self._state())
+
+    def _state(self) -> dict[str, int | None]:
+        state = self._monitor.state(self._now_us)
+        return {
+            signal.name: state.values[signal.slot] if state.ages[signal.slot] <= signal.stale_us else None
+            for signal in self.policy.signals
+        }
+
+    def _take(self, events: Sequence[Event]) -> None:
+        for event in events:
+            self.events.append((round(self.second, 2), event))
+            if isinstance(event, Readings):
+                self._monitor.update(event)
+
+    def _sent(self, frames: Sequence[bytes]) -> None:
+        for frame in frames:
+            (received,) = self._reader.parse(frame)
+            self.sent.append((round(self.second, 2), received))
+            if received.name == "PARAM_REQUEST_READ" and received.message.param_id in self.parameters:
+                self._answer(received.message.param_id)
+
+    def _answer(self, name: str) -> None:
+        value = mavlink.MAVLink_param_value_message(name.encode(), self.parameters[name], 9, 1, 0)
+        self._take(self.driver.receive(Codec(1, 1).pack(value), self._now_us).events)
+
+
+def command(token: int, kind: MotionKind, *geo: int, altitude: int = 0, speed: int = 0) -> Command:
+    """A command at a place in 1e-7 degree."""
+    return Command(token, kind.name.lower(), kind, (0,) * len(geo), geo, altitude, speed)

@@ -1,0 +1,120 @@
+"""What a ground station asks when it connects: there is an answer, and for what is not there a refusal, at once."""
+
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from pymavlink.dialects.v20 import development
+
+from rtshcua.simulation.modes import Mode
+from virtual import plans as p
+
+Pilots = Callable[..., Any]
+
+
+def modes_asked(a: Any, number: int) -> tuple[list[int], list[Any]]:
+    """The results, and the messages, read with a dialect that has them."""
+    message = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 435, number, 0, 0, 0, 0, 0)
+    datagrams = a.simulation.receive(a.codec.pack(message), a.simulation.now_us)
+    reader = development.MAVLink(None)
+    read = [reader.decode(bytearray(datagram)) for datagram in datagrams]
+    acks = [m.result for m in read if m.get_type() == "COMMAND_ACK"]
+    return acks, [m for m in read if m.get_type() == "AVAILABLE_MODES"]
+
+
+def test_all_modes_and_one_by_one(pilot: Pilots, flavour: str) -> None:
+    a = pilot(flavour).ready()
+    acks, modes = modes_asked(a, 0)
+    table = a.simulation._autopilot.flavour.modes
+    assert acks == [0]
+    assert {m.custom_mode for m in modes} == set(table.numbers.values())
+    assert [m.mode_index for m in modes] == list(range(1, len(modes) + 1))
+    assert {m.number_modes for m in modes} == {len(modes)}
+    by_number = {m.custom_mode: m for m in modes}
+    assert by_number[table.numbers[Mode.MISSION]].standard_mode == 6
+    assert by_number[table.numbers[Mode.RETURN]].mode_name == table.names[Mode.RETURN]
+    acks, modes = modes_asked(a, 2)
+    assert (acks, [m.mode_index for m in modes]) == ([0], [2])
+    refused = 2 if a.px4 else 4
+    assert modes_asked(a, 99) == ([refused], [])
+
+
+@pytest.mark.parametrize("number", [397, 395, 300, 259, 280, 411])
+def test_messages_that_it_does_not_have(pilot: Pilots, flavour: str, number: int) -> None:
+    a = pilot(flavour).ready()
+    assert a.long(512, number) == [2 if a.px4 else 4]
+
+
+@pytest.mark.parametrize("command", [519, 521, 2504, 31010, 9])
+def test_commands_that_it_does_not_have(pilot: Pilots, flavour: str, command: int) -> None:
+    assert pilot(flavour).ready().long(command) == [3]
+
+
+def test_there_are_no_files_and_no_logs(pilot: Pilots, flavour: str) -> None:
+    a = pilot(flavour).ready()
+    ask = struct.pack("<HBBBBBBI", 65_535, 3, 4, 0, 0, 0, 0, 0).ljust(251, b"\0")
+    a.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, list(ask)))
+    sequence, session, opcode, size, asked = struct.unpack_from(
+        "<HBBBB", bytes(a.last("FILE_TRANSFER_PROTOCOL").payload)
+    )
+    assert (sequence, session, opcode, size, asked) == (0, 3, 129, 1, 4)
+    a.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 65_535))
+    assert a.last("LOG_ENTRY").num_logs == 0
+
+
+def test_what_it_says_of_itself(pilot: Pilots, flavour: str) -> None:
+    a = pilot(flavour).ready()
+    assert a.long(512, 148) == [0]
+    has = a.last("AUTOPILOT_VERSION").capabilities
+    for capability in ("MISSION_INT", "COMMAND_INT", "MISSION_FENCE", "MISSION_RALLY", "MAVLINK2"):
+        assert has & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{capability}")
+    for capability in ("FTP", "SET_ATTITUDE_TARGET", "FLIGHT_TERMINATION"):
+        assert not has & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{capability}")
+
+
+@pytest.mark.parametrize(
+    ("flavour", "name", "type_", "value"),
+    [
+        ("px4", "GF_ACTION", 6, 3.0),
+        ("px4", "MIS_TAKEOFF_ALT", 9, 7.5),
+        ("px4", "RTL_RETURN_ALT", 9, 45.0),
+        ("ardupilot", "FENCE_ENABLE", 2, 1.0),
+        ("ardupilot", "RTL_ALT", 6, 1500.0),
+        ("ardupilot", "WPNAV_SPEED", 9, 800.0),
+    ],
+)
+def test_parameters_by_type(pilot: Pilots, flavour: str, name: str, type_: int, value: float) -> None:
+    a = pilot(flavour).ready()
+
+    def encoded(value: float) -> float:
+        integer = a.px4 and type_ == 6
+        return float(struct.unpack("<f", struct.pack("<i", int(value)))[0]) if integer else value
+
+    a.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), encoded(value), 6 if a.px4 and type_ == 6 else 9))
+    echo = a.last("PARAM_VALUE")
+    assert (echo.param_id, echo.param_type, echo.param_value) == (name, type_, encoded(value))
+    assert (echo.param_index == 65_535) is not a.px4
+    a.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    listed = [f.message for f in a.seen if f.name == "PARAM_VALUE"][-a.last("PARAM_VALUE").param_count :]
+    assert [m.param_index for m in listed] == list(range(len(listed)))
+    assert [m.param_value for m in listed if m.param_id == name] == [encoded(value)]
+    a.send(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
+    assert a.last("PARAM_VALUE").param_value == encoded(value)
+
+
+@pytest.mark.parametrize("name", ["MAV_SYS_ID", "SYSID_THISMAV"])
+def test_its_own_id_is_a_parameter(pilot: Pilots, name: str) -> None:
+    a = pilot("px4" if name == "MAV_SYS_ID" else "ardupilot", system=7).ready()
+    a.send(mavlink.MAVLink_param_request_read_message(7, 1, name.encode(), -1))
+    value = a.last("PARAM_VALUE").param_value
+    assert (struct.unpack("<i", struct.pack("<f", value))[0] if a.px4 else value) == 7
+
+
+def test_how_many_items_there_are_is_a_parameter(pilot: Pilots) -> None:
+    a = pilot("ardupilot").ready()
+    p.upload(a, p.square(60), p.FENCE)
+    assert (a.last("PARAM_VALUE").param_id, a.last("PARAM_VALUE").param_value) == ("FENCE_TOTAL", 4)
+    p.upload(a, p.mission(a, [p.takeoff(5)]))
+    assert (a.last("PARAM_VALUE").param_id, a.last("PARAM_VALUE").param_value) == ("MIS_TOTAL", 2)

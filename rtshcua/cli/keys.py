@@ -1,5 +1,6 @@
 """`rtshcua keys`: make and list signing keys and the trust root."""
 
+import hashlib
 import json
 import secrets
 import sys
@@ -12,11 +13,13 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.signing import fingerprint, write_link_key
 from rtshcua.cli.faults import fail
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
 from rtshcua.cli.unlock import read_passphrase
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import SEED_BYTES
 from rtshcua.wire.trust import TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
@@ -93,6 +96,32 @@ def show(
         print(json.dumps({"root_key": public.hex(), "kid": kid.hex(), "development": root.development}))
     else:
         print(public.hex())
+    return ExitCode.OK
+
+
+@app.command()
+def link(
+    file: Annotated[Path, typer.Argument(help="the file to make; readable by you alone")],
+    passphrase_file: Annotated[
+        Path | None,
+        typer.Option(help="make the key of this passphrase, as ground stations do, instead of a random one"),
+    ] = None,
+) -> ExitCode:
+    """Make a key for MAVLink 2 signing: `rtshcua run --signing-key FILE`, and the same key in the vehicle.
+
+    A ground station gives it to the vehicle (SETUP_SIGNING), over a cable and disarmed. One key a vehicle.
+    """
+    key = secrets.token_bytes(KEY_OCTETS)
+    if passphrase_file is not None:
+        passphrase = read_passphrase(passphrase_file)
+        if len(passphrase.decode(errors="replace")) < _SHORTEST:
+            return fail(ExitCode.USAGE, f"a link key needs a passphrase of {_SHORTEST} characters or more")
+        key = hashlib.sha256(passphrase).digest()
+    try:
+        write_link_key(file, key)
+    except FileExistsError:
+        return fail(ExitCode.REFUSED, f"there is a file `{file}` already", "a key that is in use is not overwritten")
+    print(f"{file}: link key {fingerprint(key)}")
     return ExitCode.OK
 
 

@@ -1,11 +1,18 @@
 """The shape of a MAVLink 2 frame on the wire, see https://mavlink.io/en/guide/serialization.html."""
 
+from binascii import crc_hqx
+from typing import Final
+
 MARKER = 0xFD
 HEADER = 10
 CHECKSUM = 2
 SIGNATURE = 13
+FLAGS = 2
+"""Where the incompatibility flags stand."""
 FLAG_SIGNED = 0x01
 """The only incompatibility flag that is defined; a frame with another one cannot be understood."""
+
+_MIRROR: Final = bytes(int(f"{octet:08b}"[::-1], 2) for octet in range(256))
 
 
 def frame_length(data: bytes, start: int) -> int:
@@ -17,3 +24,30 @@ def frame_length(data: bytes, start: int) -> int:
 def message_id(data: bytes, start: int) -> int:
     """The message's number, from the frame's header."""
     return int.from_bytes(data[start + 7 : start + HEADER], "little")
+
+
+def checksum(octets: bytes, start: int = 0xFFFF) -> int:
+    """CRC-16/MCRF4XX, which MAVLink takes over all between marker and checksum, and the message's extra octet.
+
+    It is the CRC of `crc_hqx` (same polynomial, 0x1021) with every octet, and the result, mirrored.
+    """
+    crc = crc_hqx(octets.translate(_MIRROR), start)
+    return _MIRROR[crc >> 8] | _MIRROR[crc & 0xFF] << 8
+
+
+def with_flags(frame: bytes, flags: int) -> bytes:
+    """A frame without a signature, with other incompatibility flags and the checksum that belongs to them.
+
+    The checksum is linear, so that what a changed octet does to it depends on that octet and on where it stands alone:
+    neither the rest of the frame nor the message's extra octet is needed, and a wrong checksum stays wrong.
+    """
+    changed = frame[FLAGS] ^ flags
+    end = HEADER + frame[1]
+    # from behind the marker to the extra octet there are `end` octets; of these the second changes
+    crc = int.from_bytes(frame[end : end + CHECKSUM], "little") ^ checksum(bytes([0, changed]) + bytes(end - 2), 0)
+    return frame[:FLAGS] + bytes([flags]) + frame[FLAGS + 1 : end] + crc.to_bytes(CHECKSUM, "little")
+
+
+def unsigned(frame: bytes) -> bytes:
+    """A frame as it is logged: without its signature: none are to be collected (guide to signing, "Logging")."""
+    return with_flags(frame, 0) if frame[FLAGS] & FLAG_SIGNED else frame

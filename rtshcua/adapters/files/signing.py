@@ -1,0 +1,145 @@
+"""What MAVLink signing keeps on the disk: the link's key, and the timestamps that no restart may use again.
+
+    FILE                                                       the key: 32 octets, or 64 hexadecimal digits; mode 0600
+    <state folder>/link/vehicle-<identity>/<fingerprint>       JSON: the local timestamp, and each stream's last one
+
+"The current timestamp should be stored regularly in persistent storage" (guide, "Timestamp Handling"). What is stored
+lies `RESERVE_S` ahead of what was used, and is stored again every `EVERY_S`, and when a peer's frame makes our time
+leap, by a thread of its own: nothing that flies may wait for a disk. So after a crash the first timestamp is above all
+that were sent, and what was heard before is not heard again. An orderly end stores the exact figures.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import stat
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, write_new
+from rtshcua.mavlink.signing import KEY_OCTETS, UNIT_US, SignedLink, State
+
+EVERY_S: Final = 1.0
+RESERVE_S: Final = 3.0
+_LONGEST: Final = 1_024
+
+
+class LinkKeyError(Exception):
+    """A key file, or what is kept for its key, does not serve: `exposed`, `malformed`, `in-use`, `damaged`."""
+
+    def __init__(self, slug: str, text: str, help: str | None = None) -> None:
+        super().__init__(text)
+        self.slug = slug
+        self.help = help
+
+
+def read_link_key(path: Path) -> bytes:
+    """The key in a file that its owner alone may read. Raises LinkKeyError and OSError."""
+    with path.open("rb") as file:
+        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
+        if os.name == "posix" and mode & 0o077:
+            raise LinkKeyError("exposed", f"others may read the key `{path}`: its mode is {mode:04o}", "`chmod 600`")
+        data = file.read(_LONGEST)
+    if len(data) != KEY_OCTETS:
+        try:
+            data = bytes.fromhex(data.decode("ascii"))
+        except ValueError:
+            data = b""
+    if len(data) != KEY_OCTETS or not any(data):  # zeros switch signing off (SETUP_SIGNING)
+        what = f"{KEY_OCTETS} octets, or {2 * KEY_OCTETS} hexadecimal digits, not all 0"
+        raise LinkKeyError("malformed", f"`{path}` is no link key", f"{what}; `rtshcua keys link` makes one")
+    return data
+
+
+def write_link_key(path: Path, key: bytes) -> None:
+    """Put a key into a new file. Raises FileExistsError, and OSError."""
+    write_new(path, key.hex().encode() + b"\n", mode=PRIVATE_FILE)
+
+
+def fingerprint(key: bytes) -> str:
+    """A name for a key that gives nothing of it away."""
+    return hashlib.sha256(b"rtshcua/link-key\0" + key).hexdigest()[:16]
+
+
+class LinkStore:
+    """The state of one key on one vehicle. Held by one process at a time, until it is closed or dies."""
+
+    def __init__(self, folder: Path, vehicle: str, key: bytes) -> None:
+        """Raises LinkKeyError (`in-use`), and OSError."""
+        place = folder / "link" / f"vehicle-{quote(vehicle, safe='')}"
+        make_folder(place, mode=PRIVATE_FOLDER)
+        self.path = place / fingerprint(key)
+        self._lock = os.open(self.path.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._lock)
+            raise LinkKeyError("in-use", f"another run signs for `{vehicle}` with this key") from None
+
+    def load(self) -> State:
+        """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""
+        try:
+            data = self.path.read_bytes()
+        except FileNotFoundError:
+            return State(0, {})
+        try:
+            kept = json.loads(data)
+            streams = {(int(a), int(b), int(c)): int(last) for a, b, c, last in kept["streams"]}
+            return State(int(kept["timestamp"]), streams)
+        except (ValueError, TypeError, KeyError):
+            text = f"`{self.path}` is damaged: which timestamps the link used is not known"
+            raise LinkKeyError("damaged", text, "a new key on both ends; `rtshcua keys link` makes one") from None
+
+    def save(self, state: State, ahead: int = 0) -> None:
+        """Keep a state, all of it so many timestamps ahead. Raises OSError."""
+        streams = [[*stream, last + ahead] for stream, last in sorted(state.streams.items())]
+        kept = json.dumps({"timestamp": state.timestamp + ahead, "streams": streams})
+        replace(self.path, kept.encode() + b"\n", mode=PRIVATE_FILE)
+
+    def close(self) -> None:
+        """Let another run have it."""
+        os.close(self._lock)
+
+
+class LinkKeeper:
+    """Keeps the state of a link while it is used: at once (OSError: do not fly), and from then on in a thread.
+
+    `us_in` gives the us of the link's clock in real seconds. `trouble` is what went wrong since, if anything: the link
+    is used on all the same, for a vehicle in the air must go on being told to land.
+    """
+
+    def __init__(self, store: LinkStore, link: SignedLink, us_in: Callable[[float], int]) -> None:
+        self.trouble: OSError | None = None
+        self._store = store
+        self._link = link
+        self._ahead = us_in(RESERVE_S) // UNIT_US
+        self._due = threading.Event()
+        self._over = False
+        self._store.save(link.state, self._ahead)
+        link.on_news = self._due.set
+        self._thread = threading.Thread(target=self._keep, name="link keeper", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Keep the exact state, and let another run have it. Never raises: see `trouble`."""
+        self._over = True
+        self._due.set()
+        self._thread.join()
+        self._save(0)
+        self._store.close()
+
+    def _keep(self) -> None:
+        while not self._over:
+            self._due.wait(EVERY_S)
+            self._due.clear()
+            self._save(self._ahead)
+
+    def _save(self, ahead: int) -> None:
+        try:
+            self._store.save(self._link.state, ahead)
+        except OSError as error:
+            self.trouble = error

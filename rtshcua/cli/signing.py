@@ -1,0 +1,57 @@
+"""`--signing-key`: one link's key, taken from its file, put to use, and its timestamps kept while it is used."""
+
+from pathlib import Path
+
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.files.signing import LinkKeeper, LinkKeyError, LinkStore, read_link_key
+from rtshcua.mavlink.radio import UnsignedRadio
+from rtshcua.mavlink.signing import SignedLink
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.frames import FrameSession
+
+_RADIO = "the policy reads RADIO_STATUS, which radios do not sign: it is not known without `--unsigned-radio`"
+
+
+class Signing:
+    """Signs what `frames` lets out to a vehicle, and verifies what comes in. Without a key it does neither.
+
+    `state` is the folder where timestamps are kept, by the vehicle's identity. Raises LinkKeyError, and OSError where
+    they cannot be.
+    """
+
+    def __init__(
+        self, key_file: Path | None, policy: Policy, frames: FrameSession, state: Path, clock: LinkClock,
+        *, unsigned_radio: bool,
+    ) -> None:  # fmt: skip
+        self.verifier: SignedLink | UnsignedRadio | None = None
+        self.trouble: str | None = None
+        self.notes: list[str] = []
+        self._keeper: LinkKeeper | None = None
+        if key_file is None:
+            return
+        key = read_link_key(key_file)
+        store = LinkStore(state, policy.vehicle.identity, key)
+        try:
+            now = clock.now()
+            link = SignedLink(key, store.load(), now.utc_us, now.monotonic_us)
+            self._keeper = LinkKeeper(store, link, clock.us_in)
+        except (LinkKeyError, OSError):
+            store.close()
+            raise
+        frames.sign_with(link)
+        self.verifier = UnsignedRadio(link) if unsigned_radio else link
+        read = {source.message for signal in policy.signals for source in signal.sources}
+        if "RADIO_STATUS" in read and not unsigned_radio:
+            self.notes.append(_RADIO)
+
+    def close(self) -> None:
+        """Keep the last timestamps. What went wrong with keeping them is in `trouble`, for a person."""
+        if self._keeper is None:
+            return
+        self._keeper.close()
+        error = self._keeper.trouble
+        if error is not None:
+            reason = (error.strerror or str(error)).lower()
+            self.trouble = (
+                f"the link's timestamps could not be kept: {reason}; it needs a new key before the next flight"
+            )

@@ -1,0 +1,58 @@
+"""RADIO_STATUS on a link with a key: radios do not sign, so what they tell can be forged, and may only tighten.
+
+Of all that was told in the last seconds the worst counts, field by field, so that a forged frame beside the radio's own
+can make the link look worse, never better. It is let in only where the operator says that there is a radio.
+"""
+
+from typing import Any, Final, Protocol
+
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
+
+RADIO_STATUS: Final = 109
+#: us; radios report each second
+SPAN_US: Final = 5_000_000
+
+_BETTER_HIGH: Final = ("rssi", "remrssi", "txbuf")
+_BETTER_LOW: Final = ("noise", "remnoise", "rxerrors", "fixed")
+_NOT_KNOWN: Final = 255
+
+
+class Link(Protocol):
+    """A link that verifies what comes."""
+
+    def accept(self, frame: bytes, now_us: int) -> bool:
+        """Whether a frame may come in."""
+        ...
+
+
+class UnsignedRadio:
+    """Accepts what `link` accepts, and RADIO_STATUS without a signature, tempered."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._now: dict[str, int] = {}  # the worst since `_since_us`,
+        self._before: dict[str, int] = {}  # and in the span before it
+        self._since_us: int | None = None
+
+    def accept(self, frame: bytes, now_us: int) -> bool:
+        """Whether a frame may come in."""
+        if not frame[FLAGS] & FLAG_SIGNED and message_id(frame, 0) == RADIO_STATUS:
+            return True
+        return self._link.accept(frame, now_us)
+
+    def temper(self, message: Any, now_us: int) -> None:
+        """Change an unsigned RADIO_STATUS to the worst that was told within `SPAN_US`, at least."""
+        since_us = self._since_us
+        if since_us is None or now_us - since_us >= SPAN_US:
+            recent = since_us is not None and now_us - since_us < 2 * SPAN_US
+            self._before, self._now, self._since_us = (self._now if recent else {}), {}, now_us
+        for names, worst in ((_BETTER_HIGH, _lower), (_BETTER_LOW, max)):
+            for name in names:
+                value = getattr(message, name)
+                self._now[name] = worst(self._now.get(name, value), value)
+                setattr(message, name, worst(self._before.get(name, value), self._now[name]))
+
+
+def _lower(one: int, other: int) -> int:
+    """Not known is worse than anything."""
+    return _NOT_KNOWN if _NOT_KNOWN in (one, other) else min(one, other)

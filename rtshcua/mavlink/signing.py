@@ -1,0 +1,148 @@
+"""MAVLink 2 message signing, both ends, pure: https://mavlink.io/en/guide/message_signing.html ("the guide").
+
+A signed frame has the bit `FLAG_SIGNED`, and 13 octets behind its checksum: link id, timestamp, and the first 48 bits
+of SHA-256 over key, header, payload, checksum, link id and timestamp (guide, "Signature").
+
+Two things are stricter here than in pymavlink's own signing. It remembers a timestamp before it checks the signature,
+so that a forged frame can lock out a stream for ever; and it keeps nothing over a restart, so that what was sent before
+can be sent again. `State` is what has to be kept; `rtshcua.adapters.files.signing` keeps it.
+"""
+
+import hashlib
+import hmac
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, SIGNATURE, with_flags
+
+KEY_OCTETS: Final = 32
+EPOCH_US: Final = 1_420_070_400_000_000  # 1 January 2015 in UTC us (guide, "Timestamp Handling")
+UNIT_US: Final = 10
+MINUTE: Final = 6_000_000
+_SECOND: Final = 100_000
+#: as many as the C library keeps (MAVLINK_MAX_SIGNING_STREAMS)
+MOST_STREAMS: Final = 16
+#: Timestamps have 48 bits, until 2104; what claims the last year is believed no more, so that ours never run out.
+_LAST: Final = (1 << 48) - 366 * 24 * 60 * MINUTE
+
+_TAG: Final = 6
+_STAMP: Final = 6
+
+Stream = tuple[int, int, int]
+"""System id, component id, link id (guide, "Link IDs")."""
+
+
+def timestamp_of(utc_us: int) -> int:
+    """A UTC time as a timestamp: units of 10 us since the epoch."""
+    return (utc_us - EPOCH_US) // UNIT_US
+
+
+class State(NamedTuple):
+    """What must outlive a restart: the local timestamp, and the last one of each stream that was heard."""
+
+    timestamp: int
+    streams: Mapping[Stream, int]
+
+
+@dataclass(slots=True)
+class Counts:
+    """How many frames were let in, and why others were not."""
+
+    accepted: int = 0
+    unsigned: int = 0
+    forged: int = 0
+    strayed: int = 0  # our own, or sent by its sender on another link than the one that we hear it by
+    stale: int = 0
+    crowded: int = 0  # rightly signed, of a stream for which there is no room
+
+
+class SignedLink:
+    """One link with a key: signs what leaves as `link`, and says what of the rest may come in.
+
+    `stored` is the state of the run before. `utc_us` and `monotonic_us` are the present; from here on only monotonic
+    time counts, so that setting a clock back opens nothing.
+    """
+
+    def __init__(self, key: bytes, stored: State, utc_us: int, monotonic_us: int, link: int = 0) -> None:
+        if len(key) != KEY_OCTETS:
+            raise ValueError(f"a link key has {KEY_OCTETS} octets, not {len(key)}")
+        self._key = key
+        self._link = link
+        # "The timestamp used on startup should be the maximum of the timestamp implied by the system clock and the
+        # stored timestamp."
+        self._ahead = max(timestamp_of(utc_us), stored.timestamp)
+        self._since_us = monotonic_us - self._ahead * UNIT_US
+        self._streams = dict(stored.streams)
+        self._own: Stream | None = None
+        recent = [stream for stream, last in stored.streams.items() if last >= self._ahead - MINUTE]
+        self._heard_by = {stream[:2]: stream[2] for stream in sorted(recent, key=stored.streams.__getitem__)}
+        self.counts = Counts()
+        #: called when there is more to keep than time going by: a stream that is new, or a leap of the local time
+        self.on_news: Callable[[], object] = lambda: None
+
+    @property
+    def state(self) -> State:
+        """What to keep. May be asked for by another thread than the one that signs."""
+        return State(self._ahead, self._streams.copy())
+
+    def sign(self, frame: bytes, now_us: int) -> bytes:
+        """The signed frame for an unsigned one."""
+        # "All timestamps generated must be at least 1 more than the previous timestamp sent."
+        self._ahead = max(self._ahead + 1, self._clock(now_us))
+        signed = with_flags(frame, FLAG_SIGNED) + bytes([self._link]) + self._ahead.to_bytes(_STAMP, "little")
+        self._own = frame[5], frame[6], self._link
+        return signed + self._tag(signed)
+
+    def accept(self, frame: bytes, now_us: int) -> bool:
+        """Whether a whole frame with a right checksum may come in at a monotonic time; only then is it remembered."""
+        # 1. it is signed
+        if not frame[FLAGS] & FLAG_SIGNED:
+            self.counts.unsigned += 1
+            return False
+        # 2. "Computed 48 bit signature does not match": before anything that it says is believed
+        if not hmac.compare_digest(self._tag(frame[:-_TAG]), frame[-_TAG:]):
+            self.counts.forged += 1
+            return False
+        # 3. it is not one of ours, sent back to us, nor one that its sender sent on another link: it signs there too,
+        #    and what was overheard there would be news here for a minute
+        stream = stream_of(frame)
+        if stream == self._own or self._heard_by.get(stream[:2], stream[2]) != stream[2]:
+            self.counts.strayed += 1
+            return False
+        # 4. "Timestamp is older than the previous packet from the same logical stream", or the same: a replay;
+        #    "more than 1 minute (6,000,000) behind the local system's timestamp"
+        timestamp = int.from_bytes(frame[-_TAG - _STAMP : -_TAG], "little")
+        local = max(self._ahead, self._clock(now_us))
+        if timestamp <= self._streams.get(stream, -1) or timestamp < local - MINUTE or timestamp > _LAST:
+            self.counts.stale += 1
+            return False
+        if not self._has_room(stream, local):
+            self.counts.crowded += 1
+            return False
+        # 5. "the timestamp should be replaced by the timestamp of the incoming message if that is greater"
+        is_news = stream not in self._streams or timestamp > local + _SECOND
+        self._streams[stream] = timestamp
+        self._heard_by[stream[:2]] = stream[2]
+        self._ahead = max(self._ahead, timestamp)
+        self.counts.accepted += 1
+        if is_news:
+            self.on_news()
+        return True
+
+    def _clock(self, now_us: int) -> int:
+        return (now_us - self._since_us) // UNIT_US
+
+    def _tag(self, octets: bytes) -> bytes:
+        return hashlib.sha256(self._key + octets).digest()[:_TAG]
+
+    def _has_room(self, stream: Stream, local: int) -> bool:
+        """A stream whose last frame is over a minute old needs no memory: step 4 refuses all that it would refuse."""
+        if stream not in self._streams and len(self._streams) >= MOST_STREAMS:
+            self._streams = {each: last for each, last in self._streams.items() if last >= local - MINUTE}
+        return stream in self._streams or len(self._streams) < MOST_STREAMS
+
+
+def stream_of(frame: bytes) -> Stream:
+    """Which stream a signed frame belongs to."""
+    return frame[5], frame[6], frame[-SIGNATURE]

@@ -1,0 +1,172 @@
+"""The frame session: what of MAVLink 2 may leave for the vehicle, octet by octet (design 4.5, mediated dispatch).
+
+Every frame that an adapter wants to send goes through `seal`, and only what `seal` gives back may be sent. A permit
+that the executor dispatches opens a session for its one command; until that command ends, frames that carry it out
+pass (`motion_frames`), no others. Housekeeping passes always (`housekeeping_frames`). Whatever is on neither list is
+refused. With a signer each frame that passes is signed; the key is the signer's, and nothing else can use it.
+
+A rule needs to know which autopilot it speaks to and how high its home lies. Both are read here from frames that came
+in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
+"""
+
+from enum import StrEnum
+from typing import Final, NamedTuple, Protocol
+
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frame_shape import GLOBAL_POSITION_INT, HEARTBEAT, Frame, read_frame
+from rtshcua.onboard.enforcement.housekeeping_frames import Housekeeping, housekeeping
+from rtshcua.onboard.enforcement.motion_frames import ARDUPILOT, PX4, carries_out, is_forced_arming, is_near, point_of
+from rtshcua.onboard.ports import Command
+
+#: MAV_COMP_ID_ONBOARD_COMPUTER: who we are, in the vehicle's own system; MAV_COMP_ID_AUTOPILOT1: whom we speak to
+OURS: Final = 191
+AUTOPILOT: Final = 1
+#: mm: how far home's height above sea may be reported from where it lay when the takeoff was permitted: arming sets
+#: home anew, and it moves by what GPS heights drift. A report further off counts for nothing, for every height that is
+#: sent above sea would move with it.
+HOME_MOVES: Final = 10_000
+
+
+class FrameRefusal(StrEnum):
+    """Why a frame does not leave."""
+
+    NOT_ONE_FRAME = "frame/not-one-frame"  # not exactly one whole, unsigned MAVLink 2 frame
+    NO_VEHICLE = "frame/no-vehicle"  # no autopilot was heard yet
+    NOT_OURS = "frame/not-ours"  # it claims another sender
+    WRONG_TARGET = "frame/wrong-target"  # to another system or component, or to everybody
+    FORCED_ARMING = "frame/forced-arming"  # arming or disarming past the autopilot's own checks
+    AFTER_START = "frame/after-start"  # a fence, once anything flew
+    NO_SESSION = "frame/no-session"  # it moves the vehicle, and nothing that was permitted does so now
+    NOT_COVERED = "frame/not-covered"  # it is no part of the command that was permitted
+    OUT_OF_ORDER = "frame/out-of-order"  # a point of its path before its turn: the leg there was never checked
+    LATE = "frame/late"  # the command's first frame, after its permit's time
+
+
+class Signer(Protocol):
+    """Signs outgoing frames; see `rtshcua.mavlink.signing`."""
+
+    def sign(self, frame: bytes, now_us: int) -> bytes:
+        """The signed frame for an unsigned one. `now_us` is monotonic."""
+        ...
+
+
+class Gate(Protocol):
+    """What an adapter gets of a `FrameSession`: it may ask, and tell what it heard. It opens nothing."""
+
+    def observe(self, frame: bytes) -> None:
+        """Take in one good frame from the link."""
+        ...
+
+    def seal(self, frame: bytes, now_us: int) -> bytes | FrameRefusal:
+        """The octets to send for a frame, or why it is not sent."""
+        ...
+
+
+class Session(NamedTuple):
+    """One permitted command, and how late (monotonic us) its first frame may leave."""
+
+    command: Command
+    not_after_us: int
+
+
+class FrameSession:
+    """The gate that frames leave by. Opened and closed by the executor alone."""
+
+    def __init__(self) -> None:
+        self._signer: Signer | None = None
+        self._session: Session | None = None
+        self._begun = False  # a frame of the session left
+        self._leg = -1  # the last point of its path that was sent
+        self._here: tuple[int, int] | None = None  # 1e-7 degree
+        self._started = False  # a session was opened: fences stay as they are
+        self._system = 0
+        self._autopilot = 0  # MAV_AUTOPILOT
+        self._home_amsl: int | None = None  # mm
+        self._settled_amsl: int | None = None  # the same, when the takeoff was permitted
+
+    @property
+    def token(self) -> int | None:
+        """The token of the command whose frames may leave."""
+        return None if self._session is None else self._session.command.token
+
+    def sign_with(self, signer: Signer) -> None:
+        """Sign what leaves from now on. Raises RuntimeError if it is signed already: a key is not taken away."""
+        if self._signer is not None:
+            raise RuntimeError("this link is signed already")
+        self._signer = signer
+
+    def open(self, command: Command, not_after_us: int) -> None:
+        """Let out the frames of one command, in place of whatever was let out before."""
+        self._session, self._begun, self._leg, self._started = Session(command, not_after_us), False, -1, True
+        if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
+            self._settled_amsl = self._home_amsl
+
+    def close(self) -> None:
+        """Let out nothing more that moves the vehicle."""
+        self._session = None
+
+    def observe(self, frame: bytes) -> None:
+        """Take in one good frame from the link. The first heartbeat of an autopilot that is known settles whose."""
+        heard = read_frame(frame)
+        if heard is None or heard.component != AUTOPILOT:
+            return
+        if heard.message == HEARTBEAT and not self._system:
+            autopilot = heard.fields[2]
+            if autopilot in (PX4, ARDUPILOT):
+                self._system, self._autopilot = heard.system, autopilot
+        elif heard.message == GLOBAL_POSITION_INT and heard.system == self._system:
+            self._here = heard.fields[1], heard.fields[2]
+            home_amsl, settled = heard.fields[3] - heard.fields[4], self._settled_amsl  # mm: above sea, less above home
+            if settled is None or abs(home_amsl - settled) <= HOME_MOVES:
+                self._home_amsl = home_amsl
+
+    def seal(self, frame: bytes, now_us: int) -> bytes | FrameRefusal:
+        """The octets to send for a frame at a monotonic time, or why it is not sent."""
+        refusal = self._refuse(frame, now_us)
+        if refusal is not None:
+            return refusal
+        return frame if self._signer is None else self._signer.sign(frame, now_us)
+
+    def _refuse(self, octets: bytes, now_us: int) -> FrameRefusal | None:
+        # 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else
+        frame = read_frame(octets)
+        if frame is None:
+            return FrameRefusal.NOT_ONE_FRAME
+        if not self._system:
+            return FrameRefusal.NO_VEHICLE
+        if (frame.system, frame.component) != (self._system, OURS):
+            return FrameRefusal.NOT_OURS
+        target = frame.target
+        if target is not None and target != (self._system, AUTOPILOT):
+            return FrameRefusal.WRONG_TARGET
+        # 2. never, whatever is permitted
+        if is_forced_arming(frame):
+            return FrameRefusal.FORCED_ARMING
+        # 3. always, or before the flight
+        match housekeeping(frame):
+            case Housekeeping.ALWAYS:
+                return None
+            case Housekeeping.BEFORE_FLIGHT:
+                return FrameRefusal.AFTER_START if self._started else None
+        # 4. what is permitted now
+        return self._refuse_motion(frame, now_us)
+
+    def _refuse_motion(self, frame: Frame, now_us: int) -> FrameRefusal | None:
+        session = self._session
+        if session is None:
+            return FrameRefusal.NO_SESSION
+        if not carries_out(frame, session.command, self._autopilot, self._home_amsl):
+            return FrameRefusal.NOT_COVERED
+        if not self._begun and now_us > session.not_after_us:
+            return FrameRefusal.LATE
+        point = point_of(frame)
+        if point is not None:
+            path = tuple(zip(session.command.geo[::2], session.command.geo[1::2], strict=True))
+            there = self._leg < 0 or is_near(self._here, path[self._leg])  # else it would cut the corner
+            legs = (self._leg, self._leg + 1) if there else (self._leg,)
+            turn = [leg for leg in legs if 0 <= leg < len(path) and path[leg] == point]
+            if not turn:
+                return FrameRefusal.OUT_OF_ORDER
+            self._leg = turn[0]
+        self._begun = True
+        return None

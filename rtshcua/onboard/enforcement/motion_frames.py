@@ -1,0 +1,179 @@
+"""Which frames carry out a command: the same rules for every adapter, read next to what autopilots make of a frame.
+
+A frame carries out a command if every field that the autopilot acts on has the value that the command gives it: the
+number, each parameter, the frame of reference, the point, the height, the speed, the mode. Nothing is "about right" but
+for what a 32-bit float rounds off, and for the height of home, which the autopilot's own estimate moves.
+"""
+
+from collections.abc import Mapping
+from enum import IntEnum
+from math import cos, hypot, isfinite, isnan, radians
+from types import MappingProxyType
+from typing import Any, Final
+
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.zone import meridian
+from rtshcua.onboard.enforcement import frame_shape as shape
+from rtshcua.onboard.enforcement.frame_shape import Frame
+from rtshcua.onboard.ports import Command
+
+#: MAV_AUTOPILOT of the autopilots that there are rules for
+ARDUPILOT: Final = 3
+PX4: Final = 12
+
+#: mm: how far home's height above sea may have moved between the frame that told it and the one that uses it; in the
+#: recorded flight of PX4 it moves by 0.7 m
+DATUM_MOVES: Final = 2_000
+_ROUNDING: Final = 2  # mm, mm/s
+#: m: how near to a point of its path the vehicle must have been seen before it is sent to the next; the adapters count
+#: it as arrived within 2 m
+NEAR: Final = 5.0
+_METRES: Final = 0.011_131_9  # one 1e-7 degree of latitude
+
+
+class MavCmd(IntEnum):
+    """The commands that move a vehicle and that some manoeuvre is made of."""
+
+    NAV_TAKEOFF = 22
+    DO_SET_MODE = 176
+    DO_CHANGE_SPEED = 178
+    DO_REPOSITION = 192
+    COMPONENT_ARM_DISARM = 400
+
+
+_CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+_CHANGE_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
+_GLOBAL: Final = 0  # MAV_FRAME: z is above mean sea level
+_GLOBAL_RELATIVE_ALT_INT: Final = 6  # z is above home
+_POSITION_ONLY: Final = 0x0DF8  # POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
+
+#: parameters 2 and 3 of DO_SET_MODE that a kind of motion is made with
+_MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = MappingProxyType(
+    {
+        PX4: {  # main mode AUTO (4), sub-mode
+            MotionKind.CLIMB: (4, 3),  # it is armed in Hold
+            MotionKind.HOLD: (4, 3),
+            MotionKind.HOME: (4, 5),
+            MotionKind.LAND: (4, 6),
+        },
+        ARDUPILOT: {
+            MotionKind.CLIMB: (4, 0),  # GUIDED
+            MotionKind.FLY: (4, 0),
+            MotionKind.COVER: (4, 0),
+            MotionKind.HOLD: (17, 0),  # BRAKE
+            MotionKind.HOME: (6, 0),  # RTL
+            MotionKind.LAND: (9, 0),
+        },
+    }
+)
+_TRAVELS: Final = (MotionKind.FLY, MotionKind.COVER)
+
+
+def is_forced_arming(frame: Frame) -> bool:
+    """Whether it would arm or disarm past the autopilot's own checks: parameter 2 of COMPONENT_ARM_DISARM is 21196.
+
+    Any value but 0 counts, for what an autopilot makes of another one is its own affair.
+    """
+    if frame.message not in (shape.COMMAND_LONG, shape.COMMAND_INT):
+        return False
+    return bool(frame.fields[7] == MavCmd.COMPONENT_ARM_DISARM and frame.fields[1] != 0)
+
+
+def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int | None) -> bool:
+    """Whether an autopilot that obeys the frame does what the command says, or a part of it.
+
+    `home_amsl` is how high home lies above mean sea level in mm, None where that is not known.
+    """
+    match frame.message:
+        case shape.COMMAND_LONG:
+            return _long(frame.fields, command, autopilot, home_amsl)
+        case shape.COMMAND_INT:
+            return autopilot == PX4 and _reposition(frame.fields, command, home_amsl)
+        case shape.SET_POSITION_TARGET_GLOBAL_INT:
+            return autopilot == ARDUPILOT and _position_target(frame.fields, command)
+    return False
+
+
+def point_of(frame: Frame) -> tuple[int, int] | None:
+    """Where a frame that carries out a command sends the vehicle, in 1e-7 degree; None if it leaves it where it is."""
+    match frame.message:
+        case shape.COMMAND_INT:
+            return frame.fields[4], frame.fields[5]
+        case shape.SET_POSITION_TARGET_GLOBAL_INT:
+            return frame.fields[1], frame.fields[2]
+    return None
+
+
+def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
+    """Whether a place that was reported is so near to a point of a path that the next leg may begin; 1e-7 degree."""
+    if here is None:
+        return False
+    latitude, longitude = point
+    east = (meridian(here[1], longitude) - longitude) * cos(radians(latitude / 1e7))
+    return hypot(here[0] - latitude, east) * _METRES <= NEAR
+
+
+def _long(fields: tuple[Any, ...], command: Command, autopilot: int, home_amsl: int | None) -> bool:
+    one, two, three, four, five, six, seven, number = fields[:8]
+    match number:
+        case MavCmd.DO_SET_MODE:
+            mode = _MODES[autopilot].get(command.kind)
+            return (two, three) == mode and one == _CUSTOM_MODE and _zero(four, five, six, seven)
+        case MavCmd.COMPONENT_ARM_DISARM:
+            return command.kind == MotionKind.CLIMB and one == 1 and _zero(two, three, four, five, six, seven)
+        case MavCmd.NAV_TAKEOFF if command.kind == MotionKind.CLIMB:
+            if autopilot == PX4:  # it climbs at a finite place, turned to a finite heading, to metres above sea
+                here = isnan(four) and isnan(five) and isnan(six)
+                pitch = isnan(one) or one == 0  # nothing to a multirotor
+                return here and pitch and _zero(two, three) and _is_above_sea(seven, command, home_amsl)
+            return _zero(one, two, three, four, five, six) and _is(seven, command.altitude)
+        case MavCmd.DO_CHANGE_SPEED if command.kind in _TRAVELS:
+            ground_speed = one == 1 and three == -1  # SPEED_TYPE_GROUNDSPEED, throttle as it is
+            return ground_speed and _is_speed(two, command) and _zero(four, five, six, seven)
+    return False
+
+
+def _reposition(fields: tuple[Any, ...], command: Command, home_amsl: int | None) -> bool:
+    """DO_REPOSITION: a circle's radius, or a heading of its own, would be another manoeuvre."""
+    speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+    return (
+        (number, reference, flags) == (MavCmd.DO_REPOSITION, _GLOBAL, _CHANGE_MODE)
+        and command.kind in _TRAVELS
+        and radius == 0
+        and isnan(yaw)
+        and (_is_speed(speed, command) if command.speed else speed == -1)
+        and _is_point(x, y, command)
+        and _is_above_sea(z, command, home_amsl)
+    )
+
+
+def _position_target(fields: tuple[Any, ...], command: Command) -> bool:
+    """SET_POSITION_TARGET_GLOBAL_INT; what the mask tells the autopilot to ignore may be anything."""
+    _, x, y, z, *_, mask, _, _, reference = fields
+    return (
+        (mask, reference) == (_POSITION_ONLY, _GLOBAL_RELATIVE_ALT_INT)
+        and command.kind in _TRAVELS
+        and _is_point(x, y, command)
+        and _is(z, command.altitude)
+    )
+
+
+def _is_point(x: int, y: int, command: Command) -> bool:
+    """A point of the command's path, in 1e-7 degree."""
+    return (x, y) in zip(command.geo[::2], command.geo[1::2], strict=True)
+
+
+def _is_speed(metres_per_second: float, command: Command) -> bool:
+    return command.speed > 0 and _is(metres_per_second, command.speed)
+
+
+def _is_above_sea(metres: float, command: Command, home_amsl: int | None) -> bool:
+    return home_amsl is not None and _is(metres, home_amsl + command.altitude, DATUM_MOVES)
+
+
+def _is(metres: float, millimetres: int, within: int = _ROUNDING) -> bool:
+    return isfinite(metres) and abs(round(metres * 1_000) - millimetres) <= within
+
+
+def _zero(*parameters: float) -> bool:
+    return not any(parameters)

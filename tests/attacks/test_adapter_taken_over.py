@@ -1,0 +1,55 @@
+"""An adapter that does not do what it was told to: the boundary lets its frames not out, and the flight falls back."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.px4 import flavour as px4
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.evidence.report import Verdict
+from rtshcua.onboard.ports import Command, Ending
+from virtual import case
+from virtual.flight import Flight
+
+Change = Callable[[Any], None]
+
+
+def higher(message: Any) -> None:
+    message.z += 10
+
+
+def by_force(message: Any) -> None:
+    message.command, message.param1, message.param2 = messages.ARM_DISARM, 0, 21_196
+
+
+@pytest.mark.parametrize(("change", "reason"), [(higher, "not-covered"), (by_force, "forced-arming")])
+def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason: str) -> None:
+    def changed(command: Command, seen: Observed, system: int) -> list[Stage]:
+        stages = px4.stages(command, seen, system)
+        for stage in stages:
+            if stage.message is not None:
+                change(stage.message)
+        return stages
+
+    flight = Flight(case.seal(case.mission(case.short_steps())), case.simulated("px4"))
+    flight.vehicle.driver._manoeuvres = {"px4.goto": changed}
+    highest = 0
+
+    def watch(of: Flight) -> list[Any]:
+        nonlocal highest
+        truth = of.vehicle.simulation.truth()
+        highest = max(highest, truth.up_mm)
+        assert abs(truth.north_mm) < 3_000, "it stays where it went up"
+        return []
+
+    flown = flight.fly(watch)
+    assert flown.ending is Ending.ABORTED
+    assert flown.effects("failed")[0]["detail"].startswith(f"frame/{reason}")
+    assert flown.dispatched()[:2] == ["takeoff", "goto"]
+    assert "return_home" in flown.dispatched()
+    assert flown.vehicle.simulation.truth().armed is False
+    assert highest < 36_000, "a return climbs to 30 m, and nothing climbs higher"
+    assert flown.audit().report.verdict is Verdict.VERIFIED

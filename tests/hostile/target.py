@@ -1,0 +1,93 @@
+"""What is attacked: a driver on the ground before an autopilot that it knows, with a key or without."""
+
+from collections import deque
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.mavlink.frames import Codec
+from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.ports import Command, Event
+from virtual.policy import POLICY
+
+KEY = bytes(range(1, 33))
+UTC_US = 1_767_225_600_000_000
+AUTOPILOT = {"px4": 12, "ardupilot": 3}
+NEW = State(0, {})
+PLAIN = (int, float, str, bytes, type(None))
+COUNTED = ("counts", "damaged", "refused", "unknown", "foreign", "_policy")
+
+
+class Target:
+    """`heard` are the frames of the vehicle up to now; `known` is all that the driver may know from frames."""
+
+    def __init__(self, flavour: str, *, keyed: bool, stored: State = NEW, greet: bool = True) -> None:
+        self.link = SignedLink(KEY, stored, UTC_US, 0)
+        self.frames = FrameSession()
+        if keyed:
+            self.frames.sign_with(self.link)
+        self.driver = Driver(POLICY, self.frames, verifier=self.link if keyed else None)
+        self.heard: list[bytes] = []
+        self.sent: list[bytes] = []
+        self.events: list[Event] = []
+        self.now_us = 0
+        self._keyed = keyed
+        self._codec = Codec(1, 1)
+        self._autopilot = SignedLink(KEY, NEW, UTC_US, 0, link=1)
+        if greet:
+            for message in greeting(flavour):
+                self.receive(self.says(message))
+            self.driver.tick(0)
+            self.sent.clear()
+            self.events.clear()
+
+    def says(self, message: Any, ahead_us: int = 0) -> bytes:
+        """A frame of the vehicle's own."""
+        frame = self._codec.pack(message)
+        frame = self._autopilot.sign(frame, self.now_us + ahead_us) if self._keyed else frame
+        self.heard.append(frame)
+        return frame
+
+    def receive(self, datagram: bytes) -> None:
+        """A datagram arrives."""
+        heard = self.driver.receive(datagram, self.now_us)
+        self.sent += heard.answers
+        self.events += heard.events
+
+    def known(self) -> object:
+        """All that driver, boundary and link know, down to the last number, but for what they merely count."""
+        return remembered(self.driver)
+
+    def moved(self) -> list[bytes]:
+        """Which of the frames that move a vehicle would leave."""
+        commands = [Command(1, "skill", kind, (0, 0), (1, 1), 5_000, 1_000) for kind in MotionKind]
+        return [frame for command in commands for frame in self.driver.begin(command, self.now_us)[1]]
+
+
+def remembered(thing: object) -> object:
+    """The state of an object of ours, and of all that it holds, as a value."""
+    if isinstance(thing, dict):
+        return {repr(key): remembered(value) for key, value in thing.items()}
+    if isinstance(thing, list | tuple | set | frozenset | deque):
+        return [type(thing).__name__, *map(remembered, sorted(thing, key=repr) if isinstance(thing, set) else thing)]
+    if not type(thing).__module__.startswith("rtshcua"):
+        return repr(thing) if isinstance(thing, PLAIN) else type(thing).__name__
+    names = [*vars(thing)] if hasattr(thing, "__dict__") else []
+    names += [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
+    return {name: remembered(getattr(thing, name)) for name in names if name not in COUNTED and hasattr(thing, name)}
+
+
+def greeting(flavour: str) -> list[Any]:
+    """A vehicle on the ground."""
+    return [
+        mavlink.MAVLink_heartbeat_message(2, AUTOPILOT[flavour], 81, 0, 3, 3),
+        mavlink.MAVLink_extended_sys_state_message(0, 1),
+        mavlink.MAVLink_estimator_status_message(0, 831, 0, 0, 0, 0, 0, 0, 0, 0),
+        mavlink.MAVLink_ekf_status_report_message(831, 0, 0, 0, 0, 0),
+        mavlink.MAVLink_global_position_int_message(1, 473_977_400, 85_455_900, 488_000, 100, 0, 0, 0, 0),
+        mavlink.MAVLink_gps_raw_int_message(1, 3, 473_977_400, 85_455_900, 488_000, 100, 100, 0, 0, 12),
+        mavlink.MAVLink_battery_status_message(0, 0, 0, 2_000, [12_000] * 10, 100, 0, 0, 90),
+    ]

@@ -1,0 +1,479 @@
+"""The frame session: what leaves, by tables written by hand, and by turning every octet of what may leave."""
+
+from collections.abc import Iterable
+from math import inf, nan
+from random import Random
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frame_shape import LAYOUTS
+from rtshcua.onboard.enforcement.frames import FrameRefusal, FrameSession
+from rtshcua.onboard.ports import Command
+
+SYSTEM, HOME_AMSL = 3, 488_000
+ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
+OURS = 191
+GEO = (473_977_000, 85_456_000, 473_978_000, 85_457_000)
+NOW = 1_000_000
+LATEST = 2_000_000
+
+
+def command(kind: MotionKind, altitude: int = 20_000, speed: int = 4_000) -> Command:
+    return Command(7, "skill", kind, (0, 0, 1, 1), GEO, altitude, speed)
+
+
+def pack(message: Any, system: int = SYSTEM, component: int = OURS) -> bytes:
+    return Codec(system, component).pack(message)
+
+
+def heartbeat(autopilot: int) -> Any:
+    return m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3)
+
+
+def height(above_sea: int, above_home: int) -> Any:
+    return m.MAVLink_global_position_int_message(0, 0, 0, above_sea, above_home, 0, 0, 0, 0)
+
+
+def session(autopilot: int, of: Command | None = None) -> FrameSession:
+    made = FrameSession()
+    made.observe(pack(heartbeat(autopilot), component=1))
+    made.observe(pack(height(HOME_AMSL + 5_000, 5_000), component=1))
+    if of is not None:
+        made.open(of, LATEST)
+    return made
+
+
+def long(number: int, *parameters: float, system: int = SYSTEM, component: int = 1) -> Any:
+    filled = [*parameters, *[0.0] * (7 - len(parameters))]
+    return m.MAVLink_command_long_message(system, component, number, 0, *filled)
+
+
+def reposition(**other: Any) -> Any:
+    fields = {
+        "target_system": SYSTEM, "target_component": 1, "frame": 0, "command": 192, "current": 0, "autocontinue": 0,
+        "param1": 4.0, "param2": 1, "param3": 0, "param4": nan, "x": GEO[0], "y": GEO[1], "z": 508.0,
+    }  # fmt: skip
+    return m.MAVLink_command_int_message(**{**fields, **other})
+
+
+def target(**other: Any) -> Any:
+    fields = {
+        "time_boot_ms": 0, "target_system": SYSTEM, "target_component": 1, "coordinate_frame": 6, "type_mask": 0x0DF8,
+        "lat_int": GEO[0], "lon_int": GEO[1], "alt": 20.0, "vx": 0, "vy": 0, "vz": 0, "afx": 0, "afy": 0, "afz": 0,
+        "yaw": 0, "yaw_rate": 0,
+    }  # fmt: skip
+    return m.MAVLink_set_position_target_global_int_message(**{**fields, **other})
+
+
+def one(place: int, first: int, last: int) -> list[float]:
+    """Parameters `first` to `last`, all 0 but the one at `place`."""
+    return [float(number == place) for number in range(first, last + 1)]
+
+
+K = MotionKind
+TAKEOFF = (nan, nan, nan, 508.0)
+
+TRAVELS = (K.FLY, K.COVER)
+
+#: autopilot, a frame, and the commands that it carries out
+CARRIED: list[tuple[int, Any, tuple[MotionKind, ...]]] = [
+    (PX4, long(22, 0, 0, 0, *TAKEOFF), (K.CLIMB,)),
+    (PX4, long(22, nan, 0, 0, *TAKEOFF), (K.CLIMB,)),
+    (PX4, long(400, 1), (K.CLIMB,)),
+    (PX4, reposition(), TRAVELS),
+    (PX4, long(176, 1, 4, 3), (K.CLIMB, K.HOLD)),  # it is armed in Hold
+    (PX4, long(176, 1, 4, 5), (K.HOME,)),
+    (PX4, long(176, 1, 4, 6), (K.LAND,)),
+    (ARDUPILOT, long(176, 1, 4), (K.CLIMB, *TRAVELS)),
+    (ARDUPILOT, long(400, 1), (K.CLIMB,)),
+    (ARDUPILOT, long(22, 0, 0, 0, 0, 0, 0, 20.0), (K.CLIMB,)),
+    (ARDUPILOT, long(178, 1, 4.0, -1), TRAVELS),
+    (ARDUPILOT, target(), TRAVELS),
+    (ARDUPILOT, target(time_boot_ms=9, vx=1.0), TRAVELS),
+    (ARDUPILOT, long(176, 1, 17), (K.HOLD,)),
+    (ARDUPILOT, long(176, 1, 6), (K.HOME,)),
+    (ARDUPILOT, long(176, 1, 9), (K.LAND,)),
+]
+EACH = pytest.mark.parametrize(("autopilot", "message", "kinds"), CARRIED)
+
+ALWAYS: list[Any] = [
+    m.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3),
+    long(511, 33, 100_000),
+    long(512, 148),
+    long(401),  # the checks before arming: says why not
+    m.MAVLink_param_request_read_message(SYSTEM, 1, b"RTL_ALT", -1),
+    m.MAVLink_param_request_list_message(SYSTEM, 1),
+    m.MAVLink_statustext_message(6, b"going home"),
+    m.MAVLink_timesync_message(0, 5),
+    m.MAVLink_mission_request_list_message(SYSTEM, 1, 1),
+    m.MAVLink_mission_request_int_message(SYSTEM, 1, 0, 1),
+    m.MAVLink_mission_request_message(SYSTEM, 1, 0, 1),
+    m.MAVLink_mission_ack_message(SYSTEM, 1, 0, 1),
+]
+BEFORE_FLIGHT: list[Any] = [
+    m.MAVLink_mission_count_message(SYSTEM, 1, 4, 1),
+    m.MAVLink_mission_clear_all_message(SYSTEM, 1, 1),
+    *[
+        m.MAVLink_mission_item_int_message(SYSTEM, 1, 0, 0, number, 0, 1, 4, 0, 0, 0, 1, 1, 0, 1)
+        for number in range(5_000, 5_005)
+    ],
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_ENABLE", 1, 2),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 7, 2),
+]
+NEVER: list[Any] = [
+    heartbeat(3),
+    m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),  # a ground station's
+    m.MAVLink_heartbeat_message(18, 8, 128, 0, 4, 3),
+    m.MAVLink_mission_count_message(SYSTEM, 1, 4, 0),
+    m.MAVLink_mission_clear_all_message(SYSTEM, 1, 255),
+    m.MAVLink_mission_item_int_message(SYSTEM, 1, 0, 0, 16, 0, 1, 4, 0, 0, 0, 1, 1, 0, 1),
+    m.MAVLink_mission_item_int_message(SYSTEM, 1, 0, 0, 5_001, 0, 1, 4, 0, 0, 0, 1, 1, 0, 0),
+    m.MAVLink_mission_item_message(SYSTEM, 1, 0, 0, 5_001, 0, 1, 4, 0, 0, 0, 1, 1, 0, 1),
+    m.MAVLink_mission_set_current_message(SYSTEM, 1, 0),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_ENABLE", 0, 2),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 3, 2),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", nan, 2),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"ARMING_CHECK", 0, 2),
+    m.MAVLink_setup_signing_message(SYSTEM, 1, bytes(32), 0),
+    m.MAVLink_set_mode_message(SYSTEM, 1, 9),
+    m.MAVLink_manual_control_message(SYSTEM, 0, 0, 500, 0, 0),
+    m.MAVLink_rc_channels_override_message(SYSTEM, 1, *[1_500] * 8),
+    m.MAVLink_set_attitude_target_message(0, SYSTEM, 1, 0, [1, 0, 0, 0], 0, 0, 0, 1),
+    m.MAVLink_file_transfer_protocol_message(0, SYSTEM, 1, bytes(251)),
+    m.MAVLink_set_gps_global_origin_message(SYSTEM, 0, 0, 0),
+    m.MAVLink_gps_rtcm_data_message(0, 10, bytes(180)),
+    m.MAVLink_radio_status_message(0, 0, 100, 0, 0, 0, 0),
+    m.MAVLink_command_ack_message(400, 0),
+    long(246, 1),  # reboot
+    long(185, 1),  # flight termination
+    long(400, 0),  # disarm
+    long(401, 1),
+    long(207, 0),  # fence off
+    long(300),
+    long(193, 1),
+    long(179, 1),
+]
+
+
+def named(message: Any) -> str:
+    return f"{message.get_type()} {getattr(message, 'command', '')}".strip()
+
+
+def covers(gate: FrameSession, message: Any) -> bool:
+    return isinstance(gate.seal(pack(message), NOW), bytes)
+
+
+@EACH
+def test_a_permitted_command_is_carried_out_and_no_other(
+    autopilot: int, message: Any, kinds: tuple[MotionKind, ...]
+) -> None:
+    frame = pack(message)
+    assert session(autopilot).seal(frame, NOW) is FrameRefusal.NO_SESSION
+    for kind in K:
+        sealed = session(autopilot, command(kind)).seal(frame, NOW)
+        assert sealed == (frame if kind in kinds else FrameRefusal.NOT_COVERED), kind
+
+
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
+def test_what_only_asks_passes_always(autopilot: int) -> None:
+    for gate in (session(autopilot), session(autopilot, command(K.LAND))):
+        for message in ALWAYS:
+            assert covers(gate, message), named(message)
+
+
+def test_a_fence_passes_until_something_flies() -> None:
+    gate = session(PX4)
+    for message in BEFORE_FLIGHT:
+        assert covers(gate, message), named(message)
+    gate.open(command(K.CLIMB), LATEST)
+    gate.close()
+    for message in BEFORE_FLIGHT:
+        assert gate.seal(pack(message), NOW) is FrameRefusal.AFTER_START, named(message)
+
+
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
+def test_what_is_on_no_list_never_passes(autopilot: int) -> None:
+    for gate in (session(autopilot), *(session(autopilot, command(kind)) for kind in K)):
+        for message in NEVER:
+            assert not covers(gate, message), named(message)
+
+
+@pytest.mark.parametrize("forced", [21_196.0, 2_989.0, 1.0, nan, inf])
+@pytest.mark.parametrize("on", [0, 1])
+def test_nothing_is_armed_or_disarmed_by_force(forced: float, on: int) -> None:
+    by_int = reposition(command=400, param1=on, param2=forced)
+    for message in (long(400, on, forced), by_int):
+        for gate in (session(PX4), session(ARDUPILOT, command(K.CLIMB))):
+            assert gate.seal(pack(message), NOW) is FrameRefusal.FORCED_ARMING
+
+
+REFUSED: list[tuple[str, int, MotionKind, Any]] = [
+    ("too high", PX4, K.CLIMB, long(22, 0, 0, 0, nan, nan, nan, 510.001)),
+    ("above home instead of above sea", PX4, K.CLIMB, long(22, 0, 0, 0, nan, nan, nan, 20.0)),
+    ("at a pitch", PX4, K.CLIMB, long(22, 1, 0, 0, *TAKEOFF)),
+    ("no height", PX4, K.CLIMB, long(22, 0, 0, 0, nan, nan, nan, nan)),
+    ("somewhere else", PX4, K.CLIMB, long(22, 0, 0, 0, nan, 47.0, 8.0, 508.0)),
+    ("at 0 N, 0 E", PX4, K.CLIMB, long(22, 0, 0, 0, nan, 0, 0, 508.0)),
+    ("above sea instead of above home", ARDUPILOT, K.CLIMB, long(22, 0, 0, 0, 0, 0, 0, 508.0)),
+    ("too high", ARDUPILOT, K.CLIMB, long(22, 0, 0, 0, 0, 0, 0, 20.003)),
+    ("infinitely high", ARDUPILOT, K.CLIMB, long(22, 0, 0, 0, 0, 0, 0, inf)),
+    ("mode without the flag", PX4, K.HOLD, long(176, 0, 4, 3)),
+    ("another sub-mode", PX4, K.HOLD, long(176, 1, 4, 4)),
+    ("offboard", PX4, K.FLY, long(176, 1, 6)),
+    ("more than a mode", ARDUPILOT, K.LAND, long(176, 1, 9, 0, 1)),
+    ("another mode", ARDUPILOT, K.FLY, long(176, 1, 5)),
+    ("too fast", ARDUPILOT, K.FLY, long(178, 1, 4.01, -1)),
+    ("climb speed", ARDUPILOT, K.FLY, long(178, 2, 4.0, -1)),
+    ("throttle", ARDUPILOT, K.FLY, long(178, 1, 4.0, 50)),
+    ("speed while climbing", ARDUPILOT, K.CLIMB, long(178, 1, 4.0, -1)),
+    ("takeoff while flying", ARDUPILOT, K.FLY, long(22, 0, 0, 0, 0, 0, 0, 20.0)),
+    ("as fast as it likes", PX4, K.FLY, reposition(param1=-1)),
+    ("too fast", PX4, K.FLY, reposition(param1=5.0)),
+    ("an orbit", PX4, K.FLY, reposition(command=34)),
+    ("a circle", PX4, K.FLY, reposition(param3=10)),
+    ("a heading", PX4, K.FLY, reposition(param4=1.0)),
+    ("another flag", PX4, K.FLY, reposition(param2=3)),
+    ("another frame", PX4, K.FLY, reposition(frame=6, z=20.0)),
+    ("another place", PX4, K.FLY, reposition(x=GEO[0] + 1)),
+    ("x of one point, y of another", PX4, K.FLY, reposition(y=GEO[3])),
+    ("too high", PX4, K.FLY, reposition(z=510.01)),
+    ("a position target", PX4, K.FLY, target()),
+    ("a position target above sea", PX4, K.FLY, target(alt=508.0)),
+    ("a reposition above sea", ARDUPILOT, K.FLY, reposition()),
+    *[("more than arming", PX4, K.CLIMB, long(400, 1, *one(place, 2, 7))) for place in range(3, 8)],
+    *[("more than a climb", PX4, K.CLIMB, long(22, 0, *one(place, 2, 3), *TAKEOFF)) for place in (2, 3)],
+    *[("more than a climb", ARDUPILOT, K.CLIMB, long(22, *one(place, 1, 6), 20.0)) for place in range(1, 7)],
+    *[("more than a speed", ARDUPILOT, K.FLY, long(178, 1, 4.0, -1, *one(place, 4, 7))) for place in range(4, 8)],
+    *[("more than a mode", PX4, K.HOLD, long(176, 1, 4, 3, *one(place, 4, 7))) for place in range(4, 8)],
+    ("as a reposition", ARDUPILOT, K.FLY, reposition(z=20.0, frame=6)),
+    ("by velocity", ARDUPILOT, K.FLY, target(type_mask=0x0DC7, vx=5)),
+    ("with a heading", ARDUPILOT, K.FLY, target(type_mask=0x09F8)),
+    ("above sea", ARDUPILOT, K.FLY, target(coordinate_frame=5)),
+    ("above ground", ARDUPILOT, K.FLY, target(coordinate_frame=11)),
+    ("another place", ARDUPILOT, K.FLY, target(lon_int=GEO[1] - 1)),
+    ("too high", ARDUPILOT, K.FLY, target(alt=20.01)),
+    ("a return to a place", ARDUPILOT, K.HOME, target()),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("why", "autopilot", "kind", "message"), REFUSED, ids=lambda value: str(value)[:40])
+def test_what_is_nearly_the_command_is_not(why: str, autopilot: int, kind: MotionKind, message: Any) -> None:
+    assert session(autopilot, command(kind)).seal(pack(message), NOW) is FrameRefusal.NOT_COVERED, why
+
+
+def test_without_a_speed_the_vehicle_takes_its_own() -> None:
+    free = command(K.FLY, speed=0)
+    assert covers(session(PX4, free), reposition(param1=-1))
+    assert not covers(session(PX4, free), reposition(param1=0))
+    assert not covers(session(PX4, free), reposition(param1=4.0))
+    assert not covers(session(ARDUPILOT, free), long(178, 1, 0, -1))
+
+
+def test_heights_above_sea_follow_home_as_the_autopilot_tells_it() -> None:
+    gate = session(PX4, command(K.FLY))
+    assert covers(gate, reposition(z=510.0))
+    gate.observe(pack(height(500_000, 5_000), component=1))
+    assert not covers(gate, reposition())
+    assert covers(gate, reposition(z=515.0))
+    for foreign in (
+        pack(height(0, 0), component=154),
+        pack(height(0, 0), system=SYSTEM + 1, component=1),
+        pack(heartbeat(PX4), component=1),
+    ):
+        gate.observe(foreign)
+        assert covers(gate, reposition(z=515.0))
+
+
+def test_without_homes_height_nothing_goes_above_sea() -> None:
+    gate = FrameSession()
+    gate.observe(pack(heartbeat(PX4), component=1))
+    gate.open(command(K.FLY), LATEST)
+    assert not covers(gate, reposition())
+    assert not covers(gate, reposition(z=20.0))
+
+
+def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
+    gate = FrameSession()
+    assert gate.seal(pack(ALWAYS[0]), NOW) is FrameRefusal.NO_VEHICLE
+    for nobody in (
+        pack(heartbeat(8), component=1),
+        pack(heartbeat(PX4), component=2),
+        pack(heartbeat(PX4), system=0, component=1),
+        pack(m.MAVLink_global_position_int_message(0, 0, PX4, 0, 0, 0, 0, 0, 0), component=1),
+        b"",
+        pack(heartbeat(PX4), component=1)[:-1],
+    ):
+        gate.observe(nobody)
+        assert gate.seal(pack(ALWAYS[0]), NOW) is FrameRefusal.NO_VEHICLE
+    gate.observe(pack(heartbeat(ARDUPILOT), component=1))
+    gate.observe(pack(heartbeat(PX4), component=1))
+    gate.observe(pack(heartbeat(PX4), system=SYSTEM + 1, component=1))
+    gate.open(command(K.LAND), LATEST)
+    assert covers(gate, long(176, 1, 9))
+    assert gate.seal(pack(ALWAYS[0], system=SYSTEM + 1), NOW) is FrameRefusal.NOT_OURS
+
+
+def test_we_speak_as_ourselves_and_to_the_autopilot_alone() -> None:
+    gate = session(PX4, command(K.LAND))
+    assert gate.seal(pack(ALWAYS[0], component=190), NOW) is FrameRefusal.NOT_OURS
+    assert gate.seal(pack(ALWAYS[0], system=255), NOW) is FrameRefusal.NOT_OURS
+    for system, component in ((0, 1), (SYSTEM + 1, 1), (SYSTEM, 0), (SYSTEM, 154)):
+        message = long(176, 1, 4, 6, system=system, component=component)
+        assert gate.seal(pack(message), NOW) is FrameRefusal.WRONG_TARGET
+        asking = m.MAVLink_param_request_list_message(system, component)
+        assert gate.seal(pack(asking), NOW) is FrameRefusal.WRONG_TARGET
+
+
+def test_a_command_begins_in_its_time_and_goes_on_after_it() -> None:
+    gate, land = session(PX4, command(K.LAND)), pack(long(176, 1, 4, 6))
+    assert gate.seal(land, LATEST + 1) is FrameRefusal.LATE
+    assert gate.seal(land, LATEST) == land
+    assert gate.seal(land, LATEST + 5_000_000) == land
+    gate.open(command(K.LAND), LATEST)
+    assert gate.seal(land, LATEST + 5_000_000) is FrameRefusal.LATE, "another command begins anew"
+
+
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
+def test_a_path_is_flown_point_after_point(autopilot: int) -> None:
+    """Out of its order, a leg would lead through where nobody looked. A path may come by one place twice."""
+    a, b, c = (100, 100), (200, 100), (200, 300)
+    path = (a, b, a, c)
+    covering = Command(7, "skill", K.COVER, (), tuple(part for point in path for part in point), 20_000, 4_000)
+
+    def to(point: tuple[int, int]) -> bytes:
+        x, y = point
+        return pack(reposition(x=x, y=y) if autopilot == PX4 else target(lat_int=x, lon_int=y))
+
+    gate = session(autopilot, covering)
+    assert gate.seal(to(b), NOW) is FrameRefusal.OUT_OF_ORDER
+    for point, later in ((a, c), (a, c), (b, c), (b, c), (a, (1, 1)), (c, b), (c, a)):
+        assert isinstance(gate.seal(to(later), NOW), FrameRefusal)
+        assert gate.seal(to(point), NOW) == to(point)
+    assert gate.seal(to(a), NOW) is FrameRefusal.OUT_OF_ORDER, "and never back"
+    gate.open(covering, LATEST)
+    assert gate.seal(to(c), NOW) is FrameRefusal.OUT_OF_ORDER
+    assert gate.seal(to(a), NOW) == to(a)
+
+
+def test_one_command_at_a_time_and_none_after_the_end() -> None:
+    gate = session(ARDUPILOT, command(K.LAND))
+    gate.open(command(K.HOLD), LATEST)
+    assert gate.token == 7
+    assert not covers(gate, long(176, 1, 9))
+    assert covers(gate, long(176, 1, 17))
+    gate.close()
+    assert gate.token is None
+    assert gate.seal(pack(long(176, 1, 17)), NOW) is FrameRefusal.NO_SESSION
+
+
+def damaged(frame: bytes) -> Iterable[bytes]:
+    yield b""
+    yield frame[:-1]
+    yield frame + b"\0"
+    yield frame + frame
+    yield b"\xfe" + frame[1:]
+    yield frame[:2] + b"\1" + frame[3:]  # says that it is signed
+    yield frame[:3] + b"\1" + frame[4:]
+    yield frame[:9] + b"\1" + frame[10:]  # another message, whose number ends alike
+    yield frame[:1] + bytes([255]) + frame[2:10] + frame[10:-2].ljust(255, b"\0") + frame[-2:]
+    yield bytes(8)
+
+
+def test_only_one_whole_unsigned_frame_leaves() -> None:
+    gate = session(PX4, command(K.LAND))
+    for octets in damaged(pack(long(176, 1, 4, 6))):
+        assert gate.seal(octets, NOW) is FrameRefusal.NOT_ONE_FRAME
+
+
+@EACH
+def test_no_octet_that_the_autopilot_acts_on_may_change(
+    autopilot: int, message: Any, kinds: tuple[MotionKind, ...]
+) -> None:
+    """Every octet of the whole payload is turned, in every bit; what passes must mean the same."""
+    gate = session(autopilot, command(kinds[0]))
+    frame = pack(message)
+    size = LAYOUTS[message.get_msgId()].fields.size
+    whole = frame[:1] + bytes([size]) + frame[2:10] + frame[10:-2].ljust(size, b"\0") + frame[-2:]
+    assert gate.seal(whole, NOW) == whole
+    meant = meaning(message.get_type(), whole)
+    passed = set()
+    for bit in range(8 * size):
+        turned = bytearray(whole)
+        turned[10 + bit // 8] ^= 1 << bit % 8
+        if isinstance(gate.seal(bytes(turned), NOW), bytes):
+            passed.add(bit // 8)
+            assert same(meaning(message.get_type(), bytes(turned)), meant), (bit, turned)
+    assert len(passed) < size
+
+
+def meaning(name: str, frame: bytes) -> tuple[Any, ...]:
+    """The fields of a frame that an autopilot acts on, read by pymavlink."""
+    kind = m.mavlink_map[int.from_bytes(frame[7:10], "little")]
+    values = dict(zip(kind.ordered_fieldnames, kind.unpacker.unpack(frame[10:-2]), strict=True))
+    ignored = {
+        "COMMAND_LONG": ("confirmation",),
+        "COMMAND_INT": ("current", "autocontinue"),
+        "SET_POSITION_TARGET_GLOBAL_INT":
+            ("time_boot_ms", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate"),
+    }[name]  # fmt: skip
+    return tuple(value for field, value in values.items() if field not in ignored)
+
+
+def same(got: tuple[Any, ...], meant: tuple[Any, ...]) -> bool:
+    """The same but for what a float rounds off, home's height, and what kind of NaN it is."""
+    return all(
+        one == other or (one != one and other != other) or (isinstance(one, float) and abs(one - other) <= 2.002)
+        for one, other in zip(got, meant, strict=True)
+    )
+
+
+def test_layouts_are_the_dialects() -> None:
+    for number, layout in LAYOUTS.items():
+        kind = m.mavlink_map[number]
+        sizes = [layout.fields.size, kind.unpacker.size]
+        assert sizes[0] == sizes[1]
+        octets = Random(number).randbytes(sizes[0])
+        ours, theirs = layout.fields.unpack(octets), kind.unpacker.unpack(octets)
+        assert repr(ours) == repr(theirs), kind.msgname
+        names = kind.ordered_fieldnames
+        aimed = names.index("target_system") if "target_system" in names else -1
+        assert layout.target == aimed, kind.msgname
+        assert aimed < 0 or names[aimed + 1] == "target_component"
+
+
+def test_no_message_that_we_do_not_know_leaves() -> None:
+    """Of the whole dialect, with random payloads, in every session."""
+    chance = Random(7)
+    gates = [session(autopilot, command(kind)) for autopilot in (PX4, ARDUPILOT) for kind in K]
+    for number, kind in m.mavlink_map.items():
+        payload = chance.randbytes(kind.unpacker.size)
+        frame = bytes([0xFD, len(payload), 0, 0, 0, SYSTEM, OURS]) + number.to_bytes(3, "little") + payload + b"\0\0"
+        passed = any(isinstance(gate.seal(frame, NOW), bytes) for gate in gates)
+        assert not passed or number in (111, 253), kind.msgname  # TIMESYNC and STATUSTEXT may hold anything
+
+
+class FakeSigner:
+    def __init__(self) -> None:
+        self.asked: list[tuple[bytes, int]] = []
+
+    def sign(self, frame: bytes, now_us: int) -> bytes:
+        self.asked.append((frame, now_us))
+        return b"signed " + frame
+
+
+def test_what_passes_is_signed_and_nothing_else() -> None:
+    signer = FakeSigner()
+    gate = FrameSession()
+    gate.sign_with(signer)
+    with pytest.raises(RuntimeError, match="signed already"):
+        gate.sign_with(FakeSigner())
+    gate.observe(pack(heartbeat(PX4), component=1))
+    gate.open(command(K.LAND), LATEST)
+    land = pack(long(176, 1, 4, 6))
+    assert gate.seal(land, NOW) == b"signed " + land
+    assert gate.seal(pack(long(176, 1, 4, 5)), NOW) is FrameRefusal.NOT_COVERED
+    assert signer.asked == [(land, NOW)]

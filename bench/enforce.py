@@ -17,14 +17,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from reference.world import LOG_KEY, SESSION_KEY, START, VEHICLE, loaded
+from reference.world import LOG_KEY, START, loaded, renewed
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.evidence.chain import Recorder
-from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
-from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.enforcement.mint import Mint
 from rtshcua.onboard.ports import Append, Dispatch
 from rtshcua.onboard.runtime.admission import Admission
 from rtshcua.onboard.runtime.journal import Journal
@@ -39,11 +35,7 @@ PARTS = ("enforce and record", "append", "check the permit", "all")
 
 def fresh(of: Loaded) -> Loaded:
     """The same bundle in a new session, so that its one step may be admitted again."""
-    boundary = SoftwareBoundary(
-        of.policy, of.invocations, of.bundle.policy_digest, VEHICLE, Mint(SESSION_KEY), enforced=True
-    )
-    executor = Executor(SESSION_KEY, Commands(of.bundle.policy, of.bundle.mission))
-    return replace(of, boundary=boundary, executor=executor)
+    return renewed(of)
 
 
 def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:

@@ -1,7 +1,5 @@
 """`rtshcua compile`: check a mission and sign it into a bundle."""
 
-import os
-import tempfile
 import time
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +11,7 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
+from rtshcua.cli.replacing import Replacing, replace_with, write_whole
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -41,16 +40,30 @@ def compile(
     with_: Annotated[
         list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
     ] = None,
+    replaces: Annotated[
+        list[Path] | None,
+        typer.Option(help="the bundle that flies, then what replaced it since: make a replacement (repeatable)"),
+    ] = None,
+    first: Annotated[
+        int | None, typer.Option("--from", min=0, help="with --replaces: the first step that is another one")
+    ] = None,
+    root: Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (the key store's)")] = None,
     deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
-    """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors."""
+    """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors.
+
+    With --replaces it is signed for a flight that is under way, under the policy that it flies under: the steps before
+    --from stay as they are. `rtshcua replace` hands it in.
+    """
     sources_given = [source, *(with_ or [])]
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
     issued_at = time.time_ns() // 1_000 if at is None else moment(at)
     if issued_at is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    target = output or source.with_suffix(".bundle")
+    if (first is None) != (not replaces):
+        return findings.refuse(ExitCode.USAGE, "usage", "`--replaces` and `--from` go together")
+    target = output or source.with_suffix(".replacement" if replaces else ".bundle")
     if not target.parent.is_dir():
         return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
     if target.exists() and (not target.is_file() or any(_same(target, each) for each in sources_given)):
@@ -62,6 +75,9 @@ def compile(
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
+    if replaces and first is not None:
+        order = Replacing(replaces, first, root, mission_key, passphrase_file, issued_at, target)
+        return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
     try:
         signers = (
             unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
@@ -71,7 +87,7 @@ def compile(
     except Untrusted as error:
         help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
         return findings.refuse(ExitCode.UNTRUSTED, error.slug, str(error), help)
-    _replace(target, data)
+    write_whole(target, data)
     if not as_json:
         print(_told(compiled.policy, compiled.mission, target))
         if compiled.bounds is not None:
@@ -85,19 +101,6 @@ def compile(
 
 def _same(one: Path, other: Path) -> bool:
     return other.exists() and one.samefile(other)
-
-
-def _replace(target: Path, data: bytes) -> None:
-    """Write the whole bundle or nothing: a full disk leaves no half of one under its name."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(name).chmod(0o644)
-        Path(name).replace(target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def _told(policy: Policy, mission: Mission, target: Path) -> str:

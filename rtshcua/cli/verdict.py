@@ -23,6 +23,7 @@ MEANINGS = {
     "close": "The end of the log was forged or damaged: its signature does not cover these records.",
     "trust": "The log may be sound in itself, but it does not rest on the root that you trust.",
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
+    "document": "An approval, a recall or a replacement was forged, or taken in where it should have been refused.",
     "dispatch": "The vehicle was commanded without the permission that the log should show first.",
     "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",
     "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",

@@ -13,7 +13,7 @@ from rtshcua.adapters.files.runs import LOG
 from rtshcua.cli.faults import fail
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
-from rtshcua.cli.showing.bundle import claimed
+from rtshcua.cli.showing.bundle import claimed, replaced
 from rtshcua.cli.showing.page import Page, for_terminal
 from rtshcua.cli.showing.why import Case, show_why
 from rtshcua.cli.shown import utc
@@ -23,7 +23,7 @@ from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Decision, Genesis
+from rtshcua.evidence.records import Decision, Effect, Genesis
 from rtshcua.ground.why.given import Refused, given
 from rtshcua.ground.why.nominal import lasting, nominal
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
@@ -47,8 +47,13 @@ class Subject(NamedTuple):
     """A mission under its policy, ready to be decided on."""
 
     policy: PreparedPolicy
+    mission: Mission
     invocations: tuple[PreparedInvocation, ...]
-    phases: tuple[str, ...]
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """The names of the mission's phases."""
+        return self.mission.phases
 
 
 @app.command()
@@ -125,7 +130,16 @@ def _prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
     if isinstance(ready, Malformed) or isinstance(invocations, Malformed):
         what = ready.what if isinstance(ready, Malformed) else ""
         return fail(ExitCode.INPUT, f"this would be refused on board: {what}")
-    return Subject(ready, invocations, mission.phases)
+    return Subject(ready, mission, invocations)
+
+
+def _replaced(subject: Subject, detail: str) -> Subject | ExitCode:
+    """The mission after a recorded replacement; the steps that stay keep their bindings."""
+    try:
+        mission = replaced(detail, subject.mission)
+    except Untrusted as error:
+        return fail(ExitCode.INPUT, f"a replacement in the log: {error}")
+    return _prepared(subject.policy.policy, mission)
 
 
 def _by_hand(
@@ -163,6 +177,7 @@ def _from_log(page: Page, path: Path, number: int | None) -> dict[str, object] |
     """A step's decision in a log: the one asked for, else the last that was not an `allow`, else the last."""
     subject: Subject | None = None
     chosen: Decision | None = None
+    under: Subject | None = None  # the mission in force when it was decided
     with path.open("rb") as opened:
         for line in lines(opened):
             found = read(line)
@@ -175,10 +190,16 @@ def _from_log(page: Page, path: Path, number: int | None) -> dict[str, object] |
                 subject = unpacked
             elif isinstance(found, Decision) and found.kind == STEP:
                 if number == found.seq:
-                    chosen = found
+                    chosen, under = found, subject
                     break
                 if number is None and (chosen is None or chosen.outcome == "allow" or found.outcome != "allow"):
-                    chosen = found
+                    chosen, under = found, subject
+            elif isinstance(found, Effect) and found.event == "replacement" and subject is not None:
+                after = _replaced(subject, found.detail)
+                if isinstance(after, ExitCode):
+                    return after
+                subject = after
+    subject = under
     if subject is None or chosen is None or not 0 <= chosen.step < len(subject.invocations):
         what = "no decision on a step" if number is None else f"no decision on a step with the number {number}"
         return fail(ExitCode.INPUT, f"`{path}` has {what}", "`rtshcua show` lists the records with their numbers")

@@ -11,6 +11,9 @@ from typing import Protocol, dataclass_transform
 import msgspec
 
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.stores import EvidenceSink as EvidenceSink
+from rtshcua.onboard.stores import Opening as Opening
+from rtshcua.onboard.stores import ReplayStore as ReplayStore
 
 
 @dataclass_transform(frozen_default=True)
@@ -100,6 +103,32 @@ class EvidenceFailed(Frozen, frozen=True):
     reason: str
 
 
+class Said(Frozen, frozen=True):
+    """The vehicle said something to people (STATUSTEXT). `text` is its own, untrusted; `severity` is MAV_SEVERITY."""
+
+    at_us: int
+    severity: int
+    text: str
+
+
+class Presented(Frozen, frozen=True):
+    """Somebody handed over a signed document, as yet unverified: an approval, a recall, a replacement.
+
+    `sender` numbers who gets the answer.
+    """
+
+    at_us: int
+    document: bytes
+    sender: int = 0
+
+
+class Noted(Frozen, frozen=True):
+    """The vehicle's adapter found something that an operator should know; it decides nothing."""
+
+    at_us: int
+    text: str
+
+
 Event = (
     Readings
     | Ready
@@ -112,6 +141,9 @@ Event = (
     | LinkBack
     | Interrupted
     | EvidenceFailed
+    | Said
+    | Presented
+    | Noted
 )
 
 
@@ -143,6 +175,7 @@ class Ending(StrEnum):
     COMPLETED = "completed"  # all steps observed done, landed
     ABORTED = "aborted"  # a fallback or the contingency brought it down, or home
     REFUSED = "refused"  # nothing ever flew: refused on the ground
+    RECALLED = "recalled"  # an operator called it back; it fell back first
     STOOD_DOWN = "stood-down"  # the pilot or the autopilot took over
     LINK_LOST = "link-lost"  # the vehicle went silent
     INTERRUPTED = "interrupted"  # the operator stopped it; it fell back first
@@ -153,8 +186,8 @@ class Dispatch(Frozen, frozen=True):
     """Send `command`; the permit was checked by the executor in the same step.
 
     Whoever sends it looks at the clock again: after `not_after_us` it is not sent, and `Failed` with reason `late`
-    says so. `needs_record`: nor is it when an `Append` before it could not be written (`withheld`); a fallback goes out
-    even then.
+    says so. `needs_record`: it is held until every `Append` before it is kept, and not sent when one cannot be written
+    (`withheld`), or another command replaces it; a fallback goes out at once, and even then.
     """
 
     command: Command
@@ -181,13 +214,28 @@ class Show(Frozen, frozen=True):
     step: int = -1
 
 
+class Announce(Frozen, frozen=True):
+    """Tell any ground station, as STATUSTEXT; never needed for the flight, and the first to be left out."""
+
+    severity: int
+    text: str
+
+
+class Reply(Frozen, frozen=True):
+    """The answer to what `sender` presented: a stable slug, and a text for a person."""
+
+    sender: int
+    slug: str
+    text: str
+
+
 class End(Frozen, frozen=True):
     """The run is over."""
 
     ending: Ending
 
 
-Action = Dispatch | Release | Append | Show | End
+Action = Dispatch | Release | Append | Show | Announce | Reply | End
 
 
 class Boundary(Protocol):
@@ -197,6 +245,17 @@ class Boundary(Protocol):
 
     def enforce(self, request: bytes) -> bytes:
         """Decide one request; the answer is a decision with, on `allow`, permits."""
+        ...
+
+    def consider(self, document: bytes, now: Now) -> None:
+        """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick."""
+        ...
+
+    def present(self, document: bytes, now: Now, released: int) -> bytes:
+        """Take in a signed document, if it is to be trusted; the answer says what became of it.
+
+        `released` is the number of steps that were released: none of them is replaced any more.
+        """
         ...
 
 
@@ -223,30 +282,6 @@ class Vehicle(Protocol):
         """Stand down: send nothing more that moves the vehicle."""
         ...
 
-
-class EvidenceSink(Protocol):
-    """Where evidence lines go. Raises OSError when it cannot take one; nothing is lost silently."""
-
-    def append(self, line: bytes, durable: bool) -> None:
-        """Write one line; `durable` returns only when it is on the disk."""
-        ...
-
-    def close(self) -> None:
-        """Flush and close."""
-        ...
-
-
-class Opening(StrEnum):
-    """What became of opening a mission on a vehicle."""
-
-    OPENED = "opened"
-    REPLAYED = "replayed"  # opened before, also by a run that crashed; or it might have been
-    OLD_POLICY = "old-policy"  # a higher version of its policy was in force there
-
-
-class ReplayStore(Protocol):
-    """Which missions were opened on this vehicle, and the versions of their policies: on disk before any flies."""
-
-    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
-        """Open the mission of this digest, under a version of a policy."""
+    def announce(self, severity: int, text: str) -> None:
+        """Tell any ground station, as STATUSTEXT; left out when the link is busy."""
         ...

@@ -20,15 +20,16 @@ ID_BYTES: Final = 16
 _INVOCATION: Final = Domain(b"rtshcua/invocation")
 
 
-def bind(mission: Mission, policy_digest: bytes) -> Mission:
+def bind(mission: Mission, policy_digest: bytes, *, after: bytes = b"") -> Mission:
     """The mission under the policy of that digest, every invocation with its id and its binding.
 
     An id depends on all that the mission says, the time of its issue and the step, so the same inputs give the same id,
-    and no other mission or time of issue gives it again.
+    and no other mission or time of issue gives it again. `after` names what the mission replaces, if it does; a mission
+    that replaces another has other ids than the same one by itself.
     """
     blank = tuple(msgspec.structs.replace(each, invocation_id=b"", binding=b"") for each in mission.invocations)
     mission = msgspec.structs.replace(mission, policy_digest=policy_digest, invocations=blank)
-    root = digest(_INVOCATION, _encoded(mission))
+    root = digest(_INVOCATION, _encoded(mission) + after)
     identified = [
         msgspec.structs.replace(each, invocation_id=digest(_INVOCATION, cbor.encode([root, each.step]))[:ID_BYTES])
         for each in blank

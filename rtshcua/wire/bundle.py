@@ -95,9 +95,14 @@ def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: in
         policy_key=signed_policy.key,
         mission_key=signed_mission.key,
     )
-    _check_belonging(bundle)
-    _check_entitled(bundle, policy.vehicle.identity if vehicle is None else vehicle, now_us)
+    check_bundle(bundle, policy.vehicle.identity if vehicle is None else vehicle, now_us)
     return bundle
+
+
+def check_bundle(bundle: Bundle, vehicle: str, now_us: int) -> None:
+    """Whether the parts belong together, and their keys may speak for them on this vehicle. Raises `BundleError`."""
+    _check_belonging(bundle)
+    _check_entitled(bundle, vehicle, now_us)
 
 
 def envelopes(data: bytes) -> tuple[bytes, bytes]:

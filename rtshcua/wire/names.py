@@ -23,6 +23,9 @@ POLICY: Final = Artefact("rtshcua/policy", 2)
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 1)
+RECALL: Final = Artefact("rtshcua/recall", 1)
+REPLACEMENT: Final = Artefact("rtshcua/replacement", 1)
+RECEIPT: Final = Artefact("rtshcua/receipt", 1)
 LOG: Final = Artefact("rtshcua/log", 1, "")  # JSON lines (RFC 8785), which have no registered suffix
 REQUEST: Final = Artefact("rtshcua/request", 2)  # 2: with temporal monitors
 RESPONSE: Final = Artefact("rtshcua/response", 1)
@@ -36,6 +39,9 @@ ALL: Final = (
     MISSION,
     BUNDLE,
     APPROVAL,
+    RECALL,
+    REPLACEMENT,
+    RECEIPT,
     LOG,
     REQUEST,
     RESPONSE,

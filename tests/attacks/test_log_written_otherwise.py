@@ -7,9 +7,10 @@ import pytest
 from reference.forgery import expect, flight, leaf, read, rehashed
 
 LINES = flight()
-NUMBER = 2
+NUMBER = next(number for number, line in enumerate(LINES) if read(line)["type"] == "decision")
 LINE = LINES[NUMBER]
 TEXT = LINE.decode().rstrip("\n")
+SEQ = f'"seq":{NUMBER}'
 
 
 def with_line(line: str | bytes) -> list[bytes]:
@@ -27,8 +28,8 @@ def with_line(line: str | bytes) -> list[bytes]:
         TEXT.replace('"seq":', '"seq": ', 1),
         json.dumps(read(LINE)),
         json.dumps(dict(reversed(read(LINE).items())), separators=(",", ":")),
-        TEXT.replace('"seq":2', '"seq":2.0', 1),
-        TEXT.replace('"seq":2', '"seq":2e0', 1),
+        TEXT.replace(SEQ, f"{SEQ}.0", 1),
+        TEXT.replace(SEQ, f"{SEQ}e0", 1),
         TEXT.replace('"type":"decision"', '"type":"\\u0064ecision"', 1),
         TEXT.replace('"mode":"software"', '"mode":"\\u0073oftware"', 1),
     ],
@@ -39,15 +40,15 @@ def test_whitespace_order_and_escapes(line: str) -> None:
     assert record == NUMBER
 
 
-@pytest.mark.parametrize("twice", ['"seq":2,"seq":2', '"seq":9,"seq":2', '"seq":2,"seq":9'])
+@pytest.mark.parametrize("twice", [f"{SEQ},{SEQ}", f'"seq":9,{SEQ}', f'{SEQ},"seq":9'])
 def test_a_duplicate_key(twice: str) -> None:
-    slug, record = expect(with_line(TEXT.replace('"seq":2', twice, 1)))
+    slug, record = expect(with_line(TEXT.replace(SEQ, twice, 1)))
     assert (slug, record) == ("record/not-canonical", NUMBER)
 
 
 def test_a_duplicate_key_that_was_rehashed() -> None:
     """The link of the next line fits the doctored bytes: the form alone tells."""
-    doctored = LINE.replace(b'"seq":2', b'"seq":2,"seq":2', 1)
+    doctored = LINE.replace(SEQ.encode(), f"{SEQ},{SEQ}".encode(), 1)
     after = LINES[NUMBER + 1].replace(LINES[NUMBER + 1][10:74], leaf(doctored).hex().encode(), 1)
     forged = [*LINES[:NUMBER], doctored, *rehashed([after, *LINES[NUMBER + 2 :]])]
     assert expect(forged) == ("record/not-canonical", NUMBER)

@@ -31,18 +31,18 @@ def flight() -> tuple[bytes, ...]:
 def other_flight() -> tuple[bytes, ...]:
     """Another mission, which comes home early on a low battery."""
     bundle = case.seal(case.mission(case.short_steps(), issued_at_us=case.flat.ISSUED + 1))
-    config = case.simulated("px4", faults=(BatteryLevel(10_000_000, 2_000),))
+    config = case.simulated("px4", faults=(BatteryLevel(18_000_000, 2_000),))
     return tuple(Flight(bundle, config).fly().lines)
 
 
-def prove(lines: Iterable[bytes]) -> Audit:
+def prove(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> Audit:
     """The audit under the right root key."""
-    return audit(lines, ROOT_KEY)
+    return audit(lines, pinned)
 
 
-def expect(lines: Iterable[bytes]) -> tuple[str, int]:
+def expect(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> tuple[str, int]:
     """Slug and record of what is wrong."""
-    report = prove(lines).report
+    report = prove(lines, pinned).report
     finding = report.failure or report.shortfall
     assert finding is not None, "the forgery was not noticed"
     return finding.slug, finding.record

@@ -1,4 +1,4 @@
-"""Geometry by definition, in rationals: slow, obvious, and written apart from `rtshcua.decision.zones`."""
+"""Geometry by definition, exact: slow, obvious, and written apart from `rtshcua.decision.zones`."""
 
 from fractions import Fraction
 from itertools import combinations, pairwise
@@ -24,14 +24,11 @@ def edges(zone: Zone) -> list[tuple[Point, Point]]:
 
 
 def on_segment(p: Point, a: Point, b: Point) -> bool:
-    """p is a + t (b - a) for some t in 0..1."""
-    if a == b:
-        return p == a
-    along = [Fraction(p[axis] - a[axis], b[axis] - a[axis]) if a[axis] != b[axis] else None for axis in (0, 1)]
-    if any(t is None and p[axis] != a[axis] for axis, t in enumerate(along)):
+    """p is a + t (b - a) for some t in 0..1: on their line, and nowhere beyond them."""
+    (x, y), (ax, ay), (bx, by) = p, a, b
+    if (x - ax) * (by - ay) != (y - ay) * (bx - ax):
         return False
-    places = {t for t in along if t is not None}
-    return len(places) == 1 and 0 <= places.pop() <= 1
+    return min(ax, bx) <= x <= max(ax, bx) and min(ay, by) <= y <= max(ay, by)
 
 
 def well_formed(outlines: list[list[Point]]) -> bool:
@@ -75,8 +72,10 @@ def in_polygon(p: Point, zone: Zone) -> bool:
         return False
     crossings = 0
     for (ax, ay), (bx, by) in edges(zone):
-        if min(ay, by) <= p[1] < max(ay, by) and ax + Fraction((p[1] - ay) * (bx - ax), by - ay) > p[0]:
-            crossings += 1
+        if min(ay, by) <= p[1] < max(ay, by):
+            # ax + (p[1] - ay) * (bx - ax) / (by - ay) > p[0], times what it is divided by
+            past, up = (p[1] - ay) * (bx - ax) - (p[0] - ax) * (by - ay), by > ay
+            crossings += past > 0 if up else past < 0
     return crossings % 2 == 1
 
 
@@ -89,6 +88,10 @@ def in_shape(p: Point, zone: Zone) -> bool:
 
 def segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
     """Some a + t (b - a) is c + s (d - c), with t and s in 0..1."""
+    for axis in (0, 1):
+        one, other = sorted((a[axis], b[axis])), sorted((c[axis], d[axis]))
+        if one[1] < other[0] or other[1] < one[0]:
+            return False
     if any((on_segment(a, c, d), on_segment(b, c, d), on_segment(c, a, b), on_segment(d, a, b))):
         return True
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]
@@ -96,7 +99,9 @@ def segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
     if cross == 0:
         return False
     wx, wy = c[0] - a[0], c[1] - a[1]
-    return 0 <= Fraction(wx * vy - wy * vx, cross) <= 1 and 0 <= Fraction(wx * uy - wy * ux, cross) <= 1
+    # t and s, both times the square of what they are divided by
+    t, s, most = (wx * vy - wy * vx) * cross, (wx * uy - wy * ux) * cross, cross * cross
+    return 0 <= t <= most and 0 <= s <= most
 
 
 def hull(points: list[Point]) -> list[Point]:

@@ -31,7 +31,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load, session
 from rtshcua.onboard.ports import (
     Action,
     AirState,
@@ -62,9 +62,9 @@ TICK = 50_000  # us
 SKILL_US = 2 * S  # how long the fake vehicle takes for anything
 NEVER = 1 << 60
 
-ROOT_KEY, POLICY_KEY, MISSION_KEY, LOG_KEY = (
+ROOT_KEY, POLICY_KEY, MISSION_KEY, LOG_KEY, APPROVAL_KEY = (
     SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True)
-    for number, duty in enumerate((Duty.ROOT, Duty.POLICY, Duty.MISSION, Duty.LOG))
+    for number, duty in enumerate((Duty.ROOT, Duty.POLICY, Duty.MISSION, Duty.LOG, Duty.APPROVAL))
 )
 ROOT = TrustRoot(
     version=1,
@@ -74,6 +74,7 @@ ROOT = TrustRoot(
     keys=(
         POLICY_KEY.verification(vehicles=(VEHICLE,)),
         MISSION_KEY.verification(roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,)),
+        APPROVAL_KEY.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,)),
         LOG_KEY.verification(vehicles=(VEHICLE,)),
         ROOT_KEY.verification(),
     ),
@@ -108,6 +109,13 @@ def loaded(policy: Policy = POLICY, mission: Mission = MISSION, mode: Mode = Mod
     result = try_load(sealed(policy, mission), mode, own_simulator=True)
     assert isinstance(result, Loaded), result
     return result
+
+
+def renewed(of: Loaded) -> Loaded:
+    """The same bundle in a new session, without opening it again."""
+    return session(
+        of.bundle, of.policy, of.invocations, root=ROOT, vehicle=VEHICLE, mode=of.mode, session_key=SESSION_KEY
+    )
 
 
 class ManualClock:
@@ -328,7 +336,8 @@ def request_for(of: Loaded, kind: int = 0, step: int = 0, link: int = -1, **chan
     """A request that an honest runtime would send on the ground (step 0) or in the air, but for what is `changed`."""
     invocations = of.bundle.mission.invocations
     invocation = invocations[min(max(step, 0), len(invocations) - 1)]
-    values = FakeVehicle().values | ({HEIGHT: 20 * M, POSITION_X: 110 * M, POSITION_Y: -20 * M} if step else {})
+    height = invocations[1].plan.altitude if len(invocations) > 1 else 20 * M
+    values = FakeVehicle().values | ({HEIGHT: height, POSITION_X: 110 * M, POSITION_Y: -20 * M} if step else {})
     honest = Request(
         kind,
         step,

@@ -9,6 +9,10 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 
+#: the effect that puts another mission into force
+REPLACED = "replacement"
+#: effects whose detail is a signed document, and nothing to show
+_SIGNED = ("approval", "recall")
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
@@ -59,6 +63,10 @@ class Teller:
         self.outcomes = dict.fromkeys(_OUTCOMES, 0)
         self.done: set[int] = set()
 
+    def replace(self, mission: Mission) -> None:
+        """From now on this is the mission."""
+        self._mission = mission
+
     def tell(self, line: bytes) -> Happening | None:
         """What a line says, if it is a decision or an effect."""
         record = _read(line)
@@ -75,7 +83,10 @@ class Teller:
             return None
         if record.event == "succeeded" and record.kind == STEP:
             self.done.add(record.step)
-        return Happening(record.event, t_us, record.step, subject, detail=record.detail)
+        if record.event == REPLACED:
+            return Happening(record.event, t_us, record.step, detail=f"from step {record.step} on")
+        detail = "" if record.event in _SIGNED else record.detail
+        return Happening(record.event, t_us, record.step, subject, detail=detail)
 
     def _subject(self, record: _Line) -> str:
         """The step or link that a record is about, as it was written."""
@@ -83,6 +94,8 @@ class Teller:
             return f"contingency: {self._policy.contingency[record.link].text}"
         if record.kind < 0 or record.step < 0:
             return ""
+        if record.step >= len(self._mission.invocations):
+            return ""  # of a mission that is only just put into force
         invocation = self._mission.invocations[record.step]
         if record.kind == STEP:
             return invocation.text

@@ -1,6 +1,9 @@
 """A bundle: who signed it, and all that it says."""
 
+from base64 import b64decode
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
@@ -14,6 +17,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.wire import cose, names
 from rtshcua.wire.bundle import envelopes, open_bundle, parse, policy_digest
 from rtshcua.wire.digest import BUNDLE, digest
+from rtshcua.wire.replacement import ReplacementDocument
 from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -38,6 +42,17 @@ def claimed(data: bytes) -> Claimed:
     if isinstance(checked, Malformed):
         raise Untrusted("malformed", f"the bundle makes no sense: {checked.what}")
     return Claimed(policy, mission, digest(BUNDLE, data), policy_digest(first.payload), first.kid, second.kid)
+
+
+def replaced(detail: str, mission: Mission) -> Mission:
+    """The mission after a recorded replacement, which is not verified here. Raises `Untrusted`."""
+    try:
+        document = b64decode(detail, validate=True)
+    except ValueError:
+        raise Untrusted("malformed", "a recorded document is not base64") from None
+    said = parse(names.REPLACEMENT, cose.unverified(document).payload, ReplacementDocument)
+    kept = max(said.kept, 0)
+    return replace(said.mission, invocations=(*mission.invocations[:kept], *said.mission.invocations[kept:]))
 
 
 def show_bundle(page: Page, data: bytes, now_us: int) -> dict[str, object]:

@@ -2,10 +2,11 @@
 
 from base64 import b64decode
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 
 import msgspec
 
-from rtshcua.cli.showing.bundle import Claimed, claimed
+from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
 from rtshcua.evidence.finding import Flaw
@@ -13,6 +14,9 @@ from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
+
+#: effects whose detail is a signed document
+DOCUMENTS = ("approval", "recall", "replacement")
 
 _KINDS = {STEP: "step", FALLBACK_LINK: "fallback", CONTINGENCY_LINK: "contingency"}
 
@@ -28,6 +32,7 @@ def show_log(page: Page, lines: Iterable[bytes]) -> dict[str, object]:
             start_us, names = record.at_us, _Names(_bundle(record))
             _head(page, record)
             page.head("Timeline (not verified: `rtshcua verify-log` does that)")
+        names.follow(record)
         what = names.tell(record)
         entries.append(_entry(record, what))
         page.text(f"{record.seq:>5} {(record.at_us - start_us) / 1_000_000:>10.3f} s  {what}")
@@ -70,6 +75,12 @@ class _Names:
     def __init__(self, bundle: Claimed | None) -> None:
         self._bundle = bundle
 
+    def follow(self, record: AnyRecord) -> None:
+        """After a replacement the steps have other words."""
+        if isinstance(record, Effect) and record.event == "replacement" and self._bundle is not None:
+            with suppress(Untrusted):
+                self._bundle = self._bundle._replace(mission=replaced(record.detail, self._bundle.mission))
+
     def tell(self, record: AnyRecord) -> str:
         """A record in one line."""
         if isinstance(record, Decision):
@@ -79,7 +90,8 @@ class _Names:
             return f"{record.outcome:<9} {subject}: {record.reason}{clause}{target}"
         if isinstance(record, Effect):
             subject = self._subject(record.kind, record.step, record.link)
-            return "  ".join(word for word in (f"· {record.event:<15}", subject, record.detail) if word).rstrip()
+            detail = f"{len(record.detail)} letters, signed" if record.event in DOCUMENTS else record.detail
+            return "  ".join(word for word in (f"· {record.event:<15}", subject, detail) if word).rstrip()
         if isinstance(record, Close):
             return f"closed after {record.count} records: {record.ending}"
         return f"begun in mode {record.mode}"

@@ -1,12 +1,16 @@
 """A policy, in full: what is permitted, to whom, where, and what every skill then means."""
 
+from rtshcua.adapters.loop import WAIT_US
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.contract import show_contract
 from rtshcua.cli.showing.page import Page
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import Signal
+from rtshcua.onboard.runtime.bounds import falling_us
+from rtshcua.onboard.runtime.flight import Limits
 
 _HOUR_US = 3_600_000_000
+_MINUTE_US = 60_000_000
 
 
 def show_policy(page: Page, policy: Policy) -> None:
@@ -19,6 +23,9 @@ def show_policy(page: Page, policy: Policy) -> None:
     page.row("moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}")
     if vehicle.return_altitude:
         page.row("returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower")
+    if vehicle.braking:
+        braking, reaction = words.speed(vehicle.braking), words.duration(vehicle.reaction_us)
+        page.row("brakes", f"by {braking} in a second, after {reaction}: limits count where it would come to stand")
     page.row("position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this")
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
     page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
@@ -33,6 +40,9 @@ def show_policy(page: Page, policy: Policy) -> None:
             page.row("", f"flies {words.link(policy, rule.target)}", width=2)
     page.row("airspace", "anywhere" if policy.airspace is None else policy.airspace.text.removeprefix("airspace "))
     page.rows("contingency", [f"{n} {words.link(policy, link)}" for n, link in enumerate(policy.contingency)])
+    if policy.contingency and all(0 <= link.skill < len(policy.contracts) for link in policy.contingency):
+        most = words.duration(-(-falling_us(policy, None, Limits(), WAIT_US) // _MINUTE_US) * _MINUTE_US)
+        page.row("", f"at most {most} until it is down, or given up after the last tries")
 
     if policy.monitors:
         page.head("Temporal monitors: what conditions of the past look at")

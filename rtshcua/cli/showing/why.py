@@ -46,7 +46,7 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
     if decision.outcome is Outcome.FALLBACK:
         page.row("flies", decision.target.text if decision.target is not None else "nothing: no link may fly now")
     for nearest in trace.nearest:
-        page.row("would pass", _nearest(nearest))
+        page.row("would pass", would_pass(nearest))
     page.head("Step by step")
     steps = [_step(page, step, case, decision.clause) for step in trace.steps]
     if trace.chain and decision.outcome is Outcome.FALLBACK:
@@ -170,7 +170,8 @@ def _for_program(read: list[Read]) -> list[dict[str, object]]:
     return [{"name": each.name, "values": list(each.values), "stale": each.stale} for each in read]
 
 
-def _nearest(nearest: Nearest) -> str:
+def would_pass(nearest: Nearest) -> str:
+    """What a subject should be."""
     return f"{nearest.subject} = {_words(nearest)}"
 
 

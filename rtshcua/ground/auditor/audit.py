@@ -4,7 +4,9 @@
 9. the bundle is the one that the caller knows of, if there is one
 10. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
     ruled out by the states that the records hold (`observed`)
-11. evidence before effect: each dispatch follows a record that permits it (`cover`); not in mode `none`
+11. documents: each approval, recall and replacement is verified again, and no decision read another (`documents`)
+12. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
+    `none`
 
 What no log can prove: that the state it records is what the vehicle's sensors saw, and that the temporal monitors said
 what follows from all observations, of which the log has those at which something was decided.
@@ -19,10 +21,10 @@ from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
 from rtshcua.evidence.report import Report, claims
 from rtshcua.evidence.verify import Verifier
 from rtshcua.ground.auditor.cover import Cover
-from rtshcua.ground.auditor.derive import Deriver
+from rtshcua.ground.auditor.derive import UNENFORCED, Deriver
+from rtshcua.ground.auditor.documents import Documents
 from rtshcua.ground.auditor.trust import Basis, establish
-
-UNENFORCED = "none"
+from rtshcua.ground.auditor.turns import Turns
 
 
 class Audit(NamedTuple):
@@ -43,7 +45,9 @@ class Auditor:
         self._verifier = Verifier()
         self._basis: Basis | None = None
         self._deriver: Deriver | None = None
+        self._documents: Documents | None = None
         self._cover = Cover()
+        self._turns: Turns | None = None
         self._mode = ""
         self._derived = 0
         self._suspect: Finding | None = None
@@ -65,15 +69,26 @@ class Auditor:
             return self._begin(record)
         if isinstance(record, Decision):
             return self._decided(record)
-        if isinstance(record, Effect) and self._mode != UNENFORCED:
-            return self._cover.check(record)
+        if isinstance(record, Effect):
+            return self._happened(record)
         return None
+
+    def _happened(self, record: Effect) -> Flaw | None:
+        assert self._documents is not None
+        flaw = self._documents.check(record)
+        if flaw is None and self._mode != UNENFORCED:
+            self._cover.recalled = self._documents.counts["recall"] > 0
+            assert self._turns is not None
+            flaw = self._cover.check(record) or self._turns.check(record)
+        return flaw
 
     def _begin(self, genesis: Genesis) -> Flaw | None:
         basis = establish(genesis, self._pinned)
         if isinstance(basis, Flaw):
             return basis
         self._basis, self._deriver, self._mode = basis, Deriver(basis), genesis.mode
+        self._documents = Documents(basis, self._deriver)
+        self._turns = Turns(basis)
         if self._expected is not None and b64encode(self._expected).decode() != genesis.bundle:
             return Flaw("genesis/other-bundle", "the log is of another bundle than the one that lies beside it")
         return None
@@ -115,6 +130,11 @@ class Auditor:
             *report.proven,
             Claim("decisions", f"{_many(self._derived, 'decision')} derived again, each with the same answer"),
         ]
+        assert self._documents is not None
+        documents = [_many(count, kind) for kind, count in self._documents.counts.items() if count]
+        if documents:
+            text = f"{', '.join(documents)}, each signed by a key that the root trusts for it, and good when it came"
+            proven.append(Claim("documents", text))
         unproven = [*report.unproven, Claim("state", "that the recorded state is what the vehicle's sensors saw")]
         if basis.policy.monitors:
             text = "what the temporal monitors said between the records: only that no recorded state rules it out"

@@ -15,6 +15,7 @@ class Cover:
     """
 
     def __init__(self) -> None:
+        self.recalled = False  # no step may be sent any more
         self.dispatches = 0
         self._until_us: dict[tuple[int, int, int], int] = {}
         self._standing: set[int] = set()
@@ -34,6 +35,8 @@ class Cover:
         if record.event != DISPATCHED:
             return None
         self.dispatches += 1
+        if self.recalled and record.kind == STEP:
+            return Flaw("dispatch/recalled", "a step was sent after the mission was recalled", f"step {record.step}")
         until_us = self._until_us.pop((record.kind, record.step, record.link), None)
         if until_us is not None:
             if record.at_us <= until_us or self._stands(record):

@@ -13,10 +13,12 @@ from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.policy import Airspace, Rule
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+
+UNENFORCED = "none"
 
 _AUTHORITY = 3  # steps up to this one leave an id unused (design 4.4)
 _STATE, _PASSED = 6, 8
@@ -53,7 +55,22 @@ class Deriver:
     def __init__(self, basis: Basis) -> None:
         self._basis = basis
         self._consumed: set[int] = set()
+        self._latest = -1  # the last step that was decided on and not denied
         self._observed = Observed(basis.policy)
+
+    @property
+    def decided(self) -> int:
+        """How many steps, from the first on, are decided for good."""
+        return max(self._latest + int(self._latest in self._consumed), 0)
+
+    @property
+    def released(self) -> int:
+        """How many steps were released, as far as the decisions tell."""
+        return self._latest + 1
+
+    def replaced(self, first: int) -> None:
+        """The steps from `first` on are others now."""
+        self._consumed = {step for step in self._consumed if step < first}
 
     def check(self, record: Decision) -> Flaw | None:
         """What is wrong with a decision, or None when it derives again."""
@@ -79,6 +96,8 @@ class Deriver:
         flaw = self._observed.check(state, now)
         if flaw is not None:
             return flaw
+        if record.kind != STEP and record.context.approvals:
+            return Flaw("decision/approvals", "a link of a chain is decided without approvals")
         if record.kind == CONTINGENCY_LINK and record.step == -1:
             return self._contingency(record, state, now)
         if record.kind in (STEP, FALLBACK_LINK) and 0 <= record.step < len(basis.invocations):
@@ -92,12 +111,24 @@ class Deriver:
                 return self._step(record, invocation, state, now)
         return _no_such(record)
 
+    def _not_current(self, record: Decision) -> Flaw:
+        text = "a step is decided whose turn had not come, or was over: the boundary decides no such step"
+        return Flaw("decision/not-current", text, f"step {record.step}", f"step {max(self._latest, 0)} or the next")
+
     def _step(self, record: Decision, invocation: PreparedInvocation, state: State, now: Now) -> Answer | Flaw:
         given = record.context
         consumed = int(record.step in self._consumed)
         if given.consumed != consumed:
             text = "whether the step's id was used before is not what the records before say"
             return Flaw("decision/consumed", text, str(given.consumed), str(consumed))
+        if self._basis.in_force.recalled:
+            return Flaw("decision/recalled", "a step is decided after the mission was recalled")
+        if record.step > self._latest + 1 or (record.step < self._latest and not consumed):
+            return self._not_current(record)
+        approvals = self._basis.in_force.approvals(invocation.invocation, now)
+        if given.approvals != tuple((each.rule, each.role, each.granted, each.monotonic_us) for each in approvals):
+            text = "the approvals that it read are not those that the log holds and that are verified"
+            return Flaw("decision/approvals", text, str(given.approvals), str(approvals))
         binding = _octets(record.binding)
         if binding is None:
             return Flaw("decision/inputs", "the binding is not written in hexadecimal", record.binding)
@@ -109,9 +140,11 @@ class Deriver:
             given.released_us,
             given.phase,
             given.remaining_us,
-            tuple(Approval(*approval) for approval in given.approvals),
+            approvals,
         )
         decision = decide(invocation, state, self._basis.policy, context, now)
+        if decision.outcome is not Outcome.DENY or record.mode == UNENFORCED:
+            self._latest = max(self._latest, record.step)
         if decision.step > _AUTHORITY and not _may_ask_again(invocation, decision.outcome, decision.reason):
             self._consumed.add(record.step)
         target, link = decision.target, decision.link
@@ -134,6 +167,8 @@ class Deriver:
             admissible = link_admissible(chain[record.link], state, basis.policy, now, invocation.phase)
         else:
             return _no_such(record)
+        if record.step != self._latest:
+            return self._not_current(record)
         return _of_link(record, invocation.invocation.binding, now, admissible=admissible)
 
     def _contingency(self, record: Decision, state: State, now: Now) -> Answer | Flaw:

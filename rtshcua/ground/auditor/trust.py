@@ -3,6 +3,7 @@
 from base64 import b64decode, b64encode
 from typing import NamedTuple
 
+from rtshcua.decision.in_force import InForce
 from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.evidence.finding import Flaw
@@ -17,9 +18,18 @@ class Basis(NamedTuple):
     """What the decisions of a log are derived from."""
 
     root: TrustRoot
-    bundle: Bundle
     policy: PreparedPolicy
-    invocations: tuple[PreparedInvocation, ...]
+    in_force: InForce
+
+    @property
+    def bundle(self) -> Bundle:
+        """The bundle; after a replacement, with the mission that was in force at the end."""
+        return self.in_force.bundle
+
+    @property
+    def invocations(self) -> tuple[PreparedInvocation, ...]:
+        """The invocations of the mission that is in force."""
+        return self.in_force.invocations
 
 
 def establish(genesis: Genesis, pinned: bytes) -> Basis | Flaw:
@@ -28,7 +38,7 @@ def establish(genesis: Genesis, pinned: bytes) -> Basis | Flaw:
     `pinned` is the root's public key (32 bytes) or its `kid` (16 bytes). Everything is judged as of the genesis' UTC:
     what has expired since was good when it flew.
     """
-    root_bytes, bundle_bytes = _bytes(genesis.root), _bytes(genesis.bundle)
+    root_bytes, bundle_bytes = octets(genesis.root), octets(genesis.bundle)
     if root_bytes is None or bundle_bytes is None:
         return Flaw("genesis/base64", "the trust root or the bundle is not canonical base64")
     try:
@@ -61,10 +71,10 @@ def _prepared(genesis: Genesis, root: TrustRoot, bundle: Bundle) -> Basis | Flaw
     invocations = prepare_mission(bundle.mission, policy)
     if isinstance(invocations, Malformed):
         return Flaw("trust/bundle-malformed", f"the bundle's mission makes no sense: {invocations.what}")
-    return Basis(root, bundle, policy, invocations)
+    return Basis(root, policy, InForce(bundle, policy, invocations, root, genesis.vehicle))
 
 
-def _bytes(text: str) -> bytes | None:
+def octets(text: str) -> bytes | None:
     """The bytes of canonical base64: what a lenient reader ignores could be changed unseen."""
     try:
         data = b64decode(text, validate=True)

@@ -7,16 +7,20 @@ permits. Bytes go in and bytes come out, so that an isolated process or a truste
 from typing import Final
 
 from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.in_force import InForce
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
-from rtshcua.model.flat.situation import Context
+from rtshcua.model.flat.situation import Context, Now
 from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.enforcement.mint import Mint
 from rtshcua.wire.permit import LINK_VALID_US
+from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
+from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Malformed, Request, decode
 from rtshcua.wire.response import (
     NO_CLAUSE,
@@ -45,23 +49,24 @@ class SoftwareBoundary:
     def __init__(
         self,
         policy: PreparedPolicy,
-        invocations: tuple[PreparedInvocation, ...],
-        policy_digest: bytes,
+        in_force: InForce,
+        commands: Commands,
         vehicle: str,
         mint: Mint,
         *,
         enforced: bool,
     ) -> None:
         self._policy = policy
-        self._invocations = invocations
-        self._policy_digest = policy_digest
+        self._in_force = in_force
+        self._commands = commands
+        self._policy_digest = in_force.bundle.policy_digest
         self._vehicle = vehicle
         self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
         self._mint = mint
         self._enforced = enforced
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
-        self._clauses = _ClauseNumbers(policy.policy, invocations)
+        self._clauses = _ClauseNumbers(policy.policy, in_force.invocations)
         self._consumed: set[int] = set()
         self._now_us = 0  # of the last request: time does not go back
         self._latest = -1  # the last step that was asked for and not denied
@@ -78,14 +83,36 @@ class SoftwareBoundary:
         answer = self._step(asked) if asked.kind == STEP else self._link(asked)
         return encode_refusal(answer) if isinstance(answer, Status) else encode(answer)
 
+    def consider(self, document: bytes, now: Now) -> None:
+        """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick."""
+        self._in_force.consider(document, now)
+
+    def present(self, document: bytes, now: Now, released: int) -> bytes:
+        """Take in a signed document, if it is to be trusted. Nothing is raised, and nothing else is changed.
+
+        `released` steps were released, as far as the runtime knows; more were if they were asked for here. An answer
+        about a step whose id is used up comes too late.
+        """
+        if now.monotonic_us < self._now_us:
+            return encode_receipt(Receipt(UNKNOWN, "time-went-back", "it came before the last request"))
+        self._now_us = now.monotonic_us
+        decided = self._latest + int(self._latest in self._consumed)
+        receipt = self._in_force.take(document, now, decided=max(decided, 0), released=max(released, self._latest + 1))
+        self._commands.recalled = self._in_force.recalled
+        if receipt.kind == REPLACEMENT and receipt.accepted:
+            self._commands.replace(self._in_force.bundle.mission)
+            self._consumed = {step for step in self._consumed if step < receipt.step}
+            self._clauses = _ClauseNumbers(self._policy.policy, self._in_force.invocations)
+        return encode_receipt(receipt)
+
     def _step(self, asked: Request) -> Answer | Status:
-        step = asked.step
-        if not 0 <= step < len(self._invocations) or asked.link != -1:
+        step, invocations = asked.step, self._in_force.invocations
+        if not 0 <= step < len(invocations) or asked.link != -1:
             return Status.UNKNOWN_STEP
         consumed = int(step in self._consumed)
-        if step > self._latest + 1 or (step < self._latest and not consumed):
+        if self._in_force.recalled or step > self._latest + 1 or (step < self._latest and not consumed):
             return Status.NOT_CURRENT
-        prepared = self._invocations[step]
+        prepared = invocations[step]
         context = Context(
             asked.binding,
             self._vehicle,
@@ -94,7 +121,7 @@ class SoftwareBoundary:
             asked.released_us,
             asked.phase,
             asked.remaining_us,
-            (),
+            self._in_force.approvals(prepared.invocation, asked.now),
         )
         decision = decide(prepared, asked.state, self._policy, context, asked.now)
         if decision.outcome is not Outcome.DENY or not self._enforced:
@@ -132,11 +159,11 @@ class SoftwareBoundary:
     def _link(self, asked: Request) -> Answer | Status:
         now_us = asked.now.monotonic_us
         if asked.kind == FALLBACK_LINK:
-            if not 0 <= asked.step < len(self._invocations):
+            if not 0 <= asked.step < len(self._in_force.invocations):
                 return Status.UNKNOWN_STEP
             if asked.step != self._latest:
                 return Status.NOT_CURRENT
-            prepared = self._invocations[asked.step]
+            prepared = self._in_force.invocations[asked.step]
             binding = prepared.invocation.binding
             number = self._fallback(asked, prepared)
         else:

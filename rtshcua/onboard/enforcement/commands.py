@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
-from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.ports import Command
@@ -11,11 +11,22 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 
 
 class Commands:
-    """Looks up the command of a step or a link. Raises `LookupError` for one that the bundle does not have."""
+    """Looks up the command of a step or a link. Raises `LookupError` for one that the bundle does not have.
+
+    `recalled` says that no step may be sent any more. Only the boundary changes it, and the steps.
+    """
 
     def __init__(self, policy: Policy, mission: Mission) -> None:
+        self.recalled = False
         self._policy = policy
-        self._steps = tuple((invocation, self._geo(invocation.plan.path)) for invocation in mission.invocations)
+        self._steps = self._located(mission)
+
+    def replace(self, mission: Mission) -> None:
+        """From now on these are the steps."""
+        self._steps = self._located(mission)
+
+    def _located(self, mission: Mission) -> tuple[tuple[Invocation, tuple[int, ...]], ...]:
+        return tuple((invocation, self._geo(invocation.plan.path)) for invocation in mission.invocations)
 
     def command(self, kind: int, step: int, link: int, token: int) -> Command:
         """The command, under the token of its permit. A `link` of `-1 - rule` is the target of that degrade rule."""

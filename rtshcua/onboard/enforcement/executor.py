@@ -1,7 +1,8 @@
 """The executor: the only place that turns a permit into something to send (design section 4.5, mediated dispatch).
 
 It checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
-still the one that flies; that a step waits for its turn, and never follows a return or a landing that a fallback began;
+still the one that flies; that a step waits for its turn, and never follows a recall, or a return or a landing that a
+fallback began;
 and that chains go forward only. A standing permit is good for each of its links once, and for the contingency's last
 `AGAIN` times more.
 """
@@ -10,6 +11,7 @@ from enum import StrEnum
 
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.mint import AGAIN
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.permit import Permit, open_permit
@@ -29,20 +31,25 @@ class PermitRefusal(StrEnum):
     NOT_COVERED = "permit/not-covered"  # a link that does not stand behind this permit
     LAPSED = "permit/lapsed"  # standing, but its step is over or its flight has landed
     OUT_OF_TURN = "permit/out-of-turn"  # a step while another runs, or one behind it
-    MISSION_OVER = "permit/mission-over"  # a step after a return or a landing began
+    MISSION_OVER = "permit/mission-over"  # a step after a return or a landing began, or after a recall
     BACKWARDS = "permit/backwards"  # a link before the one that was flown
 
 
 class Executor:
-    """Checks permits under the session key and remembers what was sent."""
+    """Checks permits under the session key and remembers what was sent.
 
-    def __init__(self, key: bytes, commands: Commands) -> None:
+    `frames` is the gate that the vehicle's adapter sends through: the frames of what was dispatched last may pass it.
+    """
+
+    def __init__(self, key: bytes, commands: Commands, frames: FrameSession | None = None) -> None:
         self._key = key
         self._commands = commands
+        self.frames = FrameSession() if frames is None else frames
         self._used: set[int] = set()
         self._step = -1  # the last step that was sent,
         self._serial = 0  # its permit,
         self._running = False  # and whether it still runs
+        self._last = 0  # the permit that was dispatched last, for a step or a link
         self._flight: int | None = None  # the first step permit of this flight
         self._fallback = (-1, _UNTOUCHED)  # the step whose chain was last in use, and the last link sent
         self._contingency = _UNTOUCHED  # the last link of the contingency that was sent
@@ -88,16 +95,28 @@ class Executor:
             self._flight = permit.serial if self._flight is None else self._flight
         else:
             self._follow(permit, command.kind in _HOMEWARD)
+        self._last = permit.serial
+        self.frames.open(command, permit.not_after_us)
         return Dispatch(command, permit.not_after_us, needs_record=permit.kind == STEP)
 
-    def ended(self) -> None:
-        """The running step ended, however it did: the next may be sent."""
-        self._running = False
+    def ended(self, token: int | None = None) -> None:
+        """The running step ended, however it did: the next may be sent.
+
+        With a token: that command ended, and if another one was dispatched since, the other one runs on.
+        """
+        if token in (None, self._last):
+            self._running = False
+            self.frames.close()
 
     def landed(self) -> None:
         """The vehicle landed: standing permits lapse."""
         self._running = False
         self._flight = None
+        self.frames.close()
+
+    def release(self) -> None:
+        """Nothing more that moves the vehicle is to be sent, unless another permit is dispatched."""
+        self.frames.close()
 
     def _follow(self, permit: Permit, homeward: bool) -> None:
         self._running = False
@@ -109,7 +128,7 @@ class Executor:
             self._fallback = (permit.step, _position(permit))
 
     def _refuse_step(self, permit: Permit) -> PermitRefusal | None:
-        if self._homeward:
+        if self._homeward or self._commands.recalled:
             return PermitRefusal.MISSION_OVER
         if self._running or permit.step <= self._step:
             return PermitRefusal.OUT_OF_TURN

@@ -10,6 +10,7 @@ from typing import Final
 
 import msgspec
 
+from rtshcua.decision.in_force import InForce
 from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.model.flat.situation import Now
@@ -45,11 +46,20 @@ class Loaded(msgspec.Struct, frozen=True):
 
     boundary: Boundary
     executor: Executor
-    bundle: Bundle
+    in_force: InForce
     policy: PreparedPolicy
-    invocations: tuple[PreparedInvocation, ...]
     vehicle: str
     mode: Mode
+
+    @property
+    def bundle(self) -> Bundle:
+        """The bundle; after a replacement, with the mission that is in force."""
+        return self.in_force.bundle
+
+    @property
+    def invocations(self) -> tuple[PreparedInvocation, ...]:
+        """The invocations of the mission that is in force."""
+        return self.in_force.invocations
 
     @property
     def expires_us(self) -> int:
@@ -90,8 +100,22 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return LoadRefusal("malformed", f"the {what}")
-    boundary = SoftwareBoundary(
-        policy, invocations, opened.policy_digest, vehicle, Mint(session_key), enforced=mode is not Mode.NONE
-    )
-    executor = Executor(session_key, Commands(opened.policy, opened.mission))
-    return Loaded(boundary, executor, opened, policy, invocations, vehicle, mode)
+    return session(opened, policy, invocations, root=root, vehicle=vehicle, mode=mode, session_key=session_key)
+
+
+def session(
+    bundle: Bundle,
+    policy: PreparedPolicy,
+    invocations: tuple[PreparedInvocation, ...],
+    *,
+    root: TrustRoot,
+    vehicle: str,
+    mode: Mode,
+    session_key: bytes,
+) -> Loaded:
+    """A verified and prepared bundle in force, nothing of it decided yet."""
+    in_force = InForce(bundle, policy, invocations, root, vehicle)
+    commands = Commands(bundle.policy, bundle.mission)
+    enforced = mode is not Mode.NONE
+    boundary = SoftwareBoundary(policy, in_force, commands, vehicle, Mint(session_key), enforced=enforced)
+    return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode)

@@ -6,18 +6,23 @@ from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Show
+from rtshcua.onboard.ports import Announce, Show
 from rtshcua.onboard.runtime.flight import Key
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.queue import InvocationQueue
 from rtshcua.onboard.runtime.remaining import RemainingLatency
 from rtshcua.onboard.runtime.view import Decided
+from rtshcua.wire.approval import Answered, Approvals
+from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Request, encode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, decode, own_clauses, shared_clauses
 
 #: how many decisions a display is shown
 SHOWN = 6
+#: MAV_SEVERITY of what ground stations are told of a decision: info, warning, notice, warning
+_SEVERITIES = {Outcome.ALLOW: 6, Outcome.DENY: 4, Outcome.DEFER: 5, Outcome.FALLBACK: 4}
 
 
 class Admission:
@@ -29,14 +34,26 @@ class Admission:
 
     def __init__(self, loaded: Loaded, journal: Journal, queue: InvocationQueue, remaining: RemainingLatency) -> None:
         self._loaded = loaded
+        self._in_force = loaded.in_force
         self._journal = journal
         self._queue = queue
         self._remaining = remaining
         self.recent: deque[Decided] = deque(maxlen=SHOWN)
         self._policy = loaded.bundle.policy
         self._shared = shared_clauses(self._policy)
+        self._approvals = Approvals(self._policy)
         self._last: tuple[int, tuple[object, ...]] | None = None
         self._repeated = 0
+
+    def answered(self, receipt: Receipt, now: Now) -> None:
+        """The boundary accepted an approval: it tells later decisions of it, and so do their records."""
+        self._approvals.add(
+            Answered(receipt.step, receipt.role, receipt.granted, now.monotonic_us, receipt.expires_us), now
+        )
+
+    def replaced(self, first: int) -> None:
+        """The steps from `first` on are others now."""
+        self._approvals.forget(first)
 
     def ask(self, now: Now, state: State, key: Key) -> Answer | None:
         """The boundary's answer about a step or link (kind, step, link); None when it did not decide."""
@@ -59,9 +76,9 @@ class Admission:
                 return answer
             self.flush(now)
             self._last = last
-        context = Context(
-            binding, self._loaded.vehicle, self._policy.version, answer.consumed, released_us, phase, remaining_us, ()
-        )
+        approvals = self._approvals.about(self._in_force.invocations[step].invocation, now) if kind == STEP else ()
+        vehicle, version = self._loaded.vehicle, self._policy.version
+        context = Context(binding, vehicle, version, answer.consumed, released_us, phase, remaining_us, approvals)
         clause = self._clause(step, answer)
         target = self._target(step, answer)
         self._show(now, key, answer, "" if clause is None else clause.text)
@@ -99,7 +116,7 @@ class Admission:
             return None
         if answer.clause < len(self._shared):
             return self._shared[answer.clause]
-        own = own_clauses(self._loaded.invocations[step].invocation.contract)
+        own = own_clauses(self._in_force.invocations[step].invocation.contract)
         return own[answer.clause - len(self._shared)]
 
     def _show(self, now: Now, key: Key, answer: Answer, clause: str) -> None:
@@ -108,26 +125,28 @@ class Admission:
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
         text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
         self._journal.add(Show("decision", text, key[1]))
+        why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
+        self._journal.add(Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}"))
 
     def _subject(self, kind: int, step: int, link: int) -> str:
         if kind == STEP:
-            return self._loaded.invocations[step].invocation.text
+            return self._in_force.invocations[step].invocation.text
         if link == DEGRADE:
             return "the target of a degrade rule"
         chain = self._policy.contingency
         if kind == FALLBACK_LINK:
-            chain = self._loaded.invocations[step].invocation.contract.fallback
+            chain = self._in_force.invocations[step].invocation.contract.fallback
         return chain[link].text
 
     def _bound(self, kind: int, step: int) -> tuple[bytes, bytes]:
         if kind == CONTINGENCY_LINK:
             return self._loaded.bundle.policy_digest, b""
-        invocation = self._loaded.invocations[step].invocation
+        invocation = self._in_force.invocations[step].invocation
         return invocation.binding, invocation.invocation_id
 
     def _target(self, step: int, answer: Answer) -> Link | None:
         if answer.target == NO_TARGET:
             return None
         if answer.target >= 0:
-            return self._loaded.invocations[step].invocation.contract.fallback[answer.target]
+            return self._in_force.invocations[step].invocation.contract.fallback[answer.target]
         return self._policy.rules[-1 - answer.target].target

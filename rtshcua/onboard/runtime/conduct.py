@@ -6,11 +6,10 @@ counts: `skip` goes on with the next step, `hold` waits like a deferral, `abort`
 that is used up, the contingency. On the ground nothing is sent, and the run ends.
 """
 
-from rtshcua.decision.holding import holding
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
-from rtshcua.model.flat.situation import Now, State
-from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.model.flat.situation import Now
+from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import End, Ending
 from rtshcua.onboard.runtime.admission import Admission
@@ -20,14 +19,15 @@ from rtshcua.onboard.runtime.fallback import Fallback, Progress
 from rtshcua.onboard.runtime.flight import Limits, Stage
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.monitor import StateMonitor
+from rtshcua.onboard.runtime.patience import Patience
 from rtshcua.onboard.runtime.queue import InvocationQueue
 from rtshcua.onboard.runtime.remaining import RemainingLatency
-from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
+from rtshcua.onboard.runtime.supervisor import Supervisor
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from rtshcua.wire.response import Answer
 
 #: what ends a run matters more the further down it stands
-_GRAVITY = (Ending.ABORTED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
+_GRAVITY = (Ending.ABORTED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 
 
 class Conduct:
@@ -49,7 +49,7 @@ class Conduct:
         self._resumed = resumed
         self._fallback = Fallback(loaded, self.admission, self.dispatcher, limits)
         self._supervisor: Supervisor | None = None
-        self._patience = Grace()
+        self._patience = Patience(loaded)
         self._cause: Ending | None = None
         self._began_us: int | None = None
         self._asked_us = 0
@@ -59,19 +59,20 @@ class Conduct:
     def aloft(self) -> bool:
         """Whether a motion command may be needed: a command is under way, or a flight of this bundle is not at rest.
 
-        A flight that somebody else began is none of ours, whatever happens.
+        A flight that somebody else began is none of ours, whatever happens. After a restart of ours the vehicle counts
+        as in the air until it says that it is not.
         """
         if self.dispatcher.active is not None:
             return True
         if self.dispatcher.dispatched:
             return not self.craft.at_rest
-        return self._resumed and self.craft.airborne is True
+        return self._resumed and self.craft.airborne is not False
 
     def turn(self, now: Now) -> bool:
         """Do one thing that can be done now; False when there is none left."""
         self._began_us = now.monotonic_us if self._began_us is None else self._began_us
         lost_since_us = self.craft.lost_since_us
-        if lost_since_us is not None:
+        if lost_since_us is not None and self.stage is not Stage.ENDED:
             if now.monotonic_us - lost_since_us > self._limits.silent_us:
                 self.stand_down(now, Ending.LINK_LOST)
             return False  # nothing that is sent would arrive
@@ -102,6 +103,24 @@ class Conduct:
             self.fall_back(FALLBACK_LINK, cause)
         elif self.stage in (Stage.WAITING, Stage.DECIDING):
             self.fall_back(CONTINGENCY_LINK, cause)
+
+    def recall(self, now: Now) -> None:
+        """An operator calls the vehicle back: in the air the contingency flies, on the ground the run ends.
+
+        What already brings the vehicle home or down goes on.
+        """
+        self._blame(Ending.RECALLED)
+        active = self.dispatcher.active
+        homeward = self.stage is Stage.RUNNING and active is not None and active.homeward
+        if not self.aloft:
+            self.end(now, Ending.RECALLED)
+        elif self.stage is not Stage.FALLING and not homeward:
+            self.fall_back(CONTINGENCY_LINK, Ending.RECALLED)
+
+    def replaced(self, first: int) -> None:
+        """A replacement is in force: the steps from `first` on, none of which was released, are others now."""
+        self.queue.replace(self.loaded.bundle.mission)
+        self.admission.replaced(first)
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED) -> None:
         """Fly the current step's chain, or the contingency, down to the ground.
@@ -136,6 +155,7 @@ class Conduct:
         self.admission.flush(now)
         self.stage = Stage.ENDED
         self.ending = ending
+        self.loaded.executor.release()
         self._journal.add(End(ending))
 
     def down(self, now: Now) -> None:
@@ -149,7 +169,7 @@ class Conduct:
         """The current step is done, or skipped."""
         self.queue.advance(now.monotonic_us)
         self._supervisor = None
-        self._patience = Grace()
+        self._patience.renew()
         self._held = False
         self.fresh = True
         self.stage = Stage.DECIDING
@@ -170,6 +190,9 @@ class Conduct:
         if not craft.ready or craft.airborne is None:
             if now.monotonic_us - began_us > self._limits.ready_us:
                 self._journal.effect(now, "never-ready")
+                if self.aloft:
+                    self.fall_back(CONTINGENCY_LINK)
+                    return True
                 self._give_up(now)
             return False
         self._journal.effect(now, "ready")
@@ -204,8 +227,8 @@ class Conduct:
             return True
         if answer.permit:
             return self._start(now, invocation, answer)
-        if self._may_wait(now, invocation, answer):
-            unkept = self._unkept(now, invocation, state) if self.aloft else None
+        if self._patience.may_wait(invocation, answer, self.queue.released_us or 0, now.monotonic_us):
+            unkept = self._patience.unkept(invocation, state, now) if self.aloft else None
             if unkept is None:
                 self._hold(now)
                 return False
@@ -229,20 +252,6 @@ class Conduct:
         self._supervisor = Supervisor(prepared, self.loaded.policy, now.monotonic_us)
         self.stage = Stage.RUNNING
         return False
-
-    def _may_wait(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
-        """Whether asking again can help: not past the deadline, but for an approval, which has a time of its own."""
-        if answer.reason is Reason.AWAITING_APPROVAL:
-            return True
-        holds = invocation.on_inadmissible == OnInadmissible.HOLD and answer.reason is not Reason.NO_SLACK
-        released_us = self.queue.released_us or 0
-        in_time = now.monotonic_us < released_us + invocation.contract.deadline_us
-        return in_time and (answer.outcome is Outcome.DEFER or holds)
-
-    def _unkept(self, now: Now, invocation: Invocation, state: State) -> str | None:
-        """What forbids waiting on in the air; UNKNOWN has the step's grace."""
-        unkept = holding(self.loaded.invocations[invocation.step], state, self.loaded.policy, now)
-        return self._patience.over(unkept, now.monotonic_us, invocation.contract.grace_us)
 
     def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
         if invocation.on_inadmissible == OnInadmissible.SKIP:

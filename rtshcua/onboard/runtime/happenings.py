@@ -10,16 +10,23 @@ from rtshcua.onboard.ports import (
     Interrupted,
     LinkBack,
     LinkLost,
+    Noted,
+    Presented,
     Readings,
     Ready,
+    Said,
     Sent,
     Succeeded,
     TakenOver,
 )
 from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.runtime.inbox import Inbox
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.wire.request import FALLBACK_LINK
+
+#: how much of what a vehicle says is recorded, in letters
+MOST_SAID = 200
 
 
 class Happenings:
@@ -28,6 +35,7 @@ class Happenings:
     def __init__(self, conduct: Conduct, journal: Journal) -> None:
         self._conduct = conduct
         self._journal = journal
+        self._inbox = Inbox(conduct, journal)
         self._gap = False
 
     def take(self, now: Now, event: Event) -> None:
@@ -57,6 +65,12 @@ class Happenings:
                 conduct.break_off(now, Ending.INTERRUPTED)
             case EvidenceFailed():
                 self._evidence_failed(now, event.reason)
+            case Said():
+                self._journal.effect(now, "said", detail=f"{event.severity}: {event.text[:MOST_SAID]}")
+            case Noted():
+                self._journal.effect(now, "noted", detail=event.text)
+            case Presented():
+                self._inbox.take(now, event)
 
     def _air(self, now: Now, event: AirState) -> None:
         conduct, craft = self._conduct, self._conduct.craft

@@ -26,6 +26,11 @@ class InvocationQueue:
         return self._released_us
 
     @property
+    def released(self) -> int:
+        """How many steps were released; what they say does not change any more."""
+        return 0 if self._released_us is None else min(self._index + 1, len(self._steps))
+
+    @property
     def phase(self) -> int:
         """The index of the current mission phase; the last step's once all are done."""
         return self._steps[min(self._index, len(self._steps) - 1)].phase
@@ -34,6 +39,10 @@ class InvocationQueue:
         """Release the first step. A later call changes nothing: a vehicle is ready once."""
         if self._released_us is None:
             self._released_us = now_us
+
+    def replace(self, mission: Mission) -> None:
+        """From now on these are the steps; those that were released are the same ones."""
+        self._steps = mission.invocations
 
     def advance(self, now_us: int) -> None:
         """The current step ended, or is skipped: release the next."""

@@ -8,9 +8,7 @@ from random import Random
 from fuzz import board
 from reference import world as reference
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.enforcement.mint import Mint
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Malformed, Request, decode, encode
 from rtshcua.wire.response import Unusable
 from rtshcua.wire.response import decode as read
@@ -85,10 +83,7 @@ def one(data: bytes) -> None:
         return
     of = worlds()[(data[0] & 127) % 2]
     policy = of.policy.policy
-    digest = of.bundle.policy_digest
-    boundary = SoftwareBoundary(
-        of.policy, of.invocations, digest, of.vehicle, Mint(reference.SESSION_KEY), enforced=True
-    )
+    boundary = reference.renewed(of).boundary
     if data[0] & 128:
         requests = [data[1:]]
     else:

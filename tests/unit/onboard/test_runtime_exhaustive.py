@@ -11,12 +11,10 @@ import pytest
 from msgspec.structs import replace
 
 from reference.flat_case import OBSTACLE, WIND, M, S
-from reference.world import SESSION_KEY, VEHICLE, FakeVehicle, Run, assert_covered, loaded
-from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
+from reference.world import SESSION_KEY, FakeVehicle, Run, assert_covered, loaded, renewed
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.enforcement.mint import Mint
 from rtshcua.onboard.ports import (
     AirState,
     Dispatch,
@@ -38,8 +36,8 @@ DEPTH = 3
 class Watched(Executor):
     """Remembers what it let through, and is asked for nothing else."""
 
-    def __init__(self) -> None:
-        super().__init__(SESSION_KEY, Commands(TEMPLATE.bundle.policy, TEMPLATE.bundle.mission))
+    def __init__(self, commands: Commands) -> None:
+        super().__init__(SESSION_KEY, commands)
         self.passed: list[Dispatch] = []
 
     def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | PermitRefusal:
@@ -56,11 +54,9 @@ class Watched(Executor):
 
 def fresh() -> tuple[Loaded, Watched]:
     """The same bundle in a new session, without opening it again."""
-    of, executor = TEMPLATE, Watched()
-    boundary = SoftwareBoundary(
-        of.policy, of.invocations, of.bundle.policy_digest, VEHICLE, Mint(SESSION_KEY), enforced=True
-    )
-    return replace(of, boundary=boundary, executor=executor), executor
+    of = renewed(TEMPLATE)
+    executor = Watched(of.executor._commands)
+    return replace(of, executor=executor), executor
 
 
 def token(run: Run) -> int:

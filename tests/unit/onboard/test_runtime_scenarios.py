@@ -124,6 +124,15 @@ def test_battery_falling_returns_by_the_degrade_rule() -> None:
     assert run.ending is Ending.ABORTED
 
 
+def test_a_breach_between_two_steps_is_seen_though_it_is_over() -> None:
+    """A backlog brings many states at once: each is watched, not only the last."""
+    run = start().until_flies("inspect_area")
+    at_us, far = run.clock.now().monotonic_us, run.vehicle.values[OBSTACLE]
+    run.step(*(Readings(at_us, ((OBSTACLE, value),)) for value in (far, 1 * M, far)))
+    assert run.events[-2:] == ["violated", "dispatched"]
+    assert run.flown[-1] == "hover"
+
+
 def test_wind_over_the_limit_holds_for_its_time_and_then_returns() -> None:
     run = start().until_flies("goto")
     run.vehicle.values[WIND] = 12 * M

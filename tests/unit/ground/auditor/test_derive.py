@@ -27,7 +27,7 @@ def denied_in_the_air() -> tuple[bytes, ...]:
 @cache
 def fallen_back() -> tuple[bytes, ...]:
     """The wind rises above the limit: the chain of the step flies."""
-    config = case.simulated("px4", faults=(WindStep(15 * S, 14 * M),))
+    config = case.simulated("px4", faults=(WindStep(20 * S, 14 * M),))
     return tuple(Flight(case.seal(case.mission(case.short_steps())), config).fly().lines)
 
 

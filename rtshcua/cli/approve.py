@@ -1,0 +1,90 @@
+"""`rtshcua approve`: answer a step that asks for confirmation."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.documents import WHERE, deliver, refuse, subject
+from rtshcua.cli.faults import fail
+from rtshcua.cli.unlock import unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
+from rtshcua.wire.document import MAX_LIFE_US
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_MOST_S = MAX_LIFE_US // 1_000_000
+
+
+@app.command()
+def approve(
+    bundle: Annotated[Path, typer.Argument(help="the bundle that flies")],
+    step: Annotated[int, typer.Option(help="the number of the step, from 0")],
+    role: Annotated[str | None, typer.Option(help="who you are, where several are asked")] = None,
+    refused: Annotated[bool, typer.Option("--refuse", help="say no: the step is denied, whoever else agrees")] = False,
+    seconds: Annotated[int, typer.Option("--for", min=1, max=_MOST_S, help="how many seconds the answer is good")]
+    = 300,
+    replacement: Annotated[
+        list[Path] | None, typer.Option(help="a replacement that is in force since, in order (repeatable)")
+    ] = None,
+    to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer here")] = None,
+    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    approval_key: Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:  # fmt: skip
+    """Answer the `confirm` rules that ask you about one step of one mission: yes, or no.
+
+    The bundle is verified first, so that you sign what it says. The answer is good for that step of that mission alone,
+    on its vehicle, and for a bounded time; a step that flies already is not recalled by it.
+    """
+    if to is None and output is None:
+        return fail(ExitCode.USAGE, "the answer has to go somewhere", WHERE)
+    now_us = time.time_ns() // 1000
+    try:
+        flying = subject(bundle, replacement or [], root, now_us)
+        steps = flying.mission.invocations
+        if not 0 <= step < len(steps):
+            return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 0 to {len(steps) - 1}")
+        asked = _roles(flying.policy, steps[step])
+        if role is None and len(asked) == 1:
+            role = asked[0]
+        if role is None or role not in asked:
+            return _not_asked(steps[step], role, asked)
+        said = ApprovalDocument(
+            invocation_id=steps[step].invocation_id,
+            binding=steps[step].binding,
+            vehicle=flying.policy.vehicle.identity,
+            role=role,
+            granted=int(not refused),
+            issued_at_us=now_us,
+            expires_at_us=now_us + seconds * 1_000_000,
+        )
+        key = unlock(KeyStore(data_folder()), Duty.APPROVAL, path=approval_key, passphrase_file=passphrase_file)
+        document = sign_approval(said, key)
+    except Untrusted as error:
+        return refuse(error)
+    what = f"{'refused' if refused else 'approved'} as {role} for {seconds} s: step {step}, `{steps[step].text}`"
+    return deliver(document, what, to=to, output=output, as_json=as_json)
+
+
+def _roles(policy: Policy, invocation: Invocation) -> list[str]:
+    return [name for number, name in enumerate(policy.roles) if confirms(policy, invocation, number)]
+
+
+def _not_asked(invocation: Invocation, role: str | None, asked: list[str]) -> ExitCode:
+    step = invocation.step
+    if not asked:
+        return fail(ExitCode.USAGE, f"no `confirm` of the policy asks anybody about step {step}")
+    names = ", ".join(f"`{name}`" for name in asked)
+    what = f"several roles are asked about step {step}" if role is None else f"`{role}` is not asked about step {step}"
+    return fail(ExitCode.USAGE, what, f"accepted: --role {names}")

@@ -1,0 +1,78 @@
+"""What the commands that sign or hand in a document for a flight share: what it is about, and where it goes."""
+
+import json
+import os
+from pathlib import Path
+
+from rtshcua.adapters.agent_client import hand_in
+from rtshcua.adapters.files.durable import PRIVATE_FILE
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore, read_root
+from rtshcua.cli.faults import fail
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.situation import Now
+from rtshcua.wire import cose
+from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, open_bundle
+from rtshcua.wire.document import MAX_DOCUMENT
+from rtshcua.wire.replacement import fit_replacement, open_replacement
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
+from rtshcua.wire.untrusted import Untrusted
+
+#: help for what a document may be handed to
+WHERE = "give `--to` (the flight's agent socket) or `--output`"
+
+
+def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: int) -> Bundle:
+    """The bundle that flies, verified, with the replacements that were put into force since.
+
+    Whoever signs must know what it is about. Raises `Untrusted` and OSError.
+    """
+    trusted = _root(root, now_us)
+    found = open_bundle(_read(bundle, MAX_BUNDLE), root=trusted, vehicle=None, now_us=now_us)
+    vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
+    for path in replacements:
+        document = _read(path, MAX_DOCUMENT)
+        newer = open_replacement(document, root=trusted, vehicle=vehicle, bundle=found, now=now)
+        found = fit_replacement(newer, found, released=0)
+    return found
+
+
+def refuse(error: Untrusted) -> ExitCode:
+    """How a command ends that was given what is not to be trusted."""
+    help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
+    return fail(ExitCode.UNTRUSTED, str(error), help)
+
+
+def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:
+    """Write a document, or hand it to the flight, and say what became of it. Raises OSError."""
+    if output is not None:
+        handle = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, PRIVATE_FILE)
+        with os.fdopen(handle, "wb") as file:
+            file.write(document)
+    if to is None:
+        return _say(ExitCode.OK, "written", f"{what}, written to {output}", as_json=as_json)
+    said = hand_in(to, document)
+    code = ExitCode.OK if said.slug == "accepted" else ExitCode.REFUSED
+    text = f"{what}: {said.text}" if code is ExitCode.OK else f"the flight refused it: {said.text} ({said.slug})"
+    return _say(code, said.slug, text, as_json=as_json)
+
+
+def _say(code: ExitCode, slug: str, text: str, *, as_json: bool) -> ExitCode:
+    if as_json:
+        print(json.dumps({"slug": slug, "text": text, "exit": code.slug}, ensure_ascii=False))
+    elif code is ExitCode.OK:
+        print(text)
+    else:
+        return fail(code, text)
+    return code
+
+
+def _root(path: Path | None, now_us: int) -> TrustRoot:
+    """The key store's root, or the one that was named, which is trusted for being named."""
+    signed = KeyStore(data_folder()).root() if path is None else read_root(path)
+    return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
+
+
+def _read(path: Path, most: int) -> bytes:
+    with path.open("rb") as file:
+        return file.read(most + 1)

@@ -1,0 +1,108 @@
+"""`rtshcua run --dry-run`: listen to the vehicle, decide the whole mission against the present, and send no motion."""
+
+import time
+from collections.abc import Sequence
+
+import msgspec
+
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.showing.page import Page, for_terminal
+from rtshcua.cli.showing.why import would_pass
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Event, Readings, Ready
+from rtshcua.onboard.rehearsal import Rehearsed, rehearse
+from rtshcua.onboard.runtime.monitor import StateMonitor
+
+#: how long the vehicle may take to be ready, in seconds of the machine,
+READY_S = 60.0
+#: and then for a signal that it has not told yet
+TOLD_S = 3.0
+
+_POLL_S = 0.05
+
+
+def dry_run(
+    loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts, events: Sequence[Event],
+    *, as_json: bool,
+) -> ExitCode:  # fmt: skip
+    """Rehearse the mission on the vehicle as it stands. `events` came while it was met."""
+    monitor = StateMonitor(loaded.policy)
+    ready, begun_s = False, time.monotonic()
+    until_s = begun_s + READY_S
+    while time.monotonic() < until_s:
+        if interrupts.wish() is not None:
+            return ExitCode.INTERRUPTED
+        for event in events:
+            if isinstance(event, Readings):
+                monitor.update(event)
+            elif isinstance(event, Ready):
+                ready, until_s = True, time.monotonic() + TOLD_S
+        now = clock.now()
+        monitor.observe(now)
+        if ready and None not in monitor.state(now.monotonic_us).values:
+            break
+        events = vehicle.poll(now.monotonic_us, clock.us_in(_POLL_S))
+    now = clock.now()
+    found = rehearse(loaded, monitor.state(now.monotonic_us), now)
+    unready = None if ready else (vehicle.driver.unready or "it did not say that it is")
+    code = ExitCode.OK if ready and all(each.hopeful for each in found) else ExitCode.REFUSED
+    if as_json:
+        print(msgspec.json.encode(_object(loaded, found, unready, code)).decode())
+    else:
+        print(_page(loaded, found, unready))
+    return code
+
+
+def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None) -> Page:
+    mission, page = loaded.bundle.mission, for_terminal()
+    page.head(f"Rehearsal of {mission.name} on {loaded.vehicle}: nothing is sent, nothing is used up")
+    if unready is not None:
+        page.row("not ready", unready)
+    for each in found:
+        invocation, decision = mission.invocations[each.step], each.decision
+        outcome = decision.outcome.name.lower()
+        page.text(f"{each.step:>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {invocation.text}")
+        if decision.outcome is not Outcome.ALLOW:
+            clause = "" if decision.clause is None else f": `{decision.clause.text}`"
+            page.row("because", f"{decision.reason.value}{clause}", indent=7, width=10)
+            page.rows("would pass", [would_pass(one) for one in each.nearest], indent=7, width=10)
+    page.text("")
+    waits = sum(each.hopeful and each.decision.outcome is not Outcome.ALLOW for each in found)
+    admitted = sum(each.decision.outcome is Outcome.ALLOW for each in found)
+    others = len(found) - admitted - waits
+    page.text(f"{admitted} of {len(found)} steps admitted, {waits} waiting for what will come, {others} would not fly")
+    page.text("(a later step is judged where those before it end, with all else as it is now)")
+    return page
+
+
+def _object(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, code: ExitCode) -> dict[str, object]:
+    mission = loaded.bundle.mission
+    steps = []
+    for each in found:
+        invocation, decision = mission.invocations[each.step], each.decision
+        steps.append(
+            {
+                "step": each.step,
+                "phase": mission.phases[invocation.phase],
+                "text": invocation.text,
+                "outcome": decision.outcome.name.lower(),
+                "reason": decision.reason.value,
+                "clause": None if decision.clause is None else decision.clause.text,
+                "target": None if decision.target is None else decision.target.text,
+                "nearest": [one._asdict() for one in each.nearest],
+                "hopeful": each.hopeful,
+            }
+        )
+    return {
+        "event": "rehearsal",
+        "mission": mission.name,
+        "vehicle": loaded.vehicle,
+        "ready": unready is None,
+        "unready": unready,
+        "steps": steps,
+        "exit_code": int(code),
+    }

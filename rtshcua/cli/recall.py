@@ -1,0 +1,55 @@
+"""`rtshcua recall`: call a flight home."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.documents import WHERE, deliver, refuse, subject
+from rtshcua.cli.faults import fail
+from rtshcua.cli.unlock import unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.document import MAX_LIFE_US
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.recall import RecallDocument, sign_recall
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_MOST_S = MAX_LIFE_US // 1_000_000
+
+
+@app.command()
+def recall(
+    bundle: Annotated[Path, typer.Argument(help="the bundle that flies")],
+    policy: Annotated[bool, typer.Option("--policy", help="all that fly under its policy on this vehicle")] = False,
+    seconds: Annotated[int, typer.Option("--for", min=1, max=_MOST_S, help="how many seconds the recall is good")]
+    = 300,
+    to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed recall here")] = None,
+    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    approval_key: Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:  # fmt: skip
+    """Call a flight home: the mission ends, and in the air the policy's contingency flies.
+
+    One for the mission reaches it also when it was replaced since.
+    """
+    if to is None and output is None:
+        return fail(ExitCode.USAGE, "the recall has to go somewhere", WHERE)
+    now_us = time.time_ns() // 1000
+    try:
+        flying = subject(bundle, [], root, now_us)
+        vehicle = flying.policy.vehicle.identity
+        digests = (b"", flying.policy_digest) if policy else (flying.mission_digest, b"")
+        said = RecallDocument(vehicle, *digests, now_us, now_us + seconds * 1_000_000)
+        key = unlock(KeyStore(data_folder()), Duty.APPROVAL, path=approval_key, passphrase_file=passphrase_file)
+        document = sign_recall(said, key)
+    except Untrusted as error:
+        return refuse(error)
+    name = f"all under `{flying.policy.name}`" if policy else f"`{flying.mission.name}`"
+    return deliver(document, f"recalled {name} on `{vehicle}`", to=to, output=output, as_json=as_json)

@@ -1,0 +1,83 @@
+"""`rtshcua compile --replaces`: a mission signed for a flight that is under way."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.documents import subject
+from rtshcua.cli.findings import Findings
+from rtshcua.cli.unlock import unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.bundle import policy_digest, policy_payload
+from rtshcua.wire.document import MAX_DOCUMENT, DocumentError
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.replacement import sign_replacement
+from rtshcua.wire.untrusted import Untrusted
+
+_SAME_POLICY = "a replacement flies under the policy in force: compile it with the same sources of the policy"
+
+
+class Replacing(NamedTuple):
+    """What was asked for: the bundle and its replacements so far, the first step that changes, and where it goes."""
+
+    replaces: list[Path]
+    first: int
+    root: Path | None
+    mission_key: Path | None
+    passphrase_file: Path | None
+    issued_at_us: int
+    target: Path
+
+
+def replace_with(
+    policy: Policy, mission: Mission, order: Replacing, store: KeyStore, findings: Findings, *, quiet: bool
+) -> ExitCode:
+    """Sign a compiled mission as the replacement of another, if it leaves alone what stays. The policy stays too."""
+    try:
+        over = subject(order.replaces[0], order.replaces[1:], order.root, order.issued_at_us)
+        if policy_digest(policy_payload(policy)) != over.policy_digest:
+            text = f"the sources make another policy than the `{over.policy.name}@{over.policy.version}` that is flown"
+            return findings.refuse(ExitCode.REFUSED, "wrong-policy", text, _SAME_POLICY)
+        key = unlock(store, Duty.MISSION, path=order.mission_key, passphrase_file=order.passphrase_file)
+        document = sign_replacement(mission, over=over, kept=order.first, key=key)
+    except DocumentError as error:
+        return findings.refuse(ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` stay as they fly")
+    except Untrusted as error:
+        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
+        return findings.refuse(ExitCode.UNTRUSTED, error.slug, str(error), help)
+    if len(document) > MAX_DOCUMENT:
+        text = f"the replacement has {len(document)} bytes, and a flight reads {MAX_DOCUMENT} at most"
+        return findings.refuse(ExitCode.REFUSED, "too-large", text)
+    write_whole(order.target, document)
+    steps = len(mission.invocations)
+    if not quiet:
+        print(f"{mission.name}: {steps} steps, new from {order.first}, signed into {order.target}")
+    return findings.finish(
+        ExitCode.OK,
+        replacement={
+            "path": str(order.target),
+            "bytes": len(document),
+            "mission": mission.name,
+            "supersedes": over.mission_digest.hex(),
+            "from": order.first,
+            "steps": steps,
+            "mission_key": key.kid.hex(),
+        },
+    )
+
+
+def write_whole(target: Path, data: bytes) -> None:
+    """Write the whole file or nothing: a full disk leaves no half of one under its name."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(name).chmod(0o644)
+        Path(name).replace(target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

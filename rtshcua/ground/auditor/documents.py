@@ -1,0 +1,41 @@
+"""Approvals, recalls and replacements of a log: each is verified again, as of when it came, before it counts."""
+
+from typing import Final
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.records import Effect
+from rtshcua.ground.auditor.derive import Deriver
+from rtshcua.ground.auditor.trust import Basis, octets
+from rtshcua.model.flat.situation import Now
+from rtshcua.wire.receipt import APPROVAL, RECALL, REPLACEMENT
+
+_KINDS: Final = {"approval": APPROVAL, "recall": RECALL, "replacement": REPLACEMENT}
+
+
+class Documents:
+    """Follows the documents that a log says were accepted. `counts` has how many there were of each kind."""
+
+    def __init__(self, basis: Basis, deriver: Deriver) -> None:
+        self._basis = basis
+        self._deriver = deriver
+        self.counts = dict.fromkeys(_KINDS, 0)
+
+    def check(self, record: Effect) -> Flaw | None:
+        """What is wrong with an effect, if it is a document."""
+        kind = _KINDS.get(record.event)
+        if kind is None:
+            return None
+        document = octets(record.detail)
+        if document is None:
+            return Flaw("document/base64", f"the {record.event} is not canonical base64")
+        now = Now(record.at_us, record.utc_us, record.utc_error_us)
+        deriver = self._deriver
+        receipt = self._basis.in_force.take(document, now, decided=deriver.decided, released=deriver.released)
+        if not receipt.accepted:
+            return Flaw(f"document/{receipt.slug}", f"the {record.event} was not to be trusted: {receipt.text}")
+        if receipt.kind != kind or receipt.step != record.step:
+            return Flaw("document/other", f"the document is not the {record.event} that its record says it is")
+        if kind == REPLACEMENT:
+            deriver.replaced(receipt.step)
+        self.counts[record.event] += 1
+        return None

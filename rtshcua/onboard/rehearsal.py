@@ -1,0 +1,80 @@
+"""The rehearsal: every step of a loaded bundle is decided against the present state, and nothing is sent or used up.
+
+The first step is decided as it would be now. A later one is decided as if those before it had flown: position and
+height are where their plans end, everything else is as it is now. Each is taken to be released at this moment, in its
+own phase, under the conservative `L_rem`, with no approval given.
+"""
+
+from typing import Final, NamedTuple
+
+from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.nearest import Nearest, nearest
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Plan
+from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US
+
+#: a deferral that ends by itself once the mission is under way,
+_COMES: Final = frozenset({Reason.AWAITING_APPROVAL, Reason.PHASE_NOT_REACHED})
+#: and in a later step also what is not known before the vehicle flies
+_COMES_LATER: Final = _COMES | {Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN}
+
+
+class Rehearsed(NamedTuple):
+    """One step, what is decided on it, and what would have passed. `hopeful`: admitted, or waits for what will come."""
+
+    step: int
+    decision: Decision
+    nearest: tuple[Nearest, ...]
+    hopeful: bool
+
+
+def rehearse(loaded: Loaded, state: State, now: Now) -> tuple[Rehearsed, ...]:
+    """Decide every step of the mission in force. Changes nothing."""
+    policy = loaded.policy
+    found: list[Rehearsed] = []
+    for prepared in loaded.invocations:
+        invocation = prepared.invocation
+        context = Context(
+            invocation.binding,
+            loaded.vehicle,
+            policy.policy.version,
+            0,
+            now.monotonic_us,
+            invocation.phase,
+            CONSERVATIVE_US,
+            (),
+        )
+        decision = decide(prepared, state, policy, context, now)
+        would = () if decision.outcome is Outcome.ALLOW else nearest(decision, prepared, state, policy, now)
+        comes = _COMES_LATER if invocation.step else _COMES
+        hopeful = decision.outcome is Outcome.ALLOW or (decision.outcome is Outcome.DEFER and decision.reason in comes)
+        found.append(Rehearsed(invocation.step, decision, would, hopeful))
+        state = flown(state, invocation.plan, policy.policy.vehicle)
+    return tuple(found)
+
+
+def flown(state: State, plan: Plan, vehicle: Vehicle) -> State:
+    """The state with position and height where a plan ends, fresh; what was never reported stays unknown."""
+    there: dict[int, int] = {}
+    match plan.kind:
+        case MotionKind.CLIMB:
+            there[vehicle.height] = plan.altitude
+        case MotionKind.FLY | MotionKind.COVER:
+            there |= _at(vehicle, plan.path[-2], plan.path[-1], plan.altitude)
+        case MotionKind.HOME:
+            there |= _at(vehicle, 0, 0, 0)
+        case MotionKind.LAND:
+            there[vehicle.height] = 0
+    known = {slot: value for slot, value in there.items() if slot >= 0 and state.values[slot] is not None}
+    values = tuple(known.get(slot, value) for slot, value in enumerate(state.values))
+    ages = tuple(0 if slot in known else age for slot, age in enumerate(state.ages))
+    return State(values, ages, state.monitors)
+
+
+def _at(vehicle: Vehicle, x: int, y: int, height: int) -> dict[int, int]:
+    east = vehicle.position
+    return {east: x, east + 1: y, vehicle.height: height} if east >= 0 else {vehicle.height: height}

@@ -1,0 +1,128 @@
+"""Approvals: a person's signed answer to the `confirm` rules that ask for one, about one step of one mission.
+
+It names the step by its invocation's id and binding, so it means nothing for any other step, mission or flight. The key
+must have duty `approval`, and the root must let it speak for the role in person on this vehicle.
+"""
+
+from typing import NamedTuple
+
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Policy, Rule, RuleKind
+from rtshcua.model.flat.situation import Approval, Now
+from rtshcua.model.flat.struct import Flat
+from rtshcua.wire import names
+from rtshcua.wire.bundle import parse
+from rtshcua.wire.document import DocumentError, check_person, check_times, open_document, sign_document
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot
+
+
+class ApprovalDocument(Flat, frozen=True):
+    """What a person signs: `granted` 1 or 0 for `role`, from `issued_at_us` until `expires_at_us` (UTC)."""
+
+    invocation_id: bytes
+    binding: bytes
+    vehicle: str
+    role: str
+    granted: int
+    issued_at_us: int
+    expires_at_us: int
+
+
+class Answered(NamedTuple):
+    """A verified answer: the step and the role by their numbers, `monotonic_us` when it came, `expires_us` UTC."""
+
+    step: int
+    role: int
+    granted: int
+    monotonic_us: int
+    expires_us: int
+
+
+def sign_approval(approval: ApprovalDocument, key: SigningKey) -> bytes:
+    """The signed document. Raises `WrongDuty` for a key of another duty."""
+    return sign_document(names.APPROVAL, approval, key, Duty.APPROVAL)
+
+
+def open_approval(
+    document: bytes, *, root: TrustRoot, vehicle: str, policy: Policy, mission: Mission, now: Now
+) -> Answered:
+    """What a signed approval answers, if it is to be trusted here and now, about a step of the mission in force.
+
+    Raises `DocumentError`: its own slugs are `wrong-vehicle`, `unknown-invocation`, `binding-mismatch`, `not-asked`;
+    and `EnvelopeError`, `BundleError` and `ArtefactError`.
+    """
+    opened = open_document(document, names.APPROVAL, Duty.APPROVAL, root, now)
+    said = parse(names.APPROVAL, opened.payload, ApprovalDocument)
+    if said.granted not in (0, 1):
+        raise DocumentError("malformed", "it neither grants nor refuses")
+    if said.vehicle != vehicle:
+        raise DocumentError("wrong-vehicle", f"it is for `{said.vehicle[:80]}`, this vehicle is `{vehicle}`")
+    check_person(opened.key, said.role, vehicle, now)
+    check_times(said.issued_at_us, said.expires_at_us, now)
+    invocation = next((each for each in mission.invocations if each.invocation_id == said.invocation_id), None)
+    if invocation is None:
+        raise DocumentError("unknown-invocation", "it is about no step of the mission in force")
+    if invocation.binding != said.binding:
+        raise DocumentError("binding-mismatch", f"it was made for another step {invocation.step} than the one in force")
+    role = policy.roles.index(said.role) if said.role in policy.roles else -1
+    if role < 0 or not confirms(policy, invocation, role):
+        text = f"no `confirm` of the policy asks role `{said.role[:80]}` about step {invocation.step}"
+        raise DocumentError("not-asked", text)
+    return Answered(invocation.step, role, said.granted, now.monotonic_us, said.expires_at_us)
+
+
+def confirms(policy: Policy, invocation: Invocation, role: int) -> tuple[int, ...]:
+    """The numbers of the `confirm` rules that may ask this role about an invocation, whatever their conditions say."""
+    return tuple(
+        number for number, rule in enumerate(policy.rules) if rule.approver == role and _concerns(rule, invocation)
+    )
+
+
+def _concerns(rule: Rule, invocation: Invocation) -> bool:
+    return (
+        rule.kind == RuleKind.CONFIRM
+        and invocation.skill in (rule.skills or (invocation.skill,))
+        and invocation.role in (rule.roles or (invocation.role,))
+        and invocation.source in (rule.sources or (invocation.source,))
+    )
+
+
+class Approvals:
+    """The verified answers of one flight, and what a decision is told of them.
+
+    What is kept is bounded: one grant and one refusal for each step and role. A grant counts until it expires; a
+    refusal counts for good.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self._answers: dict[tuple[int, int, int], Answered] = {}
+
+    def add(self, answered: Answered, now: Now) -> bool:
+        """Take an answer in; False for one that is there already, which changes nothing."""
+        key = (answered.step, answered.role, answered.granted)
+        held = self._answers.get(key)
+        if held is not None and _counts(held, now):
+            return False
+        self._answers[key] = answered
+        return True
+
+    def forget(self, first: int) -> None:
+        """The steps from `first` on were replaced: nobody has answered about what stands there now."""
+        self._answers = {key: answered for key, answered in self._answers.items() if answered.step < first}
+
+    def about(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
+        """What `decide` reads of them: one entry for each answer that counts and each rule that it answers."""
+        if not self._answers:
+            return ()
+        return tuple(
+            Approval(rule, answered.role, answered.granted, answered.monotonic_us)
+            for answered in self._answers.values()
+            if answered.step == invocation.step and _counts(answered, now)
+            for rule in confirms(self._policy, invocation, answered.role)
+        )
+
+
+def _counts(answered: Answered, now: Now) -> bool:
+    return not answered.granted or now.utc_us + now.utc_error_us < answered.expires_us

@@ -1,0 +1,66 @@
+"""Recalls: a person's signed order to bring a vehicle home, which ends a mission and starts none.
+
+It names one mission by its digest, or all that fly under one policy. The key must have duty `approval`, and the root
+must let it speak in person on this vehicle, for whatever role.
+"""
+
+from collections.abc import Collection
+
+from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.struct import Flat
+from rtshcua.wire import names
+from rtshcua.wire.bundle import parse
+from rtshcua.wire.document import HUMAN, DocumentError, check_key, check_times, open_document, sign_document
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot
+
+
+class RecallDocument(Flat, frozen=True):
+    """What a person signs. One of the digests of mission and policy is given, the other is empty. Times are UTC, us."""
+
+    vehicle: str
+    mission: bytes
+    policy: bytes
+    issued_at_us: int
+    expires_at_us: int
+
+
+def sign_recall(recall: RecallDocument, key: SigningKey) -> bytes:
+    """The signed document. Raises `WrongDuty` for a key of another duty."""
+    return sign_document(names.RECALL, recall, key, Duty.APPROVAL)
+
+
+def open_recall(
+    document: bytes,
+    *,
+    root: TrustRoot,
+    vehicle: str,
+    missions: Collection[bytes],
+    policy: bytes,
+    issued_at_us: int,
+    now: Now,
+) -> RecallDocument:
+    """A recall that is to be trusted here and now, for a flight of `missions` (the one that was opened and those that
+    replaced it) under the policy of that digest.
+
+    One for a whole policy does not reach a mission that was issued (`issued_at_us`) after it. Raises `DocumentError`:
+    its own slugs are `wrong-vehicle`, `wrong-source`, `key-expired`, `other-mission`, `other-policy`,
+    `before-mission`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
+    """
+    opened = open_document(document, names.RECALL, Duty.APPROVAL, root, now)
+    said = parse(names.RECALL, opened.payload, RecallDocument)
+    if bool(said.mission) == bool(said.policy):
+        raise DocumentError("malformed", "a recall names either a mission or a policy")
+    if said.vehicle != vehicle:
+        raise DocumentError("wrong-vehicle", f"it is for `{said.vehicle[:80]}`, this vehicle is `{vehicle}`")
+    check_key(opened.key, vehicle, now)
+    if HUMAN not in opened.key.sources:
+        raise DocumentError("wrong-source", f"key {opened.kid.hex()} may not speak in person")
+    check_times(said.issued_at_us, said.expires_at_us, now)
+    if said.mission and said.mission not in missions:
+        raise DocumentError("other-mission", "it recalls another mission than the one that flies")
+    if said.policy and said.policy != policy:
+        raise DocumentError("other-policy", "it recalls what flies under another policy")
+    if said.policy and said.issued_at_us < issued_at_us:
+        raise DocumentError("before-mission", "it recalls what flew under the policy before this mission was issued")
+    return said

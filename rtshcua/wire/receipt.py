@@ -1,0 +1,49 @@
+"""Receipts: what the boundary answers to a document that was presented to it."""
+
+from typing import Final
+
+import msgspec
+
+from rtshcua.wire import artefact, names
+from rtshcua.wire.artefact import ArtefactError
+from rtshcua.wire.response import Unusable
+
+#: what a document was
+UNKNOWN, APPROVAL, RECALL, REPLACEMENT = range(4)
+#: the slug of a document that took effect
+ACCEPTED: Final = "accepted"
+
+
+class Receipt(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What became of a document: `slug` is `accepted` or why it was refused, `text` is for a person.
+
+    Of an accepted approval: `step`, `role` (its number), `granted`, and `expires_us` (UTC). Of an accepted replacement:
+    `step`, the first that changed.
+    """
+
+    kind: int
+    slug: str
+    text: str
+    step: int = -1
+    role: int = -1
+    granted: int = -1
+    expires_us: int = 0
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it took effect."""
+        return self.slug == ACCEPTED
+
+
+def encode(receipt: Receipt) -> bytes:
+    """The octets of a receipt."""
+    return artefact.wrap(names.RECEIPT, msgspec.to_builtins(receipt))
+
+
+def decode(data: bytes) -> Receipt | Unusable:
+    """Read a receipt. Raises nothing."""
+    try:
+        receipt = msgspec.convert(artefact.unwrap(names.RECEIPT, data), Receipt)
+    except (ArtefactError, msgspec.ValidationError) as error:
+        return Unusable(str(error))
+    return receipt if encode(receipt) == data else Unusable("not the octets that this receipt encodes to")

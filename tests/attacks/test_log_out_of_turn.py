@@ -1,0 +1,103 @@
+"""Logs of whoever holds the log key, and flew what the executor and the boundary would not: each record is as it should
+be, and what is false is the order, or what is not there.
+"""
+
+from functools import cache
+
+import pytest
+
+from reference.forgery import edit, expect, read, signed
+from reference.world import LOG_KEY, ROOT_KEY, Run, loaded
+
+STEP, FALLBACK, CONTINGENCY = 0, 1, 2
+
+
+@cache
+def flight() -> tuple[bytes, ...]:
+    """The whole mission, as it should be."""
+    run = Run(loaded()).until_over()
+    return (*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None))
+
+
+def number(event: str, step: int) -> int:
+    return next(
+        at for at, line in enumerate(flight()) if read(line).get("event") == event and read(line).get("step") == step
+    )
+
+
+def sent_after(at: int, *links: tuple[int, int, int, str]) -> list[bytes]:
+    """The flight with these sent after record `at`."""
+    moment = {key: read(flight()[at])[key] for key in ("at_us", "utc_us")}
+    example = flight()[number("dispatched", 1)]
+    more = [
+        edit(example, kind=kind, step=step, link=link, detail=skill, token=900 + each, **moment)
+        for each, (kind, step, link, skill) in enumerate(links)
+    ]
+    return [*flight()[: at + 1], *more, *flight()[at + 1 :]]
+
+
+def found(lines: list[bytes]) -> tuple[str, int]:
+    return expect(signed(lines, LOG_KEY), ROOT_KEY.public)
+
+
+@pytest.mark.parametrize("left_out", [(0,), (1,), (0, 1), (2,)])
+def test_a_step_that_nobody_decided(left_out: tuple[int, ...]) -> None:
+    lines = [line for line in flight() if read(line).get("step") not in left_out]
+    later = next(at for at, line in enumerate(lines) if read(line).get("step", -1) > max(left_out))
+    assert found(lines) == ("decision/not-current", later)
+
+
+def test_a_step_that_was_sent_while_another_ran() -> None:
+    lines = [line for at, line in enumerate(flight()) if at != number("succeeded", 0)]
+    assert found(lines) == ("dispatch/out-of-turn", number("dispatched", 1) - 1)
+    ended = edit(flight()[number("succeeded", 0)], event="replaced")
+    lines = [ended if at == number("succeeded", 0) else line for at, line in enumerate(flight())]
+    assert found(lines) == ("dispatch/out-of-turn", number("dispatched", 1))
+
+
+@pytest.mark.parametrize("link", [(CONTINGENCY, -1, 2, "emergency_land"), (FALLBACK, 1, 1, "return_home")])
+def test_a_mission_that_went_on_after_it_was_brought_home(link: tuple[int, int, int, str]) -> None:
+    slug, record = found(sent_after(number("succeeded", 1), link))
+    assert (slug, record) == ("dispatch/mission-over", number("dispatched", 2) + 1)
+
+
+@pytest.mark.parametrize(
+    "links",
+    [
+        ((CONTINGENCY, -1, 2, "emergency_land"), (CONTINGENCY, -1, 0, "hover")),
+        ((CONTINGENCY, -1, 2, "emergency_land"), (FALLBACK, 1, 0, "hover")),
+        ((FALLBACK, 1, 1, "return_home"), (FALLBACK, 1, 0, "hover")),
+        ((FALLBACK, 1, 0, "hover"), (FALLBACK, 1, 0, "hover")),
+    ],
+)
+def test_a_chain_that_went_backwards(links: tuple[tuple[int, int, int, str], ...]) -> None:
+    at = number("succeeded", 1)
+    assert found(sent_after(at, *links)) == ("dispatch/backwards", at + 2)
+
+
+def test_the_chain_of_a_step_that_is_over() -> None:
+    at = number("succeeded", 1)
+    assert found(sent_after(at, (FALLBACK, 0, 0, "emergency_land"))) == ("dispatch/lapsed", at + 1)
+
+
+@pytest.mark.parametrize(
+    "link",
+    [
+        (CONTINGENCY, -1, 77, "hover"),
+        (CONTINGENCY, -1, -5, "hover"),
+        (CONTINGENCY, 1, 0, "hover"),
+        (CONTINGENCY, -1, 0, "goto"),
+        (FALLBACK, 1, 77, "hover"),
+        (FALLBACK, 1, 0, "goto"),
+        (FALLBACK, 1, -5, "hover"),
+    ],
+)
+def test_what_the_bundle_does_not_have(link: tuple[int, int, int, str]) -> None:
+    at = number("succeeded", 1)
+    assert found(sent_after(at, link)) == ("dispatch/other-skill", at + 1)
+
+
+def test_a_step_under_the_name_of_another() -> None:
+    at = number("dispatched", 1)
+    lines = [edit(line, detail="hover") if each == at else line for each, line in enumerate(flight())]
+    assert found(lines) == ("dispatch/other-skill", at)

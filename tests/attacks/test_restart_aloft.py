@@ -1,0 +1,53 @@
+"""A program that died in the air comes back: whatever happens before it knows more, the vehicle is brought down."""
+
+import pytest
+
+from reference.documents import low, recall
+from reference.flat_case import S
+from reference.world import FakeVehicle, Run, assert_audited, renewed
+from rtshcua.onboard.ports import AirState, Ending, Event, EvidenceFailed, Interrupted, Presented
+from rtshcua.onboard.runtime.flight import Limits
+
+OF = low()
+
+
+def back() -> Run:
+    """A new run of a bundle that flies already; nothing was heard yet."""
+    return Run(renewed(OF), FakeVehicle(armed=True, airborne=True), resumed=True, ready=False)
+
+
+@pytest.mark.parametrize(
+    ("event", "ending"),
+    [
+        (Interrupted(0), Ending.INTERRUPTED),
+        (EvidenceFailed(0, "the disk is full"), Ending.EVIDENCE_LOST),
+        (Presented(0, recall(OF)), Ending.RECALLED),
+    ],
+)
+def test_what_ends_the_run_before_it_is_known_whether_it_flies(event: Event, ending: Ending) -> None:
+    run = back()
+    run.tick(event)
+    run.tick(AirState(0, True, True))
+    run.until_over()
+    assert run.flown[-1] in ("return_home", "emergency_land")
+    assert run.ending is ending
+    assert_audited(run)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_one_that_never_counts_as_ready_comes_down_too(known: bool) -> None:
+    run = Run(
+        renewed(OF), FakeVehicle(armed=True, airborne=True), limits=Limits(ready_us=2 * S), resumed=True, ready=False
+    )
+    if known:
+        run.tick(AirState(0, True, True))
+    run.until_over()
+    assert run.flown[-1] in ("return_home", "emergency_land")
+
+
+def test_one_that_is_on_the_ground_is_left_there() -> None:
+    run = Run(renewed(OF), resumed=True, ready=False)
+    run.tick(AirState(0, False, False))
+    run.tick(Interrupted(0))
+    assert run.ending is Ending.INTERRUPTED
+    assert run.flown == []

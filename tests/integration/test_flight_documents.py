@@ -1,0 +1,115 @@
+"""Documents on whole flights in virtual time: it waits in the air for an answer, replans, and is called home."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from rtshcua.cli.sources import compile_sources
+from rtshcua.evidence.report import Verdict
+from rtshcua.model.flat.mission import Mission
+from rtshcua.onboard.ports import Ending, Event, Presented
+from rtshcua.wire.approval import ApprovalDocument, sign_approval
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.recall import RecallDocument, sign_recall
+from rtshcua.wire.replacement import sign_replacement
+from virtual import case
+from virtual.flight import Flight, Flown
+
+S = case.S
+MISSION = """import "lib:policies/bridge_inspection.rts"
+
+mission low under bridge_inspection@7 on quad {
+  intent "Low under the bridge, when a supervisor agrees."
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 9 m) }
+  phase inspection {
+    goto(bridge_a.entry, altitude = 9 m)
+    WORK
+  }
+  phase recovery { return_home() }
+}
+"""
+ASKED = 2
+
+
+def compiled(folder: Path, work: str) -> tuple[Mission, bytes]:
+    source = folder / "low.rts"
+    source.write_text(MISSION.replace("WORK", work))
+    found, _ = compile_sources([source], mission=None, issued_at_us=case.flat.ISSUED)
+    assert found.mission is not None, found.diagnostics
+    return found.mission, case.seal(found.mission, found.policy)
+
+
+@pytest.fixture(scope="module")
+def low(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return compiled(tmp_path_factory.mktemp("low"), "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)")[1]
+
+
+@pytest.fixture(scope="module")
+def shorter(tmp_path_factory: pytest.TempPathFactory) -> Mission:
+    return compiled(tmp_path_factory.mktemp("shorter"), "hover(5 s)")[0]
+
+
+def fly(bundle: bytes, flavour: str, when: str, document: Callable[[Flight], bytes]) -> Flown:
+    """Fly, and hand the document in 2 s after a record with these words; the log verifies."""
+    flight = Flight(bundle, case.simulated(flavour))
+    since: list[int] = []
+
+    def each(flight: Flight) -> Sequence[Event]:
+        now_us = flight.clock.elapsed_us
+        if not since and any(when.encode() in line for line in flight.sink.lines[1:]):
+            since.append(now_us)
+        if len(since) == 1 and now_us - since[0] >= 2 * S:
+            since.append(now_us)
+            return [Presented(now_us, document(flight), 1)]
+        return ()
+
+    flown = flight.fly(each)
+    assert len(since) == 2, "it was never handed in"
+    audit = flown.audit()
+    assert audit.report.verdict is Verdict.VERIFIED, audit.report
+    return flown
+
+
+def approval(flight: Flight, granted: int = 1) -> bytes:
+    step = flight.loaded.bundle.mission.invocations[ASKED]
+    utc_us = flight.clock.now().utc_us
+    said = ApprovalDocument(step.invocation_id, step.binding, "quad-07", "supervisor", granted, utc_us, utc_us + 60 * S)
+    return sign_approval(said, case.KEYS[Duty.APPROVAL])
+
+
+def test_it_waits_in_the_air_for_an_approval(low: bytes) -> None:
+    flown = fly(low, "px4", "approval/awaited", approval)
+    assert flown.ending is Ending.COMPLETED
+    assert flown.dispatched() == ["takeoff", "goto", "hover", "inspect_area", "return_home"]
+    assert [(step, outcome) for step, outcome, _ in flown.decisions() if step == ASKED] == [(2, "defer"), (2, "allow")]
+
+
+def test_a_refusal_brings_it_home(low: bytes) -> None:
+    flown = fly(low, "ardupilot", "approval/awaited", lambda flight: approval(flight, 0))
+    assert flown.ending is Ending.ABORTED
+    assert "inspect_area" not in flown.dispatched()
+    assert flown.decisions()[-1] == (2, "deny", "approval/refused")
+
+
+def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
+    def document(flight: Flight) -> bytes:
+        return sign_replacement(shorter, over=flight.loaded.bundle, kept=2, key=case.KEYS[Duty.MISSION])
+
+    flown = fly(low, "ardupilot", '"detail":"goto"', document)
+    assert flown.ending is Ending.COMPLETED
+    assert flown.dispatched() == ["takeoff", "goto", "hover", "return_home"]
+
+
+def test_a_recall_brings_it_home_by_the_contingency(low: bytes) -> None:
+    def document(flight: Flight) -> bytes:
+        utc_us = flight.clock.now().utc_us
+        said = RecallDocument("quad-07", flight.loaded.bundle.mission_digest, b"", utc_us, utc_us + 60 * S)
+        return sign_recall(said, case.KEYS[Duty.APPROVAL])
+
+    flown = fly(low, "px4", '"detail":"goto"', document)
+    assert flown.ending is Ending.RECALLED
+    assert flown.dispatched()[:2] == ["takeoff", "goto"]
+    assert {record["kind"] for record in flown.effects("dispatched")[2:]} == {2}
+    assert not flown.vehicle.simulation.truth().in_air

@@ -1,0 +1,85 @@
+"""A mission whose inspection asks a supervisor first, and documents for flights in the world of `world`."""
+
+from typing import Any
+
+from msgspec.structs import replace
+
+from reference.flat_case import BRIDGE, DEPARTURE, GOTO, INSPECT, INSPECTION, MISSION, PATH, TAKEOFF, M, S, invocation
+from reference.world import APPROVAL_KEY, MISSION_KEY, START, VEHICLE, Run, loaded
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Mission, Plan
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Presented, Reply
+from rtshcua.wire.approval import ApprovalDocument, sign_approval
+from rtshcua.wire.keys import SigningKey
+from rtshcua.wire.recall import RecallDocument, sign_recall
+from rtshcua.wire.receipt import Receipt, decode
+from rtshcua.wire.replacement import sign_replacement
+
+MIN = 60 * S
+LOW = 8 * M
+#: the step that the supervisor is asked about
+ASKED = 2
+
+
+def low_mission() -> Mission:
+    """The inspection is flown low, and so it must be confirmed."""
+    first = invocation(0, DEPARTURE, TAKEOFF, Plan(MotionKind.CLIMB, (), LOW, 0), LOW)
+    last = MISSION.invocations[-1]
+    goto = invocation(1, INSPECTION, GOTO, Plan(MotionKind.FLY, PATH[:2], LOW, 0), *PATH[:2], LOW)
+    inspect = invocation(ASKED, INSPECTION, INSPECT, Plan(MotionKind.COVER, PATH, LOW, 4 * M), BRIDGE, LOW, 0, 4 * M)
+    return replace(MISSION, invocations=(first, goto, inspect, last))
+
+
+def low() -> Loaded:
+    """That mission in force."""
+    return loaded(mission=low_mission())
+
+
+def approval(of: Loaded, step: int = ASKED, key: SigningKey = APPROVAL_KEY, now: Now = START, **changed: Any) -> bytes:
+    """The supervisor's signed approval of a step, but for what is `changed`."""
+    invocations = of.bundle.mission.invocations
+    said = ApprovalDocument(
+        invocation_id=invocations[step].invocation_id,
+        binding=invocations[step].binding,
+        vehicle=VEHICLE,
+        role="supervisor",
+        granted=1,
+        issued_at_us=now.utc_us,
+        expires_at_us=now.utc_us + 5 * MIN,
+    )
+    return sign_approval(replace(said, **changed), key)
+
+
+def recall(of: Loaded, key: SigningKey = APPROVAL_KEY, now: Now = START, **changed: Any) -> bytes:
+    """A signed recall of the mission, but for what is `changed`."""
+    said = RecallDocument(VEHICLE, of.bundle.mission_digest, b"", now.utc_us, now.utc_us + MIN)
+    return sign_recall(replace(said, **changed), key)
+
+
+def shorter(of: Loaded) -> Mission:
+    """The mission in force without its inspection."""
+    mission = of.bundle.mission
+    first, second, _, last = mission.invocations
+    return replace(mission, issued_at_us=mission.issued_at_us + S, invocations=(first, second, replace(last, step=2)))
+
+
+def replacement(of: Loaded, kept: int = 2, mission: Mission | None = None, key: SigningKey = MISSION_KEY) -> bytes:
+    """A signed replacement, by the mission without its inspection if nothing else is said."""
+    return sign_replacement(mission or shorter(of), over=of.bundle, kept=kept, key=key)
+
+
+def presented(of: Loaded, document: bytes, now: Now = START, released: int = 0) -> Receipt:
+    """What the boundary says to a document."""
+    receipt = decode(of.boundary.present(document, now, released))
+    assert isinstance(receipt, Receipt)
+    return receipt
+
+
+def hand(run: Run, document: bytes, sender: int = 1) -> str:
+    """Hand a document to a run; the slug of what it answers, or `over` where the run ended just before."""
+    replies = [action for action in run.tick(Presented(0, document, sender)) if isinstance(action, Reply)]
+    assert [reply.sender for reply in replies] == ([sender] if replies else [])
+    assert replies or run.ending is not None
+    return replies[0].slug if replies else "over"

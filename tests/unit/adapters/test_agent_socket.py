@@ -1,0 +1,231 @@
+"""The agent socket: who may use it, what goes out and comes in, and what never holds a flight up."""
+
+import json
+import socket
+import stat
+import threading
+from base64 import b64encode
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.agent_client import hand_in
+from rtshcua.adapters.agent_socket import GAP_US, LONGEST, MOST_READERS, MOST_WAITING, AgentSocket, SocketTaken
+from rtshcua.onboard.ports import Presented
+
+HELLO = b'{"type":"hello"}\n'
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A short path: a socket's has at most 107 bytes."""
+    import tempfile
+
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        yield Path(name)
+
+
+@pytest.fixture
+def agents(folder: Path) -> Iterator[AgentSocket]:
+    found = AgentSocket(folder / "s", lambda: HELLO)
+    yield found
+    found.close()
+
+
+def reader(agents: AgentSocket) -> socket.socket:
+    link = socket.socket(socket.AF_UNIX)
+    link.connect(str(agents.path))
+    link.settimeout(5)
+    return link
+
+
+def heard(link: socket.socket) -> list[bytes]:
+    """What has come in; every line is whole."""
+    data = link.recv(1 << 20)
+    assert data.endswith(b"\n")
+    return data.splitlines()
+
+
+def handed(document: bytes, number: int = 0) -> bytes:
+    return json.dumps({"id": number, "document": b64encode(document).decode()}).encode() + b"\n"
+
+
+def test_its_owner_alone_may_use_it(agents: AgentSocket) -> None:
+    mode = agents.path.stat().st_mode
+    assert stat.S_ISSOCK(mode)
+    assert stat.S_IMODE(mode) == 0o600
+
+
+def test_a_reader_is_greeted_and_told_every_line_from_then_on(agents: AgentSocket) -> None:
+    agents.tell(b"before\n")
+    with reader(agents) as link:
+        assert agents.poll(1) is None
+        agents.tell(b"one\n")
+        agents.tell(b"two\n")
+        assert heard(link) == [HELLO.strip(), b"one", b"two"]
+
+
+def test_a_document_comes_in_and_its_sender_alone_gets_the_answer(agents: AgentSocket) -> None:
+    with reader(agents) as one, reader(agents) as other:
+        one.sendall(handed(b"paper", 7))
+        event = agents.poll(5)
+        assert isinstance(event, Presented)
+        assert (event.at_us, event.document) == (5, b"paper")
+        agents.answer(event.sender, "accepted", "well")
+        agents.answer(event.sender, "accepted", "twice")
+        assert [json.loads(line) for line in heard(one)] == [
+            json.loads(HELLO), {"type": "answer", "id": 7, "slug": "accepted", "text": "well"}
+        ]  # fmt: skip
+        assert heard(other) == [HELLO.strip()]
+
+
+def test_one_document_of_each_reader_in_turn_and_no_more_than_the_flight_bears(agents: AgentSocket) -> None:
+    with reader(agents) as one, reader(agents) as other:
+        one.sendall(b"".join(handed(b"%d" % number) for number in range(3)))
+        other.sendall(handed(b"x"))
+        taken = [agents.poll(at_us) for at_us in range(0, 6 * GAP_US, GAP_US // 2)]
+        assert [event and event.document for event in taken[:8]] == [b"0", None, b"x", None, b"1", None, b"2", None]
+        assert not any(taken[8:])
+
+
+def test_a_line_may_come_in_pieces(agents: AgentSocket) -> None:
+    with reader(agents) as link:
+        line = handed(b"paper")
+        link.sendall(line[:10])
+        assert agents.poll(0) is None
+        link.sendall(line[10:])
+        event = agents.poll(0)
+        assert event is not None
+        assert event.document == b"paper"
+
+
+@pytest.mark.parametrize("line", [b"\n", b"{}\n", b"hello\n", b'{"document":"!!"}\n', b'{"document":"aGk=","x":1}\n',
+                                  b'{"document":7}\n', b"\xff\xfe\n", b"[" * 5000 + b"\n"])  # fmt: skip
+def test_what_is_no_such_line_is_answered_and_changes_nothing(agents: AgentSocket, line: bytes) -> None:
+    with reader(agents) as link:
+        link.sendall(line)
+        assert agents.poll(0) is None
+        assert json.loads(heard(link)[-1])["slug"] == "malformed"
+        assert agents.readers == 1
+
+
+def test_a_line_without_an_end_is_not_kept_for_ever(agents: AgentSocket) -> None:
+    with reader(agents) as link:
+        link.setblocking(False)
+        most = 0
+        for _ in range(200):
+            try:
+                link.send(b"x" * (1 << 16))
+            except BlockingIOError:
+                pass
+            except OSError:
+                break
+            agents.poll(0)
+            most += 1 << 16
+            if not agents.readers:
+                break
+        assert agents.readers == 0
+        assert most <= LONGEST + (1 << 18)
+
+
+def test_a_reader_that_takes_nothing_is_dropped_and_the_others_go_on(agents: AgentSocket) -> None:
+    line = b"y" * 4095 + b"\n"
+    with reader(agents) as slow, reader(agents) as good:
+        agents.poll(0)
+        assert agents.readers == 2
+        told = 0
+        while agents.readers == 2 and told < 4 * MOST_WAITING:
+            agents.tell(line)
+            told += len(line)
+            good.recv(1 << 20)
+        assert agents.readers == 1
+        assert told < 2 * MOST_WAITING
+        agents.tell(b"on\n")
+        assert good.recv(100) == b"on\n"
+        assert slow.fileno() >= 0
+
+
+def test_a_reader_that_hung_up_is_forgotten_with_what_it_waits_for(agents: AgentSocket) -> None:
+    link = reader(agents)
+    link.sendall(handed(b"paper"))
+    event = agents.poll(0)
+    assert event is not None
+    link.close()
+    agents.poll(GAP_US)
+    agents.answer(event.sender, "accepted", "nobody hears it")
+    assert agents.readers == 0
+
+
+def test_no_more_readers_than_that(agents: AgentSocket) -> None:
+    links = []
+    for _ in range(MOST_READERS + 2):
+        links.append(reader(agents))
+        agents.poll(0)
+    assert agents.readers == MOST_READERS
+    for link in links:
+        link.close()
+
+
+def test_a_path_that_is_listened_at_is_not_taken_away(agents: AgentSocket) -> None:
+    with pytest.raises(SocketTaken):
+        AgentSocket(agents.path, lambda: HELLO)
+    with reader(agents):
+        agents.poll(0)
+        assert agents.readers == 1
+
+
+def test_a_socket_that_a_crash_left_is_replaced_and_a_file_never_is(folder: Path) -> None:
+    left = socket.socket(socket.AF_UNIX)
+    left.bind(str(folder / "left"))
+    left.close()
+    again = AgentSocket(folder / "left", lambda: HELLO)
+    again.close()
+    again.close()
+    assert not (folder / "left").exists()
+    (folder / "file").write_text("mine")
+    with pytest.raises(SocketTaken):
+        AgentSocket(folder / "file", lambda: HELLO)
+    assert (folder / "file").read_text() == "mine"
+
+
+def test_a_path_that_no_socket_can_have(folder: Path) -> None:
+    with pytest.raises(OSError, match="at most 107 bytes"):
+        AgentSocket(folder / ("x" * 107), lambda: HELLO)
+
+
+def test_a_client_hands_in_and_waits_for_its_answer(agents: AgentSocket) -> None:
+    said: list[object] = []
+    client = threading.Thread(target=lambda: said.append(hand_in(agents.path, b"paper")))
+    client.start()
+    while client.is_alive():
+        agents.tell(b'{"type":"effect","seq":1}\n')
+        event = agents.poll(0)
+        if event is not None:
+            agents.answer(event.sender, "expired", event.document.decode())
+        client.join(0.001)
+    assert said == [("expired", "paper")]
+
+
+def test_a_client_of_nobody(folder: Path) -> None:
+    with pytest.raises(OSError, match="No such file") as raised:
+        hand_in(folder / "nothing", b"paper")
+    assert raised.value.filename == str(folder / "nothing")
+
+
+def test_a_client_of_a_flight_that_ends(agents: AgentSocket) -> None:
+    said: list[BaseException] = []
+
+    def client() -> None:
+        try:
+            hand_in(agents.path, b"paper")
+        except OSError as error:
+            said.append(error)
+
+    thread = threading.Thread(target=client)
+    thread.start()
+    while not agents.poll(0):
+        pass
+    agents.close()
+    thread.join(10)
+    assert isinstance(said[0], ConnectionError)

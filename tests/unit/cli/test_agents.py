@@ -1,0 +1,115 @@
+"""A whole run over the agent socket: an agent follows it, is refused, replans, and a person calls it home."""
+
+import json
+import socket
+import tempfile
+from base64 import b64encode
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from reference.documents import approval, low, recall, replacement
+from reference.world import Run
+from rtshcua.adapters.agent_socket import GAP_US
+from rtshcua.cli.agents import Agents
+from rtshcua.cli.live.telling import Teller
+from rtshcua.onboard.ports import Ending, Event
+
+
+class Followed(Run):
+    """A run with a reader on its socket."""
+
+    def __init__(self, folder: Path) -> None:
+        of = low()
+        self.agents = Agents(folder / "s", of)
+        self.link = socket.socket(socket.AF_UNIX)
+        self.link.connect(str(folder / "s"))
+        self.link.setblocking(False)
+        super().__init__(of, ready=False)
+
+    def told(self) -> list[dict[str, Any]]:
+        try:
+            return [json.loads(line) for line in self.link.recv(1 << 22).splitlines()]
+        except BlockingIOError:
+            return []
+
+    def hand(self, document: bytes) -> list[dict[str, Any]]:
+        """Hand a document in; what is told in the turn in which it is taken up."""
+        self.link.setblocking(True)
+        self.link.sendall(json.dumps({"id": 5, "document": b64encode(document).decode()}).encode() + b"\n")
+        self.link.setblocking(False)
+        events: list[Event] = []
+        while not events:
+            self.clock.advance(GAP_US)
+            events += self.agents.events(self.clock.now())
+        self.told()
+        self.agents.watch(self.tick(*events))
+        return self.told()
+
+
+@pytest.fixture
+def run() -> Iterator[Followed]:
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        found = Followed(Path(name))
+        with found.agents:
+            yield found
+        found.link.close()
+
+
+def test_the_first_lines_say_what_flies(run: Followed) -> None:
+    run.agents.events(run.clock.now())
+    hello, mission = run.told()
+    assert hello == {"type": "hello", "format": "rtshcua/agent", "version": 1, "vehicle": "quad-07", "mode": "software"}
+    assert mission["digest"] == run.loaded.bundle.mission_digest.hex()
+    assert [(step["step"], step["skill"], step["phase"]) for step in mission["steps"]] == [
+        (0, "takeoff", "departure"), (1, "goto", "inspection"), (2, "inspect_area", "inspection"),
+        (3, "return_home", "recovery"),
+    ]  # fmt: skip
+    assert mission["steps"][2]["id"] == run.loaded.bundle.mission.invocations[2].invocation_id.hex()
+
+
+def test_every_record_goes_out_as_it_stands_in_the_log(run: Followed) -> None:
+    run.agents.events(run.clock.now())
+    run.told()
+    run.hand(b"")
+    before = len(run.lines)
+    actions = run.tick()
+    run.agents.watch(actions)
+    assert [json.dumps(each) for each in run.told()] == [json.dumps(json.loads(each)) for each in run.lines[before:]]
+
+
+def test_documents_and_their_answers(run: Followed) -> None:
+    answer = {"type": "answer", "id": 5}
+    told = run.hand(approval(run.loaded))
+    assert [each["type"] for each in told] == ["effect", "answer"]
+    assert told[-1] | answer == told[-1]
+    assert told[-1]["slug"] == "accepted"
+    told = run.hand(replacement(run.loaded))
+    assert [each["type"] for each in told] == ["effect", "answer", "mission"]
+    assert [step["skill"] for step in told[-1]["steps"]] == ["takeoff", "goto", "return_home"]
+    assert told[-1]["digest"] == run.loaded.bundle.mission_digest.hex()
+    told = run.hand(b"nonsense")
+    assert [each["type"] for each in told] == ["effect", "answer"]
+    assert told[-1]["slug"] == "malformed"
+    told = run.hand(recall(run.loaded))
+    assert told[-1]["slug"] == "accepted"
+    assert run.ending is Ending.RECALLED
+    run.agents.tell(b'{"type":"close"}\n')
+    assert run.told() == [{"type": "close"}]
+
+
+def test_the_view_follows_a_replacement_and_shows_no_signature(run: Followed) -> None:
+    policy, mission = run.loaded.bundle.policy, run.loaded.bundle.mission
+    teller = Teller(policy, mission, 0)
+    before = len(run.lines)
+    run.hand(replacement(run.loaded))
+    (what,) = [teller.tell(line) for line in run.lines[before:]]
+    assert what is not None
+    assert (what.event, what.detail) == ("replacement", "from step 2 on")
+    teller.replace(run.loaded.bundle.mission)
+    longest = b'{"type":"effect","at_us":1,"kind":0,"step":9,"event":"x"}\n'
+    far = teller.tell(longest)
+    assert far is not None
+    assert far.subject == ""

@@ -1,0 +1,160 @@
+"""`approve`, `recall`, `replace` and `compile --replaces`, from the command line to what a boundary says to them."""
+
+import json
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.agent_socket import AgentSocket
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.app import main
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.wire.receipt import Receipt, decode
+from rtshcua.wire.trust import open_root
+
+LOW = """import "lib:policies/bridge_inspection.rts"
+
+mission low under bridge_inspection@7 on quad {
+  intent "Low under the bridge, when a supervisor agrees."
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 9 m) }
+  phase inspection {
+    goto(bridge_a.entry, altitude = 9 m)
+    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)
+  }
+  phase recovery { return_home() }
+}
+"""
+#: without the inspection; the intent moves every step in its source
+SHORTER = LOW.replace("    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)\n", "    hover(5 s)\n").replace(
+    "when a supervisor agrees", "but the supervisor is away today, so only look"
+)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
+    monkeypatch.chdir(tmp_path)
+    assert main(["keys", "init"]) == ExitCode.OK
+    (tmp_path / "low.rts").write_text(LOW)
+    (tmp_path / "shorter.rts").write_text(SHORTER)
+    assert main(["compile", "low.rts"]) == ExitCode.OK
+    capsys.readouterr()
+    return tmp_path
+
+
+def in_force(bundle: Path) -> Loaded:
+    store = KeyStore(data_folder())
+    root = open_root(store.root(), pinned=store.pin(), now_us=0)
+    found = load(
+        bundle.read_bytes(), root=root, vehicle="quad-07", now=now(), mode=Mode.SOFTWARE,
+        session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
+    )  # fmt: skip
+    assert isinstance(found, Loaded)
+    return found
+
+
+def now() -> Now:
+    utc_us = time.time_ns() // 1000
+    return Now(utc_us, utc_us, 100_000)
+
+
+def presented(of: Loaded, document: Path) -> Receipt:
+    receipt = decode(of.boundary.present(document.read_bytes(), now(), 0))
+    assert isinstance(receipt, Receipt)
+    return receipt
+
+
+def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = in_force(here / "low.bundle")
+    assert main(["approve", "low.bundle", "--step", "2", "-o", "yes"]) == ExitCode.OK
+    assert "approved as supervisor" in capsys.readouterr().out
+    assert (here / "yes").stat().st_mode & 0o777 == 0o600
+    assert presented(of, here / "yes").granted == 1
+    assert main(["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "2"]) == ExitCode.OK
+    assert "4 steps, new from 2" in capsys.readouterr().out
+    assert presented(of, here / "shorter.replacement").slug == "accepted"
+    assert [each.contract.name for each in of.bundle.mission.invocations] == ["takeoff", "goto", "hover", "return_home"]
+    again = ["--replaces", "low.bundle", "--replaces", "shorter.replacement"]
+    assert main(["compile", "low.rts", *again, "--from", "2", "-o", "back", "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["replacement"]["from"] == 2
+    assert presented(of, here / "back").slug == "accepted"
+    assert presented(of, here / "yes").slug == "unknown-invocation", "what was approved stood there before"
+    put = ["--replacement", "shorter.replacement", "--replacement", "back"]
+    assert main(["approve", "low.bundle", *put, "--step", "2", "--refuse", "--role", "supervisor", "-o", "no"]) == 0
+    assert presented(of, here / "no").granted == 0
+    for words in (["--policy"], []):
+        assert main(["recall", "low.bundle", *words, "-o", "home"]) == ExitCode.OK
+    assert presented(of, here / "home").slug == "accepted"
+
+
+def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def says(code: ExitCode, words: str, *command: str) -> None:
+        assert main(list(command)) == code
+        assert words in capsys.readouterr().err
+
+    says(ExitCode.USAGE, "has to go somewhere", "approve", "low.bundle", "--step", "2")
+    says(ExitCode.USAGE, "has to go somewhere", "recall", "low.bundle")
+    says(ExitCode.USAGE, "there is no step 4", "approve", "low.bundle", "--step", "4", "-o", "x")
+    says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "1", "-o", "x")
+    says(ExitCode.USAGE, "is not asked", "approve", "low.bundle", "--step", "2", "--role", "operator", "-o", "x")
+    says(ExitCode.USAGE, "for", "approve", "low.bundle", "--step", "2", "--for", "100000", "-o", "x")
+    says(ExitCode.INPUT, "no such file", "approve", "nothing.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--replaces", "low.bundle")
+    says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--from", "2")
+    says(ExitCode.REFUSED, "step 2 is to stay", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "3")
+    says(ExitCode.INPUT, "is no replacement", "replace", "low.bundle", "--to", "s")
+    assert main(["recall", "low.bundle", "-o", "home"]) == ExitCode.OK
+    says(ExitCode.INPUT, "but `rtshcua/recall`", "replace", "home", "--to", "s")
+    says(ExitCode.INPUT, "no such file or directory: `s`", "recall", "low.bundle", "--to", "s")
+    other = (here / "shorter.rts").read_text().replace("bridge_inspection", "training_field").replace("@7", "@2")
+    other = other.replace("    goto(bridge_a.entry, altitude = 9 m)\n", "")
+    (here / "other.rts").write_text(other)
+    says(ExitCode.REFUSED, "another policy", "compile", "other.rts", "--replaces", "low.bundle", "--from", "1")
+    damaged = bytearray((here / "low.bundle").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (here / "damaged.bundle").write_bytes(damaged)
+    says(ExitCode.UNTRUSTED, "key", "approve", "damaged.bundle", "--step", "2", "-o", "x")
+    assert not (here / "x").exists()
+    assert not (here / "other.replacement").exists()
+
+
+@pytest.fixture
+def listening() -> Iterator[Path]:
+    """A flight's socket that accepts the first document and refuses the others."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        agents = AgentSocket(Path(name) / "s", lambda: b'{"type":"hello"}\n')
+        over = threading.Event()
+
+        def serve() -> None:
+            slugs = ["accepted"]
+            while not over.wait(0.005):
+                event = agents.poll(time.monotonic_ns() // 1000)
+                if event is not None:
+                    agents.answer(event.sender, slugs.pop() if slugs else "expired", "as it says")
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield agents.path
+        over.set()
+        thread.join()
+        agents.close()
+
+
+def test_what_the_flight_says_is_what_the_command_says(
+    here: Path, listening: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    to = ["--to", str(listening)]
+    assert main(["approve", "low.bundle", "--step", "2", *to]) == ExitCode.OK
+    assert "approved as supervisor for 300 s: step 2" in capsys.readouterr().out
+    assert main(["recall", "low.bundle", *to, "--json"]) == ExitCode.REFUSED
+    said = json.loads(capsys.readouterr().out)
+    assert said == {"slug": "expired", "text": "the flight refused it: as it says (expired)", "exit": "refused"}
+    assert main(["recall", "low.bundle", *to]) == ExitCode.REFUSED
+    assert "the flight refused it" in capsys.readouterr().err

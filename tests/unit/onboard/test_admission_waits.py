@@ -1,0 +1,161 @@
+"""What a deferred step waits for, how long, and `L_rem`: what validation and dispatch take."""
+
+import json
+from collections import deque
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from reference.documents import ASKED, approval, hand, low, low_mission
+from reference.flat_case import MISSION, OBSTACLE, M, S
+from reference.world import TICK, Run, assert_audited, loaded
+from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.ports import Announce, Ending, Presented, Reply, Said, Sent
+from rtshcua.onboard.runtime.patience import Patience
+from rtshcua.onboard.runtime.queue import InvocationQueue
+from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US, WINDOW, RemainingLatency
+from rtshcua.wire.response import Answer
+
+TIMES = st.lists(st.integers(-10, 1 << 40), max_size=2 * WINDOW)
+
+
+def naive(times: list[int]) -> int:
+    """The smallest measured value that at least 99 of 100 do not exceed; never less than assumed with under eight."""
+    last = [max(each, 0) for each in times[-WINDOW:]]
+    high = min((each for each in last if sum(other <= each for other in last) * 100 >= 99 * len(last)), default=0)
+    return high if len(last) >= 8 else max(high, CONSERVATIVE_US)
+
+
+@given(TIMES)
+def test_it_is_a_high_quantile_of_the_latest_and_conservative_until_there_are_some(times: list[int]) -> None:
+    remaining = RemainingLatency()
+    for each in times:
+        remaining.measured(each)
+    assert remaining.us == naive(times)
+
+
+@given(TIMES, st.integers(0, 1 << 40))
+def test_a_slow_one_is_never_forgotten_at_once(times: list[int], slow: int) -> None:
+    remaining = RemainingLatency()
+    for each in [*times, slow]:
+        remaining.measured(each)
+    window = deque([max(each, 0) for each in [*times, slow]], WINDOW)
+    beyond = sum(each > remaining.us for each in window)
+    assert beyond * 100 <= len(window)
+
+
+def test_it_counts_until_the_first_frame_went_out() -> None:
+    """From the decision to `Sent`: the record that the command waits for is part of it."""
+    run = Run(loaded())
+    token = run.vehicle.commands[-1].token
+    run.step(Sent(run.clock.now().monotonic_us + 70_000, token))
+    run.step(Sent(run.clock.now().monotonic_us + 90_000, token + 1))
+    run.until_flies("goto")
+    record = [json.loads(line) for line in run.lines if b'"type":"decision"' in line][-1]
+    assert record["context"]["remaining_us"] == 70_000
+
+
+def waits(reason: Reason, outcome: Outcome, step: int, at_us: int, on: OnInadmissible = OnInadmissible.ABORT) -> bool:
+    invocation = replace(MISSION.invocations[0], on_inadmissible=on)
+    answer = Answer(outcome, reason, step, -1, 0, 0, 0)
+    return Patience(loaded()).may_wait(invocation, answer, 0, at_us)
+
+
+BEFORE, AFTER = 1, 10 * S
+
+
+@pytest.mark.parametrize(
+    ("reason", "outcome", "step", "before", "after"),
+    [
+        (Reason.AWAITING_APPROVAL, Outcome.DEFER, 3, True, True),  # it has a time of its own
+        (Reason.FORBID_UNKNOWN, Outcome.DEFER, 3, True, False),
+        (Reason.CLOCK_UNCERTAIN, Outcome.DEFER, 2, True, False),
+        (Reason.PHASE_NOT_REACHED, Outcome.DEFER, 4, True, False),
+        (Reason.STATE_UNKNOWN, Outcome.DEFER, 6, True, True),  # it passed the deadline's own step
+        (Reason.SAFETY_UNKNOWN, Outcome.DEFER, 7, True, True),
+        (Reason.NO_SLACK, Outcome.FALLBACK, 5, False, False),
+        (Reason.STATE_VIOLATED, Outcome.FALLBACK, 6, False, False),
+    ],
+)
+def test_what_is_waited_for(reason: Reason, outcome: Outcome, step: int, before: bool, after: bool) -> None:
+    assert waits(reason, outcome, step, BEFORE) is before
+    assert waits(reason, outcome, step, AFTER) is after
+
+
+def test_a_step_may_hold_for_what_is_violated_but_not_for_time() -> None:
+    assert waits(Reason.STATE_VIOLATED, Outcome.FALLBACK, 6, BEFORE, OnInadmissible.HOLD)
+    assert not waits(Reason.NO_SLACK, Outcome.FALLBACK, 5, BEFORE, OnInadmissible.HOLD)
+
+
+def waiting() -> Run:
+    return Run(low()).until(lambda run: (0, ASKED, -1, "defer", "approval/awaited") in run.decisions)
+
+
+def test_an_approval_is_looked_at_in_the_step_in_which_it_comes() -> None:
+    run = waiting()
+    assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
+    assert run.flown[-1] == "inspect_area"
+
+
+def test_a_deadline_runs_from_the_approval() -> None:
+    """What the step waited for the approval is not taken off it, not even when its state is unknown by then."""
+    run = waiting()
+    for _ in range(10 * S // TICK):
+        run.tick()
+    run.vehicle.values[OBSTACLE] = None
+    run.tick()
+    assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
+    assert run.decisions[-1][3:] == ("defer", "state/unknown")
+    run.vehicle.values[OBSTACLE] = 20 * M
+    run.tick()
+    assert run.flown[-1] == "inspect_area"
+    run.until_over()
+    assert run.ending is Ending.COMPLETED
+    assert_audited(run)
+
+
+def test_and_it_ends() -> None:
+    run = waiting()
+    run.vehicle.values[OBSTACLE] = None
+    run.tick()
+    hand(run, approval(run.loaded, now=run.clock.now()))
+    begun = run.clock.now().monotonic_us
+    run.until(lambda run: (0, ASKED, -1, "fallback", "timing/no-slack") in run.decisions)
+    deadline_us = low_mission().invocations[ASKED].contract.deadline_us
+    assert run.clock.now().monotonic_us - begun <= deadline_us + TICK
+    run.until_over()
+    assert_audited(run)
+
+
+def test_every_decision_is_announced_and_every_document_answered() -> None:
+    run = waiting()
+    run.tick(Presented(0, b"", 3), Presented(0, b"\xd2", 4))
+    assert [(each.sender, each.slug) for each in run.actions if isinstance(each, Reply)] == [
+        (3, "malformed"), (4, "malformed")
+    ]  # fmt: skip
+    announced = [each for each in run.actions if isinstance(each, Announce)]
+    assert len(announced) == sum(b'"type":"decision"' in line for line in run.lines)
+    assert announced[0] == Announce(6, "allow step 0")
+    assert announced[2] == Announce(5, f"defer approval/awaited: step {ASKED}")
+
+
+def test_what_the_vehicle_says_is_kept_as_its_own_words() -> None:
+    run = Run(loaded())
+    run.tick(Said(0, 4, "EKF lane switch"), Said(0, 6, "x" * 500))
+    said = [json.loads(line)["detail"] for line in run.lines if b'"event":"said"' in line]
+    assert said == ["4: EKF lane switch", "6: " + "x" * 200]
+
+
+def test_the_queue_knows_what_was_released() -> None:
+    queue = InvocationQueue(MISSION)
+    assert queue.released == 0
+    queue.release(1)
+    assert queue.released == 1
+    for number in (2, 3, 4, 4):
+        queue.advance(number)
+        assert queue.released == number
+    queue.replace(replace(MISSION, invocations=MISSION.invocations + MISSION.invocations))
+    assert queue.current is MISSION.invocations[0]

@@ -1,0 +1,31 @@
+"""Receipts: one encoding, and nothing else is one."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtshcua.wire import artefact, names
+from rtshcua.wire.receipt import APPROVAL, Receipt, decode, encode
+from rtshcua.wire.response import Unusable
+
+INTEGERS = st.integers(-(1 << 63), (1 << 63) - 1)
+
+
+@given(st.builds(Receipt, INTEGERS, st.text(), st.text(), INTEGERS, INTEGERS, INTEGERS, INTEGERS))
+def test_what_is_encoded_is_decoded(receipt: Receipt) -> None:
+    assert decode(encode(receipt)) == receipt
+
+
+@given(st.binary(max_size=60))
+def test_no_other_bytes_are_one(data: bytes) -> None:
+    assert isinstance(decode(data), Unusable)
+
+
+@pytest.mark.parametrize("body", [1, (), (1,), (1, "a"), (1, 2, "b"), (1, "a", "b", 1, 1, 1, 1, 1), (1, "a", "b")])
+def test_other_bodies_are_none(body: object) -> None:
+    assert isinstance(decode(artefact.wrap(names.RECEIPT, body)), Unusable)
+
+
+def test_only_one_slug_is_acceptance() -> None:
+    assert Receipt(APPROVAL, "accepted", "").accepted
+    assert not Receipt(APPROVAL, "expired", "").accepted

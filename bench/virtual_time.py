@@ -1,10 +1,11 @@
 """Virtual time: how many times faster than life the shipped missions fly in one process.
 
-Simulation, real MAVLink both ways, driver, loop, runtime and evidence; at 50 frames a second and more from the vehicle.
-Exits with 1 when a mission is slower than the limit.
+Simulation, real MAVLink both ways, driver, loop, runtime and evidence; at 50 frames a second and more from the vehicle,
+for which the limit is, and one mission at 200. Exits with 1 when a mission is slower than the limit.
 """
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from time import process_time
 
@@ -20,14 +21,25 @@ from virtual.shipped import NAMES, shipped
 LIMIT = 100
 FRAMES = 50
 ROUNDS = 3
-_MORE_US = 40_000
+MANY_FRAMES = 200
+_MORE = {mavlink.MAVLINK_MSG_ID_ATTITUDE: 40_000}
+_MANY = dict.fromkeys(
+    (
+        mavlink.MAVLINK_MSG_ID_ATTITUDE,
+        mavlink.MAVLINK_MSG_ID_VFR_HUD,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+    ),
+    20_000,
+)
 
 
-def one(name: str, flavour: str) -> tuple[float, float, float]:
-    """Seconds of flight, seconds of the processor that it took, frames a second of flight."""
+def one(name: str, flavour: str, more: Mapping[int, int] = _MORE) -> tuple[float, float, float]:
+    """Seconds of flight, seconds of processor time for it, frames a second of flight; `more` are streams, in us."""
     flight = Flight(shipped(name), case.simulated(flavour))
     streams = flight.vehicle.simulation._autopilot.streams
-    streams.set(mavlink.MAVLINK_MSG_ID_ATTITUDE, _MORE_US)
+    for number, interval_us in more.items():
+        streams.set(number, interval_us)
     start = process_time()
     flown = flight.fly()
     took = process_time() - start
@@ -49,6 +61,9 @@ def main() -> int:
                 f"virtual time: `{name}` on {flavour}: {seconds / took:.0f} times real time "
                 f"({seconds:.0f} s in {took:.2f} s, {frames:.0f} frames a second)"
             )
+    seconds, took, frames = min((one("standard", "px4", _MANY) for _ in range(ROUNDS)), key=lambda flight: flight[1])
+    assert frames >= MANY_FRAMES, frames
+    print(f"virtual time: `standard` on px4: {seconds / took:.0f} times real time at {frames:.0f} frames a second")
     print(f"virtual time: {slowest:.0f} times real time at the least, limit {LIMIT}")
     return int(slowest < LIMIT)
 

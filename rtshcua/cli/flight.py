@@ -11,19 +11,20 @@ import msgspec
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.files.runs import LOG, RunFolder
-from rtshcua.adapters.loop import Loop
+from rtshcua.adapters.files.writer import EvidenceWriter
+from rtshcua.adapters.loop import HELD_WAIT_US, Loop
 from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.agents import Agents
 from rtshcua.cli.interrupts import Interrupts, Wish
 from rtshcua.cli.live.feed import Feed
-from rtshcua.cli.live.story import Happened, Note, Snapshot, Summary
+from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
 from rtshcua.cli.live.telling import Teller, plan_of
+from rtshcua.cli.live.watching import Watching
 from rtshcua.cli.tape import Tape
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
-from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Append, Ending, Event, Interrupted
-from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -32,6 +33,7 @@ BOOT_BYTES = 16
 EXIT_CODES = {
     Ending.COMPLETED: ExitCode.OK,
     Ending.ABORTED: ExitCode.ABORTED,
+    Ending.RECALLED: ExitCode.ABORTED,
     Ending.REFUSED: ExitCode.REFUSED,
     Ending.STOOD_DOWN: ExitCode.STOOD_DOWN,
     Ending.LINK_LOST: ExitCode.LINK,
@@ -39,9 +41,7 @@ EXIT_CODES = {
     Ending.EVIDENCE_LOST: ExitCode.FULL,
 }
 
-_SNAPSHOT_S = 0.1
 _BACKLOG_S = 1.0
-_WAITING_NOTE_S = 5.0
 _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
 
@@ -57,7 +57,7 @@ class Flight:
     def __init__(
         self, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts, tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
-        events: Sequence[Event],
+        events: Sequence[Event], agents: Agents | None = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
         self._vehicle = vehicle
@@ -67,26 +67,30 @@ class Flight:
         self._tape = tape
         self._run = run
         self._speed = speed
-        self._live = live
         self._early = list(events)
+        self._agents = agents
         self._recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
-        self._sink = run.log()
+        log = run.log()
         self._frames = run.telemetry()
         tape.attach(self._frames)
         now = clock.now()
         self._start_us = now.monotonic_us
         policy, mission = loaded.bundle.policy, loaded.bundle.mission
         self._teller = Teller(policy, mission, self._start_us)
-        self._sink.append(
+        log.append(
             self._recorder.genesis(
                 now, bundle=bundle, root=root, boot=secrets.token_bytes(BOOT_BYTES), vehicle=loaded.vehicle,
                 mission=mission.name, mode=loaded.mode,
             ),
             True,
         )  # fmt: skip
+        self._sink = EvidenceWriter(log)
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
-        self._feed.post(plan_of(policy, mission, mode=loaded.mode, speed=speed))
-        self._shown_s = self._waited_s = time.monotonic()
+        self._feed.post(self._plan())
+        self._watch = Watching(
+            feed, self._teller, self._runtime.view, lambda: vehicle.driver.unready, live=live,
+            replan=self._replan, agents=agents,
+        )  # fmt: skip
 
     def fly(self) -> tuple[ExitCode, Summary]:
         """Fly to the end, whatever it is, and close the log."""
@@ -107,9 +111,19 @@ class Flight:
             self._run.write_summary(msgspec.structs.asdict(summary))
         return code, summary
 
+    def _plan(self) -> Plan:
+        bundle = self._loaded.bundle
+        return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._speed)
+
+    def _replan(self) -> Plan:
+        """The mission was replaced: this is the plan from now on."""
+        self._teller.replace(self._loaded.bundle.mission)
+        return self._plan()
+
     def _follow(self) -> Ending:
         wait_us = max(_WAIT_US, self._clock.us_in(_FASTEST_WAIT_S))
-        loop = Loop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us)
+        held_wait_us = max(HELD_WAIT_US, self._clock.us_in(HELD_WAIT_US / 1e6))
+        loop = Loop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
         while True:
             match self._interrupts.wish():
@@ -123,6 +137,8 @@ class Flight:
                     return loop.turn(also) or self._leave()
                 case None:
                     pass
+            if self._agents is not None:
+                also += self._agents.events(self._clock.now())
             ending = loop.turn(also)
             if ending is not None:
                 return ending
@@ -147,40 +163,20 @@ class Flight:
         self._feed.post(Note(f"left: {told}; nothing more is sent"))
         return Ending.INTERRUPTED
 
-    def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
-        for action in actions:
-            if isinstance(action, Append):
-                what = self._teller.tell(action.line)
-                if what is not None:
-                    self._feed.post(Happened(what))
-        moment_s = time.monotonic()
-        if moment_s - self._shown_s >= _SNAPSHOT_S:
-            self._shown_s = moment_s
-            self._show(now, moment_s)
-
-    def _show(self, now: Now, moment_s: float) -> None:
-        self._feed.flush()
-        if not self._live and moment_s - self._waited_s < _WAITING_NOTE_S:
-            return
-        view = self._runtime.view(now)
-        if self._live:
-            self._feed.post(Snapshot(view), keep=False)
-        if moment_s - self._waited_s >= _WAITING_NOTE_S:
-            self._waited_s = moment_s
-            unready = self._vehicle.driver.unready
-            if view.stage is Stage.WAITING and unready is not None:
-                self._feed.post(Note(f"waiting for the vehicle: {unready}"))
-
     def _close(self, ending: Ending | None) -> bool:
         """Sign and close the log; whether all of it is on the disk. Without an ending (a fault) it stays unsigned."""
         digest: bytes | None = None
         with suppress(OSError):
             digest = self._frames.finish()
+        if self._frames.lost:
+            self._feed.post(Note(f"the disk did not keep up: {self._frames.lost} frames are not in the telemetry log"))
         whole = ending is not None
         try:
             if ending is not None:
                 line = self._recorder.close(self._clock.now(), ending=ending, tlog=digest)
                 self._sink.append(line, True)
+                if self._agents is not None:
+                    self._agents.tell(line)
         except OSError:
             whole = False
         try:

@@ -86,5 +86,5 @@ def _well_known(policy: Policy) -> WellKnown:
     """A slot that no signal owns is the one after the last, which is always missing."""
     vehicle, absent = policy.vehicle, policy.slots
     x, y = (absent, absent) if vehicle.position == -1 else (vehicle.position, vehicle.position + 1)
-    height, battery = (absent if slot == -1 else slot for slot in (vehicle.height, vehicle.battery))
-    return WellKnown(x, y, height, battery)
+    others = (vehicle.height, vehicle.battery, vehicle.north, vehicle.east, vehicle.down)
+    return WellKnown(x, y, *(absent if slot == -1 else slot for slot in others))

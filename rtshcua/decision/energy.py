@@ -13,24 +13,25 @@ SECOND = 1_000_000  # us
 class Energy:
     """What one contract needs: to finish, to come home from the farthest planned place, and the vehicle's reserve.
 
-    A skill that ends on the ground needs no way home, and it is what the reserve is kept for.
+    A skill that ends on the ground needs no way home, and it is what the reserve is kept for; the others are those that
+    `stays` is true of.
     """
 
-    __slots__ = ("_fixed", "_range", "_stays")
+    __slots__ = ("_fixed", "_range", "stays")
 
     def __init__(self, contract: Contract, vehicle: Vehicle) -> None:
-        self._stays = contract.motion.kind not in (MotionKind.HOME, MotionKind.LAND)
-        self._fixed = contract.energy + (vehicle.reserve if self._stays else 0)
+        self.stays = contract.motion.kind not in (MotionKind.HOME, MotionKind.LAND)
+        self._fixed = contract.energy + (vehicle.reserve if self.stays else 0)
         self._range = vehicle.speed * vehicle.endurance_us  # mm that a full charge flies, times SECOND
 
     def needed(self, distance: int) -> int:
         """The charge needed when the farthest planned place is `distance` mm from home, rounded up."""
-        return self._fixed - (-distance * SECOND * FULL // self._range) if self._stays else self._fixed
+        return self._fixed - (-distance * SECOND * FULL // self._range) if self.stays else self._fixed
 
     def suffices(self, battery: Value, volume: Volume) -> Truth:
         """Whether the battery holds what is needed; unknown when the charge is, or the place that counts."""
         low, high, gap, _ = battery
-        if self._stays and volume.height[2] > gap:
+        if self.stays and volume.height[2] > gap:
             gap = volume.height[2]
         if gap == ABSENT:
             return UNKNOWN

@@ -62,12 +62,17 @@ NOWHERE = Place((), UNKNOWN)
 
 
 class WellKnown(NamedTuple):
-    """The state slots of position (x, y), height and battery. One that no signal owns is the slot after the last."""
+    """The state slots of position (x, y), height, battery and velocity. One that no signal owns is the slot after the
+    last, which is missing.
+    """
 
     x: int
     y: int
     height: int
     battery: int
+    north: int = -1
+    east: int = -1
+    down: int = -1
 
 
 def here(slots: Sequence[Value], known: WellKnown) -> Place:

@@ -43,7 +43,7 @@ class Planner:
         self._path = HOME if kind == MotionKind.HOME else path
         self._error: Box = (-position_error, -position_error, position_error, position_error)
         self._sweep = Sweep(self._path, self._error) if self._path else None
-        self._distance = max((_distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
+        self._distance = max((distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
         self._leg: tuple[tuple[int, int, int, int], Sweep, Span] | None = None
         self._last: tuple[tuple[Value, Value, Value], Volume] | None = None
 
@@ -84,10 +84,10 @@ class Planner:
             return self._leg[1], self._leg[2]
         left, bottom, right, top = self._error
         leg = Sweep((west, south, *self._path[:2]), (left, bottom, right + east - west, top + north - south))
-        farthest = max(_distance(max(abs(west), abs(east)), max(abs(south), abs(north))), self._distance)
+        farthest = max(distance(max(abs(west), abs(east)), max(abs(south), abs(north))), self._distance)
         nearest = farthest
         if west != east or south != north:
-            nearest = max(_distance(_clamp(0, west, east), _clamp(0, south, north)), self._distance)
+            nearest = max(distance(_clamp(0, west, east), _clamp(0, south, north)), self._distance)
         span = (nearest, farthest)
         self._leg = (key, leg, span)
         return leg, span
@@ -104,7 +104,7 @@ def _clamp(value: int, low: int, high: int) -> int:
     return min(max(value, low), high)
 
 
-def _distance(x: int, y: int) -> int:
+def distance(x: int, y: int) -> int:
     """How far a place is from home, mm rounded up."""
     square = x * x + y * y
     return isqrt(square - 1) + 1 if square else 0

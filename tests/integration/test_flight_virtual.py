@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from rtshcua.evidence.report import Verdict
+from rtshcua.mavlink.frames import Codec
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.simulation.fault_text import parse_fault
@@ -42,16 +43,33 @@ def test_the_shipped_missions_complete(name: str, flavour: str) -> None:
     assert abs(truth.north_mm) + abs(truth.east_mm) < 2_000
 
 
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_ground_stations_hear_each_decision_and_the_log_what_the_vehicle_said(flavour: str) -> None:
+    flight, heard = Flight(shipped("short"), case.simulated(flavour)), []
+
+    def listen(frame: bytes) -> bool:
+        heard.extend(each.message.text for each in Codec(0, 0).parse(frame) if each.name == "STATUSTEXT")
+        return False
+
+    flight.vehicle.lose = listen
+    flown = verified(flight.fly())
+    assert heard == [f"allow {step}" for step in ("takeoff(altitude = 10 m)", "hover(5 s)", "return_home()")]
+    assert [record["detail"].partition(" (")[0] for record in flown.effects("noted")] == [
+        "its fence was set to the policy's airspace"
+    ]
+    said = [record["detail"] for record in flown.effects("said")]
+    assert ("6: Arming motors" in said) == (flavour == "ardupilot"), "PX4 says nothing to an onboard controller"
+
+
 def test_equal_flights_leave_equal_logs() -> None:
     assert fly("short", "px4").lines == fly("short", "px4").lines
 
 
 FALLBACKS = {
-    "battery,at=40s,level=24%": ["return_home"],
-    "wind,at=40s,speed=12m/s,from=270deg": ["hover", "return_home"],
-    "link-quality,at=40s,quality=20%": ["hover", "return_home"],
+    "battery,at=50s,level=24%": ["return_home"],
+    "wind,at=50s,speed=12m/s,from=270deg": ["hover", "return_home"],
+    "link-quality,at=50s,quality=20%": ["hover", "return_home"],
     "obstacle,at=50s,distance=2m": ["hover", "return_home"],
-    "gps-jump,at=50s,north=300m,east=0m": ["hover", "return_home", "emergency_land"],
     "link-silence,at=50s,for=5s": ["emergency_land"],
 }
 
@@ -63,6 +81,37 @@ def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> No
     assert flown.ending is Ending.ABORTED
     assert flown.effects("violated")
     assert flown.dispatched() == ["takeoff", "goto", "inspect_area", *FALLBACKS[fault]]
+
+
+PILLAR = "pillar,at=0s,north=118.5m,east=140m,radius=2m,height=28m"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_survey_stops_before_what_stands_in_its_way(flavour: str) -> None:
+    flown = fly("standard", flavour, PILLAR)
+    assert flown.dispatched() == ["takeoff", "goto", "inspect_area", "hover", "return_home"]
+    (violated,) = flown.effects("violated")
+    assert violated["detail"] == "obstacle.distance > 3 m + speed * 2 s"
+    assert not flown.vehicle.simulation.truth().crashed
+
+
+JUMP = "gps-jump,at=50s,north=300m,east=0m"
+JUMPED = ["takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_land"]
+
+
+@pytest.mark.parametrize(("flavour", "fence"), [("px4", True), ("px4", False), ("ardupilot", False)])
+def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str, fence: bool) -> None:
+    """PX4's own fence makes it hold, as the first link does."""
+    flown = fly("standard", flavour, JUMP, fence=fence)
+    assert flown.ending is Ending.ABORTED
+    assert flown.dispatched() == JUMPED
+
+
+def test_the_autopilots_own_fence_is_a_second_line_of_defence_and_wins() -> None:
+    flown = fly("standard", "ardupilot", JUMP)
+    assert flown.ending is Ending.STOOD_DOWN
+    assert flown.effects("violated")
+    assert [record["detail"] for record in flown.effects("taken-over")] == ["RTL"]
 
 
 TAKEN = {

@@ -30,12 +30,20 @@ class MemorySink:
         self.full = False
         self._waiting: list[bytes] = []
 
-    def append(self, line: bytes, durable: bool) -> None:
+    @property
+    def kept(self) -> int:
+        return len(self.lines)
+
+    def append(self, line: bytes, durable: bool) -> int:
         self._waiting.append(line)
         if self.full:
             raise OSError(28, "no space left on device")
         self.lines += self._waiting
         self._waiting.clear()
+        return len(self.lines)
+
+    def trouble(self) -> str | None:
+        return None
 
     def close(self) -> None:
         pass
@@ -83,7 +91,7 @@ class Flight:
     def __init__(
         self, bundle: bytes, config: SimulationConfig, *, trust: tuple[TrustRoot, bytes] | None = None,
         mode: Mode = Mode.SOFTWARE, utc_us: int = case.flat.ISSUED + 60 * case.S, wait_us: int = 100_000,
-        resumed: bool = False, vehicle: VirtualVehicle | None = None,
+        resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
     ) -> None:  # fmt: skip
         root, signed_root = trust or case.root()
         self.clock = vehicle.clock if vehicle else VirtualClock(Now(MONOTONIC_US, utc_us, 1_000))
@@ -93,7 +101,9 @@ class Flight:
         )
         assert not isinstance(loaded, LoadRefusal), loaded
         self.loaded = loaded
-        self.vehicle = vehicle or VirtualVehicle(loaded.bundle.policy, config, self.clock)
+        frames = loaded.executor.frames
+        self.vehicle = vehicle or VirtualVehicle(loaded.bundle.policy, config, self.clock, frames, fence=fence)
+        loaded.executor.frames = self.vehicle.frames
         log_key = case.KEYS[Duty.LOG]
         self.recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
         self.runtime = Runtime(loaded, self.recorder, resumed=resumed)

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 
 from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.mavlink.frames import Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.world import Simulation
@@ -31,12 +33,18 @@ class VirtualVehicle:
     """Steps the simulation tick by tick; what would be datagrams are method calls.
 
     `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives
-    the bytes that come in place of a datagram from it.
+    the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
+    permitted.
     """
 
-    def __init__(self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None) -> None:
+    def __init__(
+        self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None,
+        frames: FrameSession | None = None, verifier: Verifier | None = None, *, fence: bool = True,
+    ) -> None:  # fmt: skip
         self.simulation = Simulation(config)
-        self.driver = Driver(policy)
+        self.frames = FrameSession() if frames is None else frames
+        self._free = frames is None
+        self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier)
         self.clock = clock or VirtualClock()
         self.received = self.sent = 0
         self.lose = lambda frame: False
@@ -57,12 +65,17 @@ class VirtualVehicle:
             self._take(self.simulation.advance(self.clock.elapsed_us), events)
 
     def begin(self, command: Command, now_us: int) -> None:
+        if self._free:
+            self.frames.open(command, now_us)
         events, frames = self.driver.begin(command, now_us)
         self._send(frames, events)
         self._pending += events
 
     def release(self) -> None:
         self.driver.release()
+
+    def announce(self, severity: int, text: str) -> None:
+        self.driver.announce(severity, text)
 
     def _send(self, frames: Sequence[bytes], events: list[Event]) -> None:
         for frame in frames:

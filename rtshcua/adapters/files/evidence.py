@@ -1,4 +1,4 @@
-"""The file that evidence lines go to: `EvidenceSink` of `rtshcua.onboard.ports`."""
+"""The file that evidence lines go to; who must not wait for the disk writes to it through `writer`."""
 
 import os
 from contextlib import suppress
@@ -34,11 +34,12 @@ class EvidenceFile:
         that failed on: what the system then reports of the disk cannot be believed any more.
         """
         self._waiting.append(line)
-        self._write()
+        self.flush()
         if durable:
-            self._sync()
+            self.sync()
 
-    def _write(self) -> None:
+    def flush(self) -> None:
+        """Writes what waits. Raises OSError where the disk refuses it still."""
         waiting = self._waiting
         while waiting:
             line = waiting[0]
@@ -59,7 +60,8 @@ class EvidenceFile:
                 os.ftruncate(self._handle, self._length)
                 self._taken = 0
 
-    def _sync(self) -> None:
+    def sync(self) -> None:
+        """Returns when what was written is on the disk. Raises OSError, and from the first time on always."""
         if self._sync_error is not None:
             raise self._sync_error
         try:
@@ -74,8 +76,8 @@ class EvidenceFile:
             return
         handle = self._handle
         try:
-            self._write()
-            self._sync()
+            self.flush()
+            self.sync()
         finally:
             self._handle = -1
             os.close(handle)

@@ -9,6 +9,7 @@ from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, SignalSourc
 from rtshcua.model.flat.zone import HIGHEST, MAX_COORDINATE
 
 MAX_POSITION_ERROR = 1 << 20  # mm, about 1 km
+MAX_REACTION = 60_000_000  # us
 
 
 def signals(policy: Policy) -> Iterator[str]:
@@ -44,6 +45,9 @@ def vehicle(policy: Policy) -> Iterator[str]:
         ("position", policy.vehicle.position, POSITION),
         ("height", policy.vehicle.height, NUMBER),
         ("battery", policy.vehicle.battery, NUMBER),
+        ("velocity north", policy.vehicle.north, NUMBER),
+        ("velocity east", policy.vehicle.east, NUMBER),
+        ("velocity down", policy.vehicle.down, NUMBER),
     ):
         if slot != -1 and kinds.get(slot) != kind:
             yield f"vehicle: slot {slot} is no {name}"
@@ -58,3 +62,7 @@ def _numbers(vehicle: Vehicle) -> Iterator[str]:
     yield from within("reserve", vehicle.reserve, 0, FULL)
     yield from within("return altitude", vehicle.return_altitude, 0, HIGHEST)
     yield from within("offset from UTC", vehicle.utc_offset_us, -DAY, DAY)
+    yield from within("braking", vehicle.braking, 0, MAX_SPEED)
+    yield from within("reaction", vehicle.reaction_us, 0, MAX_REACTION)
+    if vehicle.braking and -1 in (vehicle.north, vehicle.east, vehicle.down):
+        yield "brakes, and has no signal of its velocity"

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.checks.vehicles import deceleration
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.places import POSITION_SIGNAL
 from rtshcua.ground.checker.scope import signal_type
-from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, Type
+from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, SPEED, Type
 from rtshcua.ground.compiler import local_time
 from rtshcua.ground.compiler.belonging import belongs
 from rtshcua.ground.compiler.conditions import Conditions
@@ -30,6 +31,9 @@ from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
 #: the signals that every decision reads, in the order of their slots: where the vehicle is, how high, how much energy
 WELL_KNOWN: Mapping[str, Type] = {POSITION_SIGNAL: POSITION, "height": HEIGHT, "battery": RATIO}
+
+#: the signals of the velocity over ground (NED), which a vehicle that `brakes` is watched by
+VELOCITY: Mapping[str, Type] = dict.fromkeys(("velocity.north", "velocity.east", "velocity.down"), SPEED)
 
 #: whoever flies the vehicle; a rule `by any` is about this role too, where no rule names it
 OPERATOR = "operator"
@@ -62,23 +66,24 @@ def lower_policy(
     """
     before = len(context.report.found)
     skills = _skills(context, policy, files)
-    if not _well_known(context, policy, files) or not belongs(context, policy, skills, vehicle, files):
+    read = WELL_KNOWN if vehicle.braking is None else {**WELL_KNOWN, **VELOCITY}
+    if not _well_known(context, policy, read, files) or not belongs(context, policy, skills, vehicle, files):
         return None
     declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
     local_time.check_policy(context, policy, vehicle, skills, declared)
     table = Files(context.report, names)
     slots = Slots(context)
-    position, height, battery = (slots.of(name) for name in WELL_KNOWN)
-    for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in WELL_KNOWN), *skills):
+    well_known = [slots.of(name) for name in read]
+    for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in read), *skills):
         table.index(part.span.file)  # all that the policy rests on is named, quoted or not
     for zone in declared:
-        read = context.data.name(zone.shape) if isinstance(zone.shape, GeoJson) else None
-        if read is not None:
-            table.index(read)
+        data = context.data.name(zone.shape) if isinstance(zone.shape, GeoJson) else None
+        if data is not None:
+            table.index(data)
     projection = projection_at(vehicle.home.latitude, vehicle.home.longitude)
     zones = ZoneTable(projection, declared, context.report, vehicle, context.data)
     conditions = Conditions(context, slots, zones, table)
-    flat_vehicle = _vehicle(vehicle, position, height, battery)
+    flat_vehicle = _vehicle(vehicle, *well_known)
     numbers = {skill.name.text: number for number, skill in enumerate(skills)}
     contracts = Contracts(context, numbers, conditions, zones, table, flat_vehicle)
     roles = _roles(policy)
@@ -150,10 +155,12 @@ def _roles(policy: PolicyDecl) -> tuple[str, ...]:
     return tuple(sorted(named | {rule.approver.text for rule in policy.rules if rule.approver is not None}))
 
 
-def _well_known(context: Context, policy: PolicyDecl, files: frozenset[str]) -> bool:
-    """Whether the signals are declared that every decision reads."""
+def _well_known(context: Context, policy: PolicyDecl, read: Mapping[str, Type], files: frozenset[str]) -> bool:
+    """Whether the signals are declared that every decision reads, or all supervision."""
     good = True
-    for name, type in WELL_KNOWN.items():
+    for name, type in read.items():
+        every = "every decision reads it" if name in WELL_KNOWN else "what brakes is watched by it"
+        needs = "every flight needs it" if name in WELL_KNOWN else "a vehicle that `brakes` is watched by it"
         signal = context.symbols.signals.get(name)
         if signal is None or signal.span.file not in files:
             good = False
@@ -161,14 +168,14 @@ def _well_known(context: Context, policy: PolicyDecl, files: frozenset[str]) -> 
                 codes.WELL_KNOWN_SIGNAL,
                 policy.name.span,
                 f"the policy `{policy.name.text}` neither declares nor imports a signal `{name}`",
-                help=f"every flight needs it: declare it as {type.describe()}, or import `lib:skills/signals.rts`",
+                help=f"{needs}: declare it as {type.describe()}, or import `lib:skills/signals.rts`",
             )
         elif signal_type(context.symbols, signal) != type:
             good = False
             context.report.add(
                 codes.WELL_KNOWN_SIGNAL,
                 signal.type.span,
-                f"the signal `{name}` must be {type.describe()}, for every decision reads it as that",
+                f"the signal `{name}` must be {type.describe()}, for {every} as that",
                 help="give the signal another name, or read it from a fitting field",
             )
     return good
@@ -189,7 +196,10 @@ def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | 
     )
 
 
-def _vehicle(vehicle: VehicleDecl, position: int, height: int, battery: int) -> Vehicle:
+def _vehicle(
+    vehicle: VehicleDecl, position: int, height: int, battery: int, north: int = -1, east: int = -1, down: int = -1
+) -> Vehicle:
+    braking = vehicle.braking
     return Vehicle(
         name=vehicle.name.text,
         identity=vehicle.identity,
@@ -204,4 +214,9 @@ def _vehicle(vehicle: VehicleDecl, position: int, height: int, battery: int) -> 
         height=height,
         battery=battery,
         return_altitude=0 if vehicle.return_altitude is None else vehicle.return_altitude.value,
+        braking=0 if braking is None else deceleration(braking),
+        reaction_us=0 if braking is None else braking.reaction.value,
+        north=north,
+        east=east,
+        down=down,
     )

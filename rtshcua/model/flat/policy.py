@@ -75,6 +75,9 @@ class Vehicle(Flat, frozen=True):
 
     `position`, `height`, `battery` are the state slots of the well-known signals (-1: the policy declares none).
     `return_altitude` (mm above home) is the height that a return climbs to, if it is lower, before it flies home.
+    Told to stop, it goes on for at most `reaction_us` and then loses at least `braking` mm/s of its speed in a second;
+    with `braking` 0 that is not declared. `north`, `east`, `down` are the slots of the signals of its velocity over
+    ground, -1 each without `braking`.
     """
 
     name: str
@@ -90,6 +93,11 @@ class Vehicle(Flat, frozen=True):
     height: int
     battery: int
     return_altitude: int = 0
+    braking: int = 0
+    reaction_us: int = 0
+    north: int = -1
+    east: int = -1
+    down: int = -1
 
 
 class Policy(Flat, frozen=True):

@@ -85,6 +85,14 @@ class ZoneDecl(Node):
     dates: Dates | None = None
 
 
+class Braking(Node):
+    """`brakes from 12 m/s in 6 s after 500 ms`: told to stop, it goes on for `reaction` and then loses speed evenly."""
+
+    speed: Quantity
+    time: Quantity
+    reaction: Quantity
+
+
 class VehicleDecl(Node):
     """What the checks, the simulation and "wrong vehicle" need to know of one aircraft; signed with the policy.
 
@@ -106,6 +114,7 @@ class VehicleDecl(Node):
     elevation: Quantity | None = None  # of home above sea
     elevation_within: Quantity | None = None  # how far the real elevation of the ground at home may differ
     return_altitude: Quantity | None = None  # `return at 30 m`: the autopilot's return climbs to it before it flies
+    braking: Braking | None = None
 
 
 Combination.model_rebuild()

@@ -75,7 +75,7 @@ class Dispatcher:
             token=active.command.token,
             detail=detail,
         )
-        self._executor.ended()
+        self._executor.ended(active.command.token)
         self.active = None
 
     def landed(self) -> None:
@@ -86,4 +86,5 @@ class Dispatcher:
     def release(self, now: Now) -> None:
         """Stand down: send nothing more."""
         self.end(now, "released")
+        self._executor.release()
         self._journal.add(Release())

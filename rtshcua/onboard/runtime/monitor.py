@@ -22,11 +22,14 @@ class StateMonitor:
         self._policy = policy
         self._values: list[int | None] = [None] * policy.policy.slots
         self._stamps: list[int | None] = [None] * policy.policy.slots
+        self._state: tuple[int, State] | None = None  # the last that was asked for, and when
+        self._unseen: set[int] = set()  # slots with a value that came after the last observation
         self._memory = initial(policy)
         self._truths: tuple[int, ...] = (UNKNOWN,) * len(policy.monitors)
 
     def update(self, readings: Readings) -> None:
         """Take over what one frame reported at `readings.at_us`."""
+        self._state = None
         for slot, value in readings.values:
             if not 0 <= slot < len(self._values):
                 continue
@@ -35,18 +38,36 @@ class StateMonitor:
                 continue
             self._stamps[slot] = readings.at_us
             self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
+            self._unseen.add(slot)
+
+    def hides(self, readings: Readings) -> bool:
+        """Whether these readings replace a value that nobody has looked at: frames came faster than steps were made."""
+        return any(slot in self._unseen for slot, _ in readings.values)
+
+    def seen(self) -> None:
+        """All values that are held were looked at."""
+        self._unseen.clear()
 
     def observe(self, now: Now) -> None:
         """Let the temporal monitors look at the state, once a turn: an edge lasts from one observation to the next."""
+        self.seen()
         if self._policy.monitors:
             self._memory, self._truths = observe(self._memory, self._policy, self.state(now.monotonic_us), now)
+            self._state = None
 
     def state(self, now_us: int) -> State:
         """The state as of `now_us`, with the truths of the last observation. Ages saturate at 0 and `MAX_AGE_US`, and
         are 0 where nothing was ever reported.
         """
-        return State(
-            values=tuple(self._values),
-            ages=tuple(0 if stamp is None else min(max(now_us - stamp, 0), MAX_AGE_US) for stamp in self._stamps),
-            monitors=self._truths,
+        if self._state is not None and self._state[0] == now_us:
+            return self._state[1]
+        oldest_us = now_us - MAX_AGE_US
+        ages = tuple(
+            [
+                0 if stamp is None or stamp > now_us else MAX_AGE_US if stamp < oldest_us else now_us - stamp
+                for stamp in self._stamps
+            ]
         )
+        state = State(tuple(self._values), ages, self._truths)
+        self._state = (now_us, state)
+        return state

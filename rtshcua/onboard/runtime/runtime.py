@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Ending, Event
+from rtshcua.onboard.ports import Action, Ending, Event, Readings
 from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.flight import Limits, Stage
 from rtshcua.onboard.runtime.happenings import Happenings
@@ -43,6 +43,9 @@ class Runtime:
         """
         conduct = self._conduct
         for event in events:
+            if isinstance(event, Readings) and conduct.stage is Stage.RUNNING and conduct.monitor.hides(event):
+                conduct.turn(now)  # no state goes by unwatched, however many came at once
+                conduct.monitor.seen()
             if conduct.stage is not Stage.ENDED:
                 self._happenings.take(now, event)
         conduct.monitor.observe(now)

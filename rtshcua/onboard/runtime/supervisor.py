@@ -1,4 +1,4 @@
-"""The supervisor: what must hold all the while a skill runs, `assume`, `maintain`, airspace and degrade rules."""
+"""The supervisor: what must hold all the while a skill runs, at every update of the state (`decision.watch`)."""
 
 from collections.abc import Iterable
 
@@ -42,5 +42,4 @@ class Supervisor:
         at_us = now.monotonic_us
         if 0 < contract.duration_us < at_us - self._started_us:
             return _DURATION
-        broken = [(each.clause.text, each.truth) for each in watch(self._prepared, state, self._policy, now)]
-        return self._grace.over(broken, at_us, contract.grace_us)
+        return self._grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)

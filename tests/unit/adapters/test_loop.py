@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from rtshcua.adapters.loop import WAIT_US, Loop
+import pytest
+
+from rtshcua.adapters.loop import HELD_WAIT_US, WAIT_US, Loop
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
     Append,
@@ -29,6 +31,10 @@ class World:
         self.now_us = 1_000
         self.did: list[Any] = []
         self.full = False
+        self.slow = False
+        self.kept = 0
+        self.given = 0
+        self.troubles: list[str] = []
         self.polled: list[int] = []
         self.events: list[Any] = []
         self.saw: list[Any] = []
@@ -50,10 +56,17 @@ class World:
     def release(self) -> None:
         self.did.append("release")
 
-    def append(self, line: bytes, durable: bool) -> None:
+    def append(self, line: bytes, durable: bool) -> int:
         if self.full:
             raise OSError(28, "no space left on device")
         self.did.append(line)
+        self.given += 1
+        if not self.slow:
+            self.kept = self.given
+        return self.given
+
+    def trouble(self) -> str | None:
+        return self.troubles.pop(0) if self.troubles else None
 
     def close(self) -> None:
         pass
@@ -119,3 +132,83 @@ def test_the_end_comes_after_all_else_was_done() -> None:
     world = World([End(Ending.COMPLETED), Append(b"last", True)])
     assert world.loop.turn() is Ending.COMPLETED
     assert world.did == [b"last"]
+
+
+STEP = [Append(b"allowed", False), Dispatch(COMMAND, 5_000, True), Append(b"dispatched", False)]
+OTHER = Command(8, "return_home", 4, (), (), 0, 0)
+
+
+def held(*script: Sequence[Any]) -> World:
+    """A world whose disk is slow, after a step that was admitted."""
+    world = World(STEP, *script)
+    world.slow = True
+    world.loop.turn()
+    assert world.did == [b"allowed", b"dispatched"]
+    world.did.clear()
+    return world
+
+
+def test_a_step_waits_for_its_own_record_alone_and_the_loop_goes_on() -> None:
+    world = held()
+    world.loop.turn()
+    assert (world.did, world.polled) == ([], [WAIT_US, HELD_WAIT_US])
+    world.kept = 1  # the decision; what follows it may take longer
+    world.loop.turn()
+    assert world.did == [("begin", 7)]
+    world.loop.turn()
+    assert world.did == [("begin", 7)]
+    assert world.polled[-1] == WAIT_US
+
+
+def test_a_record_that_takes_too_long_makes_its_step_late() -> None:
+    world = held()
+    world.now_us = 5_001
+    world.loop.turn()
+    assert world.events == [Failed(5_001, 7, "late")]
+    world.kept = 2
+    world.loop.turn()
+    assert world.did == []
+
+
+def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
+    world = held()
+    world.now_us, world.kept = 5_001, 2
+    world.loop.turn()
+    assert world.did == []
+    assert world.events == [Failed(5_001, 7, "late")]
+
+
+def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
+    world = held([Append(b"violated", False), Dispatch(OTHER, 9_000, False)])
+    world.loop.turn()
+    assert world.did == [b"violated", ("begin", 8)]
+    world.kept = 9
+    world.loop.turn()
+    assert world.did == [b"violated", ("begin", 8)]
+
+
+@pytest.mark.parametrize("action", [Release(), End(Ending.STOOD_DOWN)])
+def test_standing_down_drops_a_step_that_waits(action: Any) -> None:
+    world = held([action])
+    world.loop.turn()
+    world.kept = 9
+    world.loop.turn()
+    assert ("begin", 7) not in world.did
+
+
+def test_a_disk_that_fails_withholds_a_step_that_waits() -> None:
+    world = held()
+    world.troubles = ["input/output error"]
+    world.loop.turn()
+    assert world.events == [EvidenceFailed(1_000, "input/output error"), Failed(1_000, 7, "withheld")]
+    world.kept = 9
+    world.loop.turn()
+    assert world.did == []
+
+
+def test_a_failure_is_told_though_nothing_waits() -> None:
+    world = World()
+    world.troubles = ["input/output error"]
+    world.loop.turn()
+    assert world.events == [EvidenceFailed(1_000, "input/output error")]
+    assert world.polled == [0]

@@ -74,19 +74,27 @@ def test_level_edges_side_by_side() -> None:
     assert [comb.along(place, (0, 0, 0, 0)) for place in places] == [F, F, F, F, T, F, T, F, F, F]
 
 
+ZIG_ZAG = zig_zag(100)
+LEGS = list(edges(polygon(ZIG_ZAG)))
+
+
+def test_tables_of_a_zig_zag() -> None:
+    """Many edges through many slabs: fewer entries than edges times slabs."""
+    slabs, bands = Slabs(LEGS), Bands(LEGS)
+    assert slabs.entries() <= MOST * len(LEGS)
+    assert bands.entries() <= REPEATS * len(LEGS)
+    assert bands.clear(3, 500, 5, 500, (0, 0, 0, 0)), "between two edges, within the bounds of both"
+    assert not bands.clear(1, 500, 3, 500, (0, 0, 0, 0))
+
+
 @settings(max_examples=60)
 @given(worlds.CHANCES)
-def test_tables_of_a_zig_zag(of: Random) -> None:
-    """Many edges through many slabs: fewer entries than edges times slabs, and the same answers."""
-    ring = zig_zag(100)
-    legs = list(edges(polygon(ring)))
-    slabs, bands = Slabs(legs), Bands(legs)
-    assert slabs.entries() <= MOST * len(legs)
-    assert bands.entries() <= REPEATS * len(legs)
+def test_tables_of_a_zig_zag_give_the_same_answers(of: Random) -> None:
+    slabs, zone = Slabs(LEGS), polygon(ZIG_ZAG)
     for _ in range(20):
-        x, y = of.choice(ring) if of.random() < 0.5 else (of.randint(-2, 400), of.randint(-500, 1_500))
+        x, y = of.choice(ZIG_ZAG) if of.random() < 0.5 else (of.randint(-2, 400), of.randint(-500, 1_500))
         x += of.randint(-1, 1)
-        assert slabs.contains(x, y) == in_shape((x, y), polygon(ring))
+        assert slabs.contains(x, y) == in_shape((x, y), zone)
 
 
 @settings(max_examples=100)

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, loaded, ready, with_rules
 from reference.flat_case import BATTERY, FIX, HEIGHT, HOME, HOVER, LAND, LINK, NOW, POSITION_X, POSITION_Y, WIND, M, S
+from rtshcua.decision.holding import WAY_HOME
 from rtshcua.decision.links import DEGRADE, START, choose_contingency, choose_fallback, fallbacks, link_admissible
 from rtshcua.decision.truth import FALSE, UNKNOWN
 from rtshcua.decision.values import MISSING, Sets, interval, maybe, point
@@ -127,9 +128,10 @@ def test_no_link_at_all() -> None:
 
 def broken(values: dict[int, int | None], policy: Any = POLICY, **given: Any) -> list[tuple[str, int]]:
     found = watch(ready(STEP, policy), flat.state(values, **given), policy, NOW)
-    return [(one.clause.text, one.truth) for one in found]
+    return [(one.text, one.truth) for one in found]
 
 
+NEAR, LOW = "position inside grow(area, 15 m)", "height <= altitude + 5 m"
 DEGRADE_TEXT, AIRSPACE_TEXT = flat.RULES[6].text, "airspace inside city outside school"
 
 
@@ -141,20 +143,32 @@ DEGRADE_TEXT, AIRSPACE_TEXT = flat.RULES[6].text, "airspace inside city outside 
         ({WIND: None}, [("wind.speed < 10 m/s", UNKNOWN)]),
         ({BATTERY: 3_000}, []),  # `require` counts at dispatch only
         ({HEIGHT: 26 * M}, [("height <= altitude + 5 m", FALSE)]),
-        ({POSITION_X: 85 * M}, [("position inside grow(area, 15 m)", FALSE)]),  # the boundary is outside
-        ({POSITION_X: 86 * M}, []),  # where it is, not where it may go
+        ({POSITION_X: 88 * M}, [("position inside grow(area, 15 m)", FALSE)]),  # within the position error
+        ({POSITION_X: 88 * M + 1}, []),  # where it is, not where it may go
         ({POSITION_X: 600 * M}, [("position inside grow(area, 15 m)", FALSE), (AIRSPACE_TEXT, FALSE)]),
         ({BATTERY: 2_000}, [(DEGRADE_TEXT, FALSE)]),
-        ({BATTERY: None}, [(DEGRADE_TEXT, UNKNOWN)]),
+        ({BATTERY: 1_086}, [(WAY_HOME, FALSE), (DEGRADE_TEXT, FALSE)]),  # 111.8 m are 86.3 of 10000, beside 1000
+        ({BATTERY: 1_087}, [(DEGRADE_TEXT, FALSE)]),
+        ({BATTERY: None}, [(WAY_HOME, UNKNOWN), (DEGRADE_TEXT, UNKNOWN)]),
+        (
+            {POSITION_X: None, HEIGHT: 26 * M},  # too high, wherever it is
+            [(NEAR, UNKNOWN), (LOW, FALSE), (AIRSPACE_TEXT, UNKNOWN), (WAY_HOME, UNKNOWN)],
+        ),
     ],
 )
 def test_watch(values: dict[int, int | None], found: list[tuple[str, int]]) -> None:
     assert broken(values) == found
 
 
+def test_what_comes_home_or_down_needs_no_charge_for_the_way() -> None:
+    for step, needs in ((STEP, True), (flat.INVOCATIONS[-1], False)):
+        found = watch(ready(step, POLICY), flat.state({BATTERY: 100}), POLICY, NOW)
+        assert ((WAY_HOME, FALSE) in found) is needs
+
+
 def test_watch_sees_what_is_stale() -> None:
     names = [text for text, truth in broken({}, ages={POSITION_X: S}) if truth == UNKNOWN]
-    assert names == ["position inside grow(area, 15 m)", AIRSPACE_TEXT]
+    assert names == [NEAR, LOW, AIRSPACE_TEXT, WAY_HOME]
 
 
 def test_watch_without_airspace_and_degrade() -> None:

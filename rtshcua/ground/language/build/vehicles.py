@@ -7,7 +7,7 @@ from rtshcua.ground.language.build.zones import Zones
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.places import VehicleDecl
+from rtshcua.model.ir.places import Braking, VehicleDecl
 from rtshcua.model.quantity import UNITS, Dimension
 
 FULL = 100 * UNITS["%"].numerator
@@ -67,6 +67,10 @@ class Vehicles(Zones):
         """`return at 30 m`."""
         return Part("return", span, altitude)
 
+    def brakes(self, span: Span, speed: Quantity, time: Quantity, reaction: Quantity) -> Part:
+        """`brakes from 12 m/s in 6 s after 500 ms`."""
+        return Part("brakes", span, Braking(span=span, speed=speed, time=time, reaction=reaction))
+
     def vehicle(self, span: Span, name: Name, *given: Part) -> None:
         """`vehicle quad { ... }`."""
         self.undotted(name, "vehicle")
@@ -95,6 +99,7 @@ class Vehicles(Zones):
                 elevation=elevation,
                 elevation_within=elevation_within,
                 return_altitude=found["return"].value if "return" in found else None,
+                braking=found["brakes"].value if "brakes" in found else None,
             ),
             name,
         )

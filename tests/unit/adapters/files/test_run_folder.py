@@ -4,6 +4,7 @@ import errno
 import hashlib
 import json
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -12,6 +13,7 @@ from rtshcua.adapters.files.runs import RunFolder
 from rtshcua.mavlink import tlog
 
 UTC_US = 1_750_000_000_999_999  # 2025-06-15T15:06:40Z
+FRAME = bytes.fromhex("fd09000000010100000000000000020351040312d4")
 
 
 def test_folder_holds_the_bundle_and_makes_room(tmp_path: Path) -> None:
@@ -43,14 +45,13 @@ def test_a_name_stays_inside_the_folder(name: str, part: str, tmp_path: Path) ->
 
 
 def test_telemetry_is_a_tlog_and_its_digest_that_of_the_file(tmp_path: Path) -> None:
-    frame = bytes.fromhex("fd09000000010100000000000000020351040312d4")
     file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
-    file.write(UTC_US, frame)
-    file.write(UTC_US + 1, frame)
+    file.write(UTC_US, FRAME)
+    file.write(UTC_US + 1, FRAME)
     digest = file.finish()
     data = (tmp_path / "telemetry.tlog").read_bytes()
     assert digest == hashlib.sha256(data).digest()
-    assert [(entry.at_us, entry.frame) for entry in tlog.read(data)] == [(UTC_US, frame), (UTC_US + 1, frame)]
+    assert [(entry.at_us, entry.frame) for entry in tlog.read(data)] == [(UTC_US, FRAME), (UTC_US + 1, FRAME)]
 
 
 @pytest.mark.parametrize("size", [10, 1 << 20])
@@ -66,3 +67,29 @@ def test_a_full_disk_ends_the_telemetry_and_not_the_flight(size: int, tmp_path: 
     assert file.finish() == hashlib.sha256(b"").digest()
     assert file.error is not None
     assert file.error.errno == errno.ENOSPC
+
+
+def test_nobody_waits_for_a_disk_that_stands_still(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(telemetry, "MOST_WAITING", 3)
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
+    still, real, writing = Event(), file._file, Event()
+
+    class Disk:
+        def write(self, data: bytes) -> None:
+            writing.set()
+            assert still.wait(20)
+            real.write(data)
+
+        flush, close = real.flush, real.close
+
+    file._file = Disk()
+    file.write(UTC_US, FRAME)
+    assert writing.wait(20)
+    for number in range(1, 6):
+        file.write(UTC_US + number, FRAME)
+    assert file.lost == 2
+    still.set()
+    file.finish()
+    data = (tmp_path / "telemetry.tlog").read_bytes()
+    assert [entry.at_us for entry in tlog.read(data)] == [UTC_US + number for number in range(4)]
+    assert file.error is None

@@ -130,8 +130,9 @@ def test_a_program_at_longitude_180_is_that_of_any_other_longitude(home: int) ->
 
 def test_a_place_on_the_other_side_is_reached_and_simulated() -> None:
     near = arrived(-168_500_000, -HALF_TURN + 10, 20_000)
-    assert near(Observed(latitude=-168_500_000, longitude=HALF_TURN - 10, height=20_000))
-    assert not near(Observed(latitude=-168_500_000, longitude=HALF_TURN - 10_000, height=20_000))
+    there = {"latitude": -168_500_000, "height": 20_000, "located": True, "levelled": True}
+    assert near(Observed(longitude=HALF_TURN - 10, **there))
+    assert not near(Observed(longitude=HALF_TURN - 10_000, **there))
     for side in (1, -1):
         home = Home(-168_500_000, side * (HALF_TURN - 1000), 0)
         latitude, longitude = home.globe(30.0, side * 200.0)

@@ -1,0 +1,98 @@
+"""Endurance: a flight of two hours in virtual time, and how its memory grows.
+
+Leg after leg, back and forth, with evidence to a file; everything is the code of a real run, but for the vehicle. What
+the process holds is looked at after half an hour and at the end. Exits with 1 when it grew by more than the limit.
+"""
+
+import gc
+import sys
+import tempfile
+from pathlib import Path
+from time import process_time
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.loop import Loop
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Plan
+from virtual import case
+from virtual.flight import Flight
+
+HOURS = 2
+HOUR_US = 3_600 * case.S
+STEPS = 400  # more than it gets to
+LIMIT_BYTES = 2 << 20
+LIMIT_OBJECTS = 20  # for each step flown: what a step was last asked about is remembered with it
+_ENDURANCE_US = 10 * HOUR_US
+
+
+class Sink(EvidenceFile):
+    """The file, written to in virtual time: what was appended is kept."""
+
+    kept = 0
+
+    def append(self, line: bytes, durable: bool) -> int:  # type: ignore[override]
+        """Write one line, without a sync."""
+        super().append(line, durable=False)
+        self.kept += 1
+        return self.kept
+
+    def trouble(self) -> None:
+        """None."""
+
+
+def flight() -> Flight:
+    """Leg after leg, for as long as anybody looks."""
+    steps = [case.step(0, 0, flat.TAKEOFF, Plan(MotionKind.CLIMB, (), 15 * case.M, 0), 15 * case.M)]
+    for number in range(1, STEPS):
+        place = (150 * case.M if number % 2 else -50 * case.M, 0)
+        leg = case.step(1, 1, flat.GOTO, Plan(MotionKind.FLY, place, 15 * case.M, 0), *place, 15 * case.M)
+        steps.append(replace(leg, step=number, invocation_id=number.to_bytes(16, "big")))
+    policy = case.policy()
+    contracts = tuple(replace(each, validity_us=_ENDURANCE_US, duration_us=0) for each in policy.contracts)
+    steps = [replace(each, contract=replace(each.contract, validity_us=_ENDURANCE_US, duration_us=0)) for each in steps]
+    vehicle = replace(policy.vehicle, endurance_us=_ENDURANCE_US)
+    sealed = case.seal(case.mission(steps), replace(policy, contracts=contracts, vehicle=vehicle))
+    return Flight(sealed, case.simulated("px4", hover_us=_ENDURANCE_US))
+
+
+def held() -> tuple[int, int]:
+    """The bytes of memory that the process has, and the objects that the collector knows."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4_096, len(gc.get_objects())
+
+
+def main() -> int:
+    """Flies, prints, and says whether memory stayed flat."""
+    with tempfile.TemporaryDirectory() as name:
+        flown = flight()
+        clock, sink = flown.clock, Sink(Path(name) / "log.jsonl")
+        flown.loop = Loop(flown.runtime, flown.vehicle, sink, clock, lambda *_: None, 100_000)
+        start = process_time()
+        marks = []
+        for until_us in (HOUR_US // 2, HOURS * HOUR_US):
+            while clock.elapsed_us < until_us:
+                ending = flown.loop.turn()
+                assert ending is None, ending
+            marks.append(held())
+        took = process_time() - start
+        sink.close()
+    view = flown.runtime.view(clock.now())
+    grown, more = (after - before for before, after in zip(*marks, strict=True))
+    most = LIMIT_OBJECTS * view.step
+    before, after = (mark[0] / 2**20 for mark in marks)
+    print(
+        f"endurance: {HOURS} h in virtual time, {view.step} steps, {sink.kept} records, at "
+        f"{clock.elapsed_us / 1e6 / took:.0f} times real time: memory from {before:.1f} to {after:.1f} MiB (limit "
+        f"{LIMIT_BYTES >> 20} MiB more), {more} objects more (limit {most})"
+    )
+    return int(grown > LIMIT_BYTES or more > most)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,302 @@
+"""Reaction: from a telemetry frame that breaks a limit to the frame of the fallback's command, over UDP on loopback.
+
+A process flies a mission in virtual time into its second step, and from there in real time, as `rtshcua run` would:
+200 frames a second come in, until one says that the battery is low. The peer, another process, stamps that frame when
+it sends it, and the answer when it has it. Meanwhile each write of evidence and of telemetry takes 20 ms and each sync
+200 ms (injected at the files), and nobody reads the terminal. Beside it the same with a quick disk and no view. Exits
+with 1 when a figure is above its limit.
+
+The machine is noisy, so the percentiles are those of one process's reactions, and the quietest process counts; the
+median process stands beside it.
+"""
+
+import gc
+import os
+import select
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
+from random import Random
+from statistics import median
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.files.telemetry import TelemetryFile
+from rtshcua.adapters.files.writer import EvidenceWriter
+from rtshcua.adapters.loop import Loop
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.live.feed import Feed
+from rtshcua.cli.live.story import Note
+from rtshcua.cli.live.telling import Teller
+from rtshcua.cli.live.watching import Watching
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.runtime.flight import Stage
+from virtual import case
+from virtual.flight import Flight
+from virtual.shipped import shipped
+
+PROCESSES, IN_PROCESS, QUICK = 3, 100, 40
+RATE = 200
+FRAMES = 40  # before the one that counts
+WRITE_S, SYNC_S = 0.02, 0.2
+MEDIAN_LIMIT_US, P99_LIMIT_US = 500.0, 5_000.0
+PATIENCE_S = 2.0
+STEP = 1
+ECHO = """
+import select, socket
+link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+link.bind(("127.0.0.1", 0))
+print(link.getsockname()[1], flush=True)
+while True:
+    select.select([link], [], [])
+    link.sendto(*link.recvfrom(1024))
+"""
+NOT_MOTION = (511, 512)  # SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
+
+
+class SlowFile(EvidenceFile):
+    """An evidence file on a slow disk."""
+
+    def append(self, line: bytes, durable: bool) -> None:
+        """Takes its time."""
+        time.sleep(WRITE_S)
+        super().append(line, durable)
+
+    def sync(self) -> None:
+        """Takes much more."""
+        time.sleep(SYNC_S)
+        super().sync()
+
+
+class Slowly:
+    """A telemetry log's file on a slow disk."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+
+    def write(self, data: bytes) -> None:
+        """Takes its time."""
+        time.sleep(WRITE_S)
+        self._file.write(data)
+
+    def flush(self) -> None:
+        """Takes much more."""
+        time.sleep(SYNC_S)
+        self._file.flush()
+
+
+class Going:
+    """A flight's clock that goes on in real time."""
+
+    def __init__(self, since: Now) -> None:
+        self._since = since
+        self._start_ns = time.monotonic_ns()
+
+    def now(self) -> Now:
+        """The present moment."""
+        gone_us = (time.monotonic_ns() - self._start_ns) // 1_000
+        return Now(self._since.monotonic_us + gone_us, self._since.utc_us + gone_us, self._since.utc_error_us)
+
+    def heard(self, boot_us: int) -> None:
+        """Nothing."""
+
+    def real_seconds(self, us: int) -> float:
+        """Seconds."""
+        return us / 1e6
+
+    def us_in(self, seconds: float) -> int:
+        """Microseconds."""
+        return int(seconds * 1e6)
+
+
+def under_way() -> Flight:
+    """A flight whose second step flies."""
+    flight = Flight(shipped("short"), case.simulated("px4"))
+    while True:
+        assert flight.loop.turn() is None
+        view = flight.runtime.view(flight.clock.now())
+        if view.stage is Stage.RUNNING and view.step == STEP:
+            return flight
+
+
+def telemetry(flight: Flight) -> list[bytes]:
+    """What the vehicle says next, and the frame that breaks a limit."""
+    frames: list[bytes] = []
+    simulation, elapsed_us = flight.vehicle.simulation, flight.clock.elapsed_us
+    while len(frames) < FRAMES:
+        elapsed_us += 20_000
+        frames += simulation.advance(elapsed_us)
+    low = mavlink.MAVLink_battery_status_message(0, 0, 0, 32_767, [65_535] * 10, -1, 0, 0, 20)
+    return [*frames[:FRAMES], Codec(1, 1).pack(low)]
+
+
+@contextmanager
+def blocked() -> Iterator[Feed]:
+    """A view whose terminal nobody reads: its pipe is full, and so is the one to it."""
+    reading, writing = os.pipe()
+    stdout = os.dup(1)
+    os.dup2(writing, 1)
+    feed = Feed("lines")
+    os.dup2(stdout, 1)
+    while len(feed._waiting) < 10:
+        feed.post(Note("nobody reads this " * 20))
+    try:
+        yield feed
+    finally:
+        feed._process.kill()
+        feed._process.wait()
+        for handle in (reading, writing, stdout):
+            os.close(handle)
+
+
+def unwatched(*_: Any) -> None:
+    """Nobody looks."""
+
+
+def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
+    """The flight from here on, in real time, until the peer has had its answer."""
+    clock = Going(flight.clock.now())
+    frames = TelemetryFile(folder / "telemetry.tlog")
+    if feed is not None:
+        frames._file = Slowly(frames._file)
+    sink = EvidenceWriter((SlowFile if feed else EvidenceFile)(folder / "log.jsonl"))
+    vehicle = UdpVehicle(("127.0.0.1", 0), flight.vehicle.driver, clock, frames.write)
+    watch: Callable[..., None] = unwatched
+    if feed is not None:
+        policy, mission = flight.loaded.bundle.policy, flight.loaded.bundle.mission
+        teller = Teller(policy, mission, clock.now().monotonic_us)
+        watch = Watching(feed, teller, flight.runtime.view, lambda: vehicle.driver.unready, live=True)
+    loop = Loop(flight.runtime, vehicle, sink, clock, watch)
+    gc.collect()
+    gc.freeze()  # as `rtshcua run` does
+    print(vehicle.port, flush=True)
+    while not select.select([sys.stdin], [], [], 0)[0]:
+        loop.turn()
+    sys.stdin.readline()
+    vehicle.close()
+    gc.unfreeze()
+
+
+def fly(*, slowly: bool) -> None:
+    """In a process of its own: one flight after the other, for as long as the peer asks."""
+    with blocked() if slowly else nullcontext() as feed, tempfile.TemporaryDirectory() as folder:
+        number = 0
+        while sys.stdin.readline():
+            place = Path(folder) / str(number)
+            place.mkdir()
+            fly_on(under_way(), feed, place)
+            number += 1
+
+
+def reactions(
+    frames: list[bytes], chance: Random, *, slowly: bool, processes: int = 1, count: int = IN_PROCESS
+) -> list[list[float]]:
+    """The reactions in each of some processes, in us, in their order."""
+    found = []
+    for _ in range(processes):
+        words = [sys.executable, __file__, "--fly", "slowly" if slowly else "quickly"]
+        with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as flying:
+            found.append([one(flying, frames, chance) for _ in range(count)])
+            flying.stdin.close()
+            flying.kill()  # its files are slow
+    return found
+
+
+def one(flying: Any, frames: list[bytes], chance: Random) -> float:
+    """One reaction of the process, in us."""
+    flying.stdin.write(b"\n")
+    flying.stdin.flush()
+    port = int(flying.stdout.readline())
+    took = react(("127.0.0.1", port), frames, chance)
+    flying.stdin.write(b"\n")
+    flying.stdin.flush()
+    return took
+
+
+def react(address: tuple[str, int], frames: list[bytes], chance: Random) -> float:
+    """Send the frames at their rate, and time the answer to the last."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        start_s = time.monotonic()
+        for number, frame in enumerate(frames[:-1]):
+            link.sendto(frame, address)
+            time.sleep(max(0.0, start_s + (number + 1) / RATE - time.monotonic()))
+        time.sleep(chance.random() / RATE)
+        link.setblocking(False)
+        with suppress(BlockingIOError):
+            while link.recv(1024):
+                pass
+        link.settimeout(PATIENCE_S)
+        sent_ns = time.monotonic_ns()
+        link.sendto(frames[-1], address)
+        while True:
+            answer = link.recv(1024)
+            had_ns = time.monotonic_ns()
+            for received in Codec(1, 1).parse(answer):
+                if received.name.startswith("COMMAND_") and received.message.command not in NOT_MOTION:
+                    return (had_ns - sent_ns) / 1e3
+
+
+def bare(count: int) -> list[float]:
+    """What the same way takes with nothing done on it, in us: a process that sends back whatever comes."""
+    words = [sys.executable, "-c", ECHO]
+    with (
+        subprocess.Popen(words, stdout=subprocess.PIPE) as echo,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        address, times = ("127.0.0.1", int(echo.stdout.readline())), []
+        link.settimeout(PATIENCE_S)
+        for _ in range(count):
+            time.sleep(1 / RATE)
+            sent_ns = time.monotonic_ns()
+            link.sendto(bytes(50), address)
+            link.recv(1024)
+            times.append((time.monotonic_ns() - sent_ns) / 1e3)
+        echo.kill()
+    return times
+
+
+def high(times: list[float]) -> float:
+    """The 99th percentile."""
+    return sorted(times)[-(-len(times) * 99 // 100) - 1]
+
+
+def main() -> int:
+    """Measures, prints, and says whether the limits held."""
+    if sys.argv[1:2] == ["--fly"]:
+        fly(slowly=sys.argv[2] == "slowly")
+        return 0
+    frames, chance = telemetry(under_way()), Random(1)
+    gc.disable()
+    slow = reactions(frames, chance, slowly=True, processes=PROCESSES)
+    (quick,) = reactions(frames, chance, slowly=False, count=QUICK)
+    middle, worst = min(map(median, slow)), min(map(high, slow))
+    print(
+        f"reaction: telemetry frame in to fallback command out, {RATE} frames a second, slow disk, blocked terminal: "
+        f"median {middle:.0f} us (limit {MEDIAN_LIMIT_US:.0f}), p99 {worst:.0f} us (limit {P99_LIMIT_US:.0f}); median "
+        f"process: {median(map(median, slow)):.0f} us, {median(map(high, slow)):.0f} us; "
+        f"first of a process: {median(times[0] for times in slow):.0f} us"
+    )
+    print(
+        f"reaction: with a quick disk and no view: median {median(quick):.0f} us, p99 {high(quick):.0f} us; "
+        f"the slow disk and the terminal make it {middle / median(quick):.2f} times"
+    )
+    echo = bare(IN_PROCESS)
+    print(
+        f"reaction: a process that only sends back what comes: median {median(echo):.0f} us, p99 {high(echo):.0f} us; "
+        f"ours takes {middle / median(echo):.1f} times that"
+    )
+    return int(middle > MEDIAN_LIMIT_US or worst > P99_LIMIT_US)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -12,15 +12,20 @@ from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.files.replay import FileReplayStore
 from rtshcua.adapters.files.runs import RunFolder
+from rtshcua.adapters.files.signing import LinkKeyError
+from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated
+from rtshcua.cli.agents import Agents
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
+from rtshcua.cli.live.story import Note
+from rtshcua.cli.signing import Signing
 from rtshcua.cli.tape import Tape
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -46,7 +51,10 @@ _NOT_HERE = ("mode-refused", "wrong-vehicle")
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`."""
+    """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`.
+
+    `fence` False: the vehicle's own fence is left as it is.
+    """
 
     bundle: Path
     link: Address | None
@@ -61,6 +69,11 @@ class Launch:
     state: Path
     runs: Path
     style: str
+    fence: bool = True
+    signing_key: Path | None = None
+    unsigned_radio: bool = False
+    agent_socket: Path | None = None
+    dry_run: bool = False
 
 
 class Refused(Exception):
@@ -87,21 +100,33 @@ def launch(order: Launch) -> ExitCode:
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
             slack = max(1, round(order.speed / _UNHURRIED))
-            vehicle = _listen(order, _driver(loaded, slack), clock, tape)
+            signing = _sign(order, loaded, clock)
+            stack.callback(signing.close)
+            vehicle = _listen(order, _driver(order, loaded, slack, signing), clock, tape)
             stack.callback(vehicle.close)
             if order.link is None:
                 stack.enter_context(_simulate(order, loaded, vehicle.port))
+            agents = None if order.agent_socket is None else stack.enter_context(Agents(order.agent_socket, loaded))
             events = _meet(order, vehicle, clock, interrupts)
+            if order.dry_run:
+                from rtshcua.cli.dry_run import dry_run  # shows what would pass as `why` does, which is of the ground
+
+                return dry_run(loaded, vehicle, clock, interrupts, events, as_json=order.style == "json")
             resumed = _opened_before(order, loaded, vehicle, clock, events)
             run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
             feed = view.enter_context(Feed(order.style))
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
+                agents=agents,
             )  # fmt: skip
+            for note in signing.notes:
+                feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
             code, summary = flight.fly()
+        if signing.trouble is not None:
+            feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
 
@@ -143,9 +168,36 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     return loaded
 
 
-def _driver(loaded: Loaded, slack: int) -> Driver:
+def _sign(order: Launch, loaded: Loaded, clock: LinkClock) -> Signing:
     try:
-        return Driver(loaded.bundle.policy, slack)
+        signing = Signing(
+            order.signing_key, loaded.bundle.policy, loaded.executor.frames, order.state, clock,
+            unsigned_radio=order.unsigned_radio,
+        )  # fmt: skip
+    except LinkKeyError as error:
+        raise Refused(ExitCode.UNTRUSTED, f"link-key-{error.slug}", str(error), error.help) from None
+    if order.signing_key is None and order.link is not None and not order.link.is_loopback:
+        signing.notes.append(
+            f"`{order.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"
+        )
+    return signing
+
+
+def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driver:
+    policy = loaded.bundle.policy
+    try:
+        own = manoeuvres(packs_of(policy.sources))
+    except BrokenPack as error:
+        raise Refused(ExitCode.REFUSED, "broken-pack", error.text) from None
+    try:
+        return Driver(
+            policy,
+            loaded.executor.frames,
+            slack,
+            fence=order.fence and not order.dry_run,
+            manoeuvres=own,
+            verifier=signing.verifier,
+        )
     except UnknownSource as error:
         raise Refused(ExitCode.REFUSED, "unknown-source", str(error)) from None
 
@@ -164,6 +216,8 @@ def _listen(order: Launch, driver: Driver, clock: LinkClock, tape: Tape) -> UdpV
 
 def _simulate(order: Launch, loaded: Loaded, port: int) -> Simulator:
     words = [*simulated.fitting(loaded.bundle.policy), *order.simulator]
+    if order.signing_key is not None:
+        words += ["--signing-key", str(order.signing_key)]
     try:
         return Simulator(["--port", str(port), "--speed", f"{order.speed:g}", *words])
     except SimulatorError as error:

@@ -40,11 +40,26 @@ def run(
     root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
     log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
+    signing_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="the link's key: sign what is sent, believe nothing unsigned")
+    ] = None,
+    unsigned_radio: Annotated[
+        bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, the worst of the last seconds")
+    ] = False,
     runs: Annotated[Path, typer.Option(help="where the run's folder is made")] = Path("runs"),
     state_dir: Annotated[Path | None, typer.Option(help="where it is kept which bundles flew (the data folder)")]
     = None,
     fresh_state: Annotated[bool, typer.Option("--fresh-state", help="forget which bundles flew; simulation only")]
     = False,
+    no_fence: Annotated[
+        bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
+    ] = False,
+    agent_socket: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="a local socket: records go out, signed documents come in")
+    ] = None,
+    rehearsal: Annotated[
+        bool, typer.Option("--dry-run", help="decide every step against the present state; send no motion")
+    ] = False,
     plain: Annotated[bool, typer.Option("--plain", help="one line an event, in a terminal too")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the summary last")] = False,
 ) -> ExitCode:  # fmt: skip
@@ -60,6 +75,8 @@ def run(
         return fail(ExitCode.USAGE, "`--connect` needs `--vehicle`: which vehicle is it?", _VEHICLE_HELP)
     if fresh_state and (state_dir is not None or not own):
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
+    if unsigned_radio and signing_key is None:
+        return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
     try:
         link = None if connect is None else address.parse(connect)
     except ValueError as error:
@@ -86,6 +103,11 @@ def run(
             state=state,
             runs=runs,
             style=_style(plain=plain, as_json=as_json),
+            signing_key=signing_key,
+            unsigned_radio=unsigned_radio,
+            agent_socket=agent_socket,
+            dry_run=rehearsal,
+            fence=not no_fence and not rehearsal,
         )
         try:
             return launch(order)

@@ -5,8 +5,10 @@ It obeys position targets in GUIDED only, and ignores them silently elsewhere; t
 
 from rtshcua.adapters.ardupilot import modes
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.datum import relative_m
 from rtshcua.adapters.vehicle.effects import airborne, armed, arrived, climbed, down, in_mode, in_mode_or_down, still
-from rtshcua.adapters.vehicle.flavour import Flavour, Stage
+from rtshcua.adapters.vehicle.fence import FenceHabits
+from rtshcua.adapters.vehicle.flavour import Flavour, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
@@ -16,13 +18,14 @@ _ARM_US = 8_000_000
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
 _GUIDED = frozenset({modes.GUIDED})
+_POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
 
 
 def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
     """The stages of a manoeuvre."""
     match command.kind:
         case MotionKind.CLIMB:
-            takeoff = messages.command(system, messages.TAKEOFF, 0, 0, 0, 0, 0, 0, command.altitude / 1_000)
+            takeoff = messages.command(system, messages.TAKEOFF, 0, 0, 0, 0, 0, 0, relative_m(command.altitude))
             return [
                 _guided(system),
                 Stage(messages.arm(system), messages.ARM_DISARM, armed, _GUIDED, _ARM_US),
@@ -35,7 +38,7 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                 speed = messages.command(system, messages.CHANGE_SPEED, 1, command.speed / 1_000, -1)
                 way.append(Stage(speed, messages.CHANGE_SPEED, None, _GUIDED, _SPEED_US, powered=True))
             for latitude, longitude in zip(command.geo[::2], command.geo[1::2], strict=True):
-                target = messages.position_target(system, latitude, longitude, command.altitude)
+                target = messages.position_target(system, latitude, longitude, relative_m(command.altitude))
                 near = arrived(latitude, longitude, command.altitude)
                 way.append(Stage(target, None, near, _GUIDED, repeat_us=_REPEAT_US, powered=True, travels=True))
             return way
@@ -67,4 +70,14 @@ def _down(system: int, mode: int) -> list[Stage]:
     ]
 
 
-ARDUPILOT = Flavour("ardupilot", 3, modes.NAMES, stages)
+ARDUPILOT = Flavour(
+    name="ardupilot",
+    autopilot=3,
+    mode_names=modes.NAMES,
+    stages=stages,
+    estimator="EKF_STATUS_REPORT",
+    natural=frozenset(),
+    returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
+    bytewise=False,
+    fence=FenceHabits(frame=0, all_inclusions=True, switches=(("FENCE_TYPE", _POLYGONS), ("FENCE_ENABLE", 1))),
+)

@@ -56,6 +56,12 @@ class Commander:
             self._last_us[stage.command] = now_us
         return [stage.message]
 
+    @property
+    def waits(self) -> bool:
+        """Whether a command of the present stage was sent and not answered yet."""
+        stage = self._stage
+        return stage is not None and stage.command is not None and not self.accepted and self.refused is None
+
     def acknowledge(self, command: int, result: int, now_us: int) -> None:
         """Take in one COMMAND_ACK of the vehicle. PX4 answers some twice: accepted, and then what came of it."""
         if self._stage is None or command != self._stage.command:

@@ -1,27 +1,48 @@
 """A vehicle without its socket: frames in, events and frames out, time given; for real and virtual time."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.announcer import Announcer
 from rtshcua.adapters.vehicle.commander import Commander
-from rtshcua.adapters.vehicle.flavour import Flavour, Message
+from rtshcua.adapters.vehicle.datum import NoDatum
+from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
+from rtshcua.adapters.vehicle.flavour import Flavour, Message, Stages, mode_name
+from rtshcua.adapters.vehicle.link import Link
 from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
 from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.streams import ALWAYS, Streams
 from rtshcua.adapters.vehicle.telemetry import Telemetry
-from rtshcua.mavlink.frames import Codec, Received
+from rtshcua.adapters.vehicle.texts import Texts
+from rtshcua.mavlink.frames import Received, Verifier
 from rtshcua.model.flat.policy import Policy
-from rtshcua.onboard.ports import AirState, Command, Event, LinkBack, LinkLost, Readings, Ready, Sent
+from rtshcua.onboard.enforcement.frames import OURS, Gate
+from rtshcua.onboard.ports import (
+    AirState,
+    Command,
+    Event,
+    Failed,
+    LinkBack,
+    LinkLost,
+    Noted,
+    Readings,
+    Ready,
+    Said,
+    Sent,
+    TakenOver,
+)
 
-#: Component id of the onboard controller that mediates.
-COMPONENT = 191
+COMPONENT = OURS
 HEARTBEAT_US = 1_000_000
 LINK_LOST_US = 3_000_000
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
+_WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
 
 
@@ -37,14 +58,24 @@ class Driver:
     """One vehicle, chosen by the first heartbeat of an autopilot that we know; frames of other systems do not count.
 
     `slack` stretches every wait for an answer or an effect. It is 1, but for a simulated vehicle that lives so much
-    faster than life that the machine's own hold-ups would count as silence.
+    faster than life that the machine's own hold-ups would count as silence. `fence` False: the vehicle's own fence is
+    left as it is. Whatever is sent goes out through `frames`; with a `verifier` only what it accepts comes in.
+    `manoeuvres` are ways to fly by flavour (`px4`) and by flavour and skill (`px4.spray_area`): see `adapters.packs`.
     """
 
-    def __init__(self, policy: Policy, slack: int = 1) -> None:
+    def __init__(
+        self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
+        verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
+    ) -> None:  # fmt: skip
+        self._policy = policy
+        self._fence = fence
+        self._manoeuvres = manoeuvres or {}
         self._telemetry = Telemetry(policy)
-        self._home_within = policy.vehicle.home_within
-        self._streams = Streams({**self._telemetry.intervals, **ALWAYS}, self._telemetry.sources)
-        self._codec = Codec(255, COMPONENT)
+        self._streams = Streams({}, ())
+        self._preflight: Preflight | None = None
+        self._texts = Texts()
+        self._announcer = Announcer()
+        self._link = Link(frames, verifier)
         self._flavour: Flavour | None = None
         self._seen = Observed()
         self._system = 0
@@ -54,6 +85,7 @@ class Driver:
         self._beat_us: int | None = None
         self._silent = False
         self._was_ready = False
+        self._released = False
         self._was_air: tuple[bool, bool] | None = None
 
     @property
@@ -71,20 +103,20 @@ class Driver:
         """What `Ready` waits for, in words; None once it was given, or when only streams are still to come."""
         if self._was_ready:
             return None
-        return self._seen.unready or (None if self._seen.airborne else self._far_from_home())
+        return self._seen.unready or (None if self._seen.airborne else self._unsettled())
 
     def receive(self, datagram: bytes, now_us: int) -> Heard:
         """Take in a datagram; whatever its bytes, never raises."""
         events: list[Event] = []
         send: list[Message] = []
-        received = self._codec.parse(datagram)
+        received = self._link.parse(datagram, now_us)
         for frame in received:
             if self._flavour is None:
                 self._choose(frame)
             if frame.system == self._system and self._flavour is not None:
-                self._take(frame, now_us, events)
+                self._take(frame, now_us, events, send)
                 self._advance(now_us, send, events)
-        return Heard(events, self._pack(send), received)
+        return Heard(events, self._pack(send, now_us, events), received)
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """What is due at a time: heartbeat, requests for streams, retries, a link that fell silent."""
@@ -95,7 +127,10 @@ class Driver:
         if self._beat_us is None or now_us - self._beat_us >= HEARTBEAT_US:
             self._beat_us = now_us
             send.append(messages.heartbeat())
+        self._seen.pass_time(now_us)
         send += self._streams.due(self._system, now_us)
+        send += self._prepare(now_us)
+        self._hear(self._texts.due(now_us), events)
         heard_us = self._seen.heartbeat_us
         if not self._silent and heard_us is not None and now_us - heard_us > LINK_LOST_US:
             self._silent = True
@@ -104,31 +139,53 @@ class Driver:
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(Ready(now_us))
-        return events, self._pack(send)
+        events += self._notes(now_us)
+        send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
+        return events, self._pack(send, now_us, events)
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
         """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard."""
         if self._flavour is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
         before = frozenset[int]() if self._manoeuvre is None else self._manoeuvre.modes
-        stages = self._flavour.stages(command, self._seen, self._system)
+        try:
+            stages = self._way(self._flavour, command)(command, self._seen, self._system)
+        except NoDatum as error:
+            return [Failed(now_us, command.token, "no-datum", str(error))], []
+        except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
+            return [Failed(now_us, command.token, "broken-manoeuvre", str(error))], []
         self._manoeuvre = Manoeuvre(command, self._flavour, self._seen, stages, self._commander, before)
-        frames = self._pack(self._manoeuvre.start(self._seen, now_us))
-        return [Sent(now_us, command.token)] if frames else [], frames
+        events: list[Event] = []
+        frames = self._pack(self._manoeuvre.start(self._seen, now_us), now_us, events)
+        return [Sent(now_us, command.token), *events] if frames else events, frames
+
+    def _way(self, flavour: Flavour, command: Command) -> Stages:
+        """How this skill is flown: in a way of its own, if a pack brings one, else as any of its kind."""
+        own = self._manoeuvres.get(f"{flavour.name}.{command.skill}")
+        return own or self._manoeuvres.get(flavour.name, flavour.stages)
 
     def release(self) -> None:
         """Stand down: nothing that moves the vehicle is sent any more."""
-        self._manoeuvre = None
+        self._manoeuvre, self._released = None, True
+
+    def announce(self, severity: int, text: str) -> None:
+        """Tell any ground station; goes out with a later `tick`, when the link has nothing better to do."""
+        self._announcer.add(severity, text)
 
     def _choose(self, frame: Received) -> None:
         if frame.name != "HEARTBEAT" or frame.component != _AUTOPILOT:
             return
-        self._flavour = _FLAVOURS.get(frame.message.autopilot)
-        if self._flavour is not None:
+        flavour = self._flavour = _FLAVOURS.get(frame.message.autopilot)
+        if flavour is not None:
             self._system = frame.system
-            self._codec = Codec(frame.system, COMPONENT, only={frame.system})
+            self._link.settle(frame.system)
+            self._seen.estimator = Estimator(flavour.estimator)
+            wanted = {**self._telemetry.intervals, **ALWAYS, flavour.estimator: STALE_US // _WITHIN_STALE}
+            self._streams = Streams(wanted, self._telemetry.sources)
+            slack = self._commander.slack
+            self._preflight = Preflight(self._policy, flavour, self._seen, fence=self._fence, slack=slack)
 
-    def _take(self, frame: Received, now_us: int, events: list[Event]) -> None:
+    def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> None:
         name, message = frame.name, frame.message
         if frame.component == _AUTOPILOT:
             self._spoken.add(name)
@@ -138,15 +195,23 @@ class Driver:
             self._acknowledge(frame, now_us)
             return
         self._streams.heard(name, now_us)
-        values = self._telemetry.read(name, message, frame.component)
+        values = self._telemetry.read(name, message, frame.component, partial(self._vouched, name, now_us))
         if values:
             events.append(Readings(now_us, values))
         if frame.component != _AUTOPILOT:
             return
+        before = self._seen.mode
         self._seen.take(name, message, now_us)
-        if name == "HEARTBEAT" and self._silent:
-            self._silent = False
-            events.append(LinkBack(now_us))
+        match name:
+            case "HEARTBEAT":
+                self._watch_mode(before, now_us, events)
+                if self._silent:
+                    self._silent = False
+                    events.append(LinkBack(now_us))
+            case "STATUSTEXT":
+                self._hear(self._texts.take(message, now_us), events)
+            case _ if self._preflight is not None and self._is_for_us(message):
+                send += self._preflight.take(name, message, self._system, now_us)
         air = (self._seen.armed, self._seen.airborne)
         if air != self._was_air and self._seen.landed_state:
             self._was_air = air
@@ -154,29 +219,74 @@ class Driver:
 
     def _acknowledge(self, frame: Received, now_us: int) -> None:
         message = frame.message
-        if frame.component != _AUTOPILOT or message.target_component not in (0, COMPONENT):
+        if frame.component != _AUTOPILOT or not self._is_for_us(message):
             return
         if message.command == messages.SET_INTERVAL:
             self._streams.answered(message.result == 0)
         else:
             self._commander.acknowledge(message.command, message.result, now_us)
 
+    def _is_for_us(self, message: Message) -> bool:
+        return getattr(message, "target_component", 0) in (0, COMPONENT)
+
+    def _vouched(self, name: str, now_us: int, field: str) -> bool:
+        return self._seen.estimator.vouches_for(name, field, now_us)
+
+    def _hear(self, said: Sequence[Said], events: list[Event]) -> None:
+        for each in said:
+            self._seen.say(each.severity, each.text)
+            events.append(each)
+
+    def _watch_mode(self, before: int | None, now_us: int, events: list[Event]) -> None:
+        """In the air, and outside of any manoeuvre of ours, too, whoever changes the mode has taken over."""
+        mode, flavour = self._seen.mode, self._flavour
+        if self._manoeuvre is not None or self._released or not self._seen.airborne or mode is None or flavour is None:
+            return
+        if before not in (None, mode) and (before, mode) not in flavour.natural:
+            events.append(TakenOver(now_us, mode_name(flavour, mode)))
+
+    def _prepare(self, now_us: int) -> list[Message]:
+        """On the ground, before it is ready: what has to be settled with the vehicle."""
+        if self._preflight is None or self._was_ready or not self._seen.down:
+            return []
+        return self._preflight.due(self._system, now_us)
+
+    def _unsettled(self) -> str | None:
+        return None if self._preflight is None else self._preflight.unready
+
+    def _notes(self, now_us: int) -> list[Event]:
+        told = [self._seen.notes, self._streams.notes]
+        if self._preflight is not None:
+            told.append(self._preflight.notes)
+        events: list[Event] = [Noted(now_us, text) for notes in told for text in notes]
+        for notes in told:
+            notes.clear()
+        return events
+
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
         if self._manoeuvre is not None:
-            out, happened = self._manoeuvre.advance(self._seen, now_us)
+            try:
+                out, happened = self._manoeuvre.advance(self._seen, now_us)
+            except Exception as error:  # noqa: BLE001  see `begin`
+                events += self._break(self._manoeuvre, error, now_us)
+                return
             send += out
             events += happened
 
+    def _break(self, manoeuvre: Manoeuvre, error: Exception, now_us: int) -> list[Event]:
+        if manoeuvre.over:
+            return []
+        manoeuvre.over = True
+        return [Failed(now_us, manoeuvre.token, "broken-manoeuvre", str(error))]
+
     def _is_ready(self, now_us: int) -> bool:
         seen = self._seen
-        return seen.ready and self._streams.settled(now_us) and (seen.airborne or self._far_from_home() is None)
+        return seen.ready and self._streams.settled(now_us) and (seen.airborne or self._unsettled() is None)
 
-    def _far_from_home(self) -> str | None:
-        """On the ground, where it stands becomes its home, which all of the policy is drawn around."""
-        away = self._telemetry.distance_from_home(self._seen.latitude, self._seen.longitude)
-        if away <= self._home_within:
-            return None
-        return f"it stands {away // 1_000} m from the policy's home, more than {self._home_within // 1_000} m"
-
-    def _pack(self, send: Sequence[Message]) -> list[bytes]:
-        return [self._codec.pack(message) for message in send]
+    def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
+        """The frames that the boundary lets out. A manoeuvre that it stops has failed."""
+        frames, refused = self._link.pack(send, now_us)
+        if refused and self._manoeuvre is not None and not self._manoeuvre.over:
+            self._manoeuvre.over = True
+            events.append(Failed(now_us, self._manoeuvre.token, refused[0]))
+        return frames

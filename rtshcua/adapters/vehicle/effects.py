@@ -35,7 +35,7 @@ def airborne(seen: Observed) -> bool:
 
 def still(seen: Observed) -> bool:
     """In the air and not moving, gusts apart."""
-    return seen.airborne and seen.speed <= STILL
+    return seen.airborne and seen.speed is not None and seen.speed <= STILL
 
 
 def down(seen: Observed) -> bool:
@@ -44,15 +44,17 @@ def down(seen: Observed) -> bool:
 
 
 def climbed(altitude: int) -> Callable[[Observed], bool]:
-    """In the air at the height (mm above home)."""
-    return lambda seen: seen.airborne and seen.height >= altitude - CLIMBED
+    """In the air at the height (mm above home), by what the estimator vouches for."""
+    return lambda seen: seen.airborne and seen.levelled and seen.height >= altitude - CLIMBED
 
 
 def arrived(latitude: int, longitude: int, altitude: int) -> Callable[[Observed], bool]:
-    """Near the place (1e-7 degree, mm above home)."""
+    """Near the place (1e-7 degree, mm above home), by what the estimator vouches for."""
     shrink = cos(radians(latitude / 1e7))
 
     def near(seen: Observed) -> bool:
+        if not (seen.located and seen.levelled):
+            return False
         north = (seen.latitude - latitude) * _MM_PER_UNIT
         east = (meridian(seen.longitude, longitude) - longitude) * _MM_PER_UNIT * shrink
         return hypot(north, east) <= ARRIVED and abs(seen.height - altitude) <= LEVEL

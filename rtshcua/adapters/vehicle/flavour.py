@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
+from rtshcua.adapters.vehicle.fence import FenceHabits
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.onboard.ports import Command
 
@@ -31,14 +32,36 @@ class Stage:
     travels: bool = False
 
 
+Stages: TypeAlias = Callable[[Command, Observed, int], list[Stage]]
+"""How a command is flown: what is seen and the target system to the stages of its manoeuvre."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnAltitude:
+    """A parameter that holds the height at which the autopilot flies home, and the mm in one of its units."""
+
+    parameter: str
+    mm: int
+
+
 @dataclass(frozen=True, slots=True)
 class Flavour:
-    """An autopilot's name, the names of its modes, and how it is made to do each kind of motion."""
+    """An autopilot: its name, the names of its modes, how it is made to do each kind of motion, and its own ways.
+
+    `estimator` is the message in which its estimator reports. `natural` are changes of mode (from, to) that it makes
+    in the course of what it was told. `returns` are parameters of which one is there. `bytewise`: integer parameters
+    travel as their bytes. `fence` says how it takes a geofence.
+    """
 
     name: str
     autopilot: int  # MAV_AUTOPILOT of its heartbeat
     mode_names: Mapping[int, str]
-    stages: Callable[[Command, Observed, int], list[Stage]]  # command, what is seen, target system
+    stages: Stages
+    estimator: str
+    natural: frozenset[tuple[int, int]]
+    returns: tuple[ReturnAltitude, ...]
+    bytewise: bool
+    fence: FenceHabits
 
 
 def mode_name(flavour: Flavour, number: int) -> str:

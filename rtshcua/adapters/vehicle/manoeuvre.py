@@ -11,6 +11,8 @@ from rtshcua.onboard.ports import Command, Event, Failed, Succeeded, TakenOver
 
 #: A vehicle that should travel and stands still for this long has stopped short of its target.
 STOPPED_US = 10_000_000
+#: Never answered, and no effect seen: it may have been executed, or be executed yet.
+UNKNOWN = "unknown/no-answer"
 
 
 class Manoeuvre:
@@ -38,13 +40,18 @@ class Manoeuvre:
         self.over = False
 
     @property
+    def token(self) -> int:
+        """Of its command."""
+        return self._command.token
+
+    @property
     def modes(self) -> frozenset[int]:
         """The flight modes in which nobody has taken over."""
         return self._modes | self._before
 
     def start(self, seen: Observed, now_us: int) -> list[Message]:
         """The first messages to send."""
-        seen.text = ""  # what it says from now on may be about this
+        seen.hush()
         return self._enter(now_us)
 
     def advance(self, seen: Observed, now_us: int) -> tuple[list[Message], Sequence[Event]]:
@@ -109,11 +116,11 @@ class Manoeuvre:
             return "disarmed"
         waited_us = now_us - max(self._entered_us, commander.busy_us or 0)
         if stage.timeout_us and waited_us > stage.timeout_us * commander.slack:
-            return "no-effect"
+            return UNKNOWN if commander.waits else "no-effect"
         if not (stage.travels and still(seen)):
             self._stopped_us = None
         elif self._stopped_us is None:
             self._stopped_us = now_us
         elif now_us - self._stopped_us > STOPPED_US:
-            return "stopped-short"
+            return UNKNOWN if commander.waits else "stopped-short"
         return None

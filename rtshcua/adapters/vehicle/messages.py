@@ -4,6 +4,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from rtshcua.adapters.vehicle.fence import FenceItem
+
 NAN = float("nan")
 
 DO_SET_MODE = dialect.MAV_CMD_DO_SET_MODE
@@ -12,6 +14,9 @@ TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
 REPOSITION = dialect.MAV_CMD_DO_REPOSITION
 CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
 SET_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+RUN_PREARM_CHECKS = dialect.MAV_CMD_RUN_PREARM_CHECKS
+FENCE = dialect.MAV_MISSION_TYPE_FENCE
+TEXT_OCTETS = 50
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _POSITION_ONLY = 0x0DF8  # POSITION_TARGET_TYPEMASK: ignore velocity, acceleration, yaw and yaw rate
@@ -40,21 +45,21 @@ def arm(system: int) -> Any:
     return command(system, ARM_DISARM, 1, 0)
 
 
-def reposition_amsl(system: int, latitude: int, longitude: int, amsl_mm: int, speed_mm_s: int) -> Any:
+def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int) -> Any:
     """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode."""
     speed = speed_mm_s / 1_000 if speed_mm_s else -1.0
     flags = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
     return dialect.MAVLink_command_int_message(
         system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
-        speed, flags, 0, NAN, latitude, longitude, amsl_mm / 1_000,
+        speed, flags, 0, NAN, latitude, longitude, amsl_m,
     )  # fmt: skip
 
 
-def position_target(system: int, latitude: int, longitude: int, height_mm: int) -> Any:
-    """SET_POSITION_TARGET_GLOBAL_INT: a place at a height above home."""
+def position_target(system: int, latitude: int, longitude: int, height_m: float) -> Any:
+    """SET_POSITION_TARGET_GLOBAL_INT: a place at a height in metres above home."""
     return dialect.MAVLink_set_position_target_global_int_message(
         0, system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, _POSITION_ONLY,
-        latitude, longitude, height_mm / 1_000, 0, 0, 0, 0, 0, 0, 0, 0,
+        latitude, longitude, height_m, 0, 0, 0, 0, 0, 0, 0, 0,
     )  # fmt: skip
 
 
@@ -67,3 +72,56 @@ def number_of(message: str) -> int | None:
 def message_interval(system: int, message: str, interval_us: int) -> Any:
     """SET_MESSAGE_INTERVAL by the name of a message that the dialect has."""
     return command(system, SET_INTERVAL, number_of(message) or 0, interval_us)
+
+
+def request(system: int, message: str) -> Any:
+    """REQUEST_MESSAGE: once, by the name of a message that the dialect has."""
+    return command(system, dialect.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
+
+
+def time_sync(now_ns: int) -> Any:
+    """TIMESYNC: our monotonic time, to come back beside the vehicle's."""
+    return dialect.MAVLink_timesync_message(0, now_ns)
+
+
+def status_text(severity: int, text: str) -> Any:
+    """STATUSTEXT of at most 50 octets."""
+    return dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:TEXT_OCTETS])
+
+
+def parameter_read(system: int, name: str) -> Any:
+    """PARAM_REQUEST_READ by name."""
+    return dialect.MAVLink_param_request_read_message(system, _AUTOPILOT, name.encode(), -1)
+
+
+def parameter_set(system: int, name: str, value: float, kind: int) -> Any:
+    """PARAM_SET; the value is encoded as the flavour wants it."""
+    return dialect.MAVLink_param_set_message(system, _AUTOPILOT, name.encode(), value, kind)
+
+
+def fence_count(system: int, items: int) -> Any:
+    """MISSION_COUNT of a fence that is to be uploaded."""
+    return dialect.MAVLink_mission_count_message(system, _AUTOPILOT, items, FENCE)
+
+
+def fence_item(system: int, number: int, frame: int, item: FenceItem) -> Any:
+    """MISSION_ITEM_INT of a fence."""
+    return dialect.MAVLink_mission_item_int_message(
+        system, _AUTOPILOT, number, frame, item.command, 0, 1, item.parameter, 0, 0, 0, item.latitude, item.longitude,
+        0, FENCE,
+    )  # fmt: skip
+
+
+def fence_list(system: int) -> Any:
+    """MISSION_REQUEST_LIST: how many items has the fence?"""
+    return dialect.MAVLink_mission_request_list_message(system, _AUTOPILOT, FENCE)
+
+
+def fence_request(system: int, number: int) -> Any:
+    """MISSION_REQUEST_INT: one item of the fence."""
+    return dialect.MAVLink_mission_request_int_message(system, _AUTOPILOT, number, FENCE)
+
+
+def fence_received(system: int) -> Any:
+    """MISSION_ACK that ends a download."""
+    return dialect.MAVLink_mission_ack_message(system, _AUTOPILOT, dialect.MAV_MISSION_ACCEPTED, FENCE)

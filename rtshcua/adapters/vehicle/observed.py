@@ -1,32 +1,49 @@
 """What the vehicle was seen to do: the only ground on which a command counts as done."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from rtshcua.adapters.vehicle import datum, health
+from rtshcua.adapters.vehicle.estimator import Estimator
+
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-_PREARM = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
 _ON_GROUND = 1  # MAV_LANDED_STATE
 _IN_AIR = (2, 3, 4)  # IN_AIR, TAKEOFF, LANDING
 _FIX_3D = 3
-_LONGEST_TEXT = 200
+_CRITICAL = (5, 6)  # MAV_STATE: CRITICAL, EMERGENCY
+_DEBUG = 7  # MAV_SEVERITY
+_REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
 
 
 @dataclass(slots=True)
 class Observed:
-    """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us."""
+    """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
 
+    Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
+    so now. `notes` collects what an operator should know.
+    """
+
+    estimator: Estimator = field(default_factory=Estimator)
     mode: int | None = None
     armed: bool = False
     landed_state: int = 0
     latitude: int = 0
     longitude: int = 0
+    located: bool = False
     height: int = 0
+    levelled: bool = False
     home_amsl: int | None = None
-    speed: int = 0
+    speed: int | None = None
     fix: int = 0
     prearm: bool = False
+    unwell: tuple[str, ...] = ()
     heartbeat_us: int | None = None
+    now_us: int = 0
+    critical: bool = False
+    notes: list[str] = field(default_factory=list)
     text: str = ""
+    text_severity: int = _DEBUG
+    prearm_text: str = ""
 
     def take(self, name: str, message: Any, now_us: int) -> None:
         """Take in one message of the autopilot's component."""
@@ -35,20 +52,38 @@ class Observed:
                 self.mode = message.custom_mode
                 self.armed = bool(message.base_mode & _ARMED)
                 self.heartbeat_us = now_us
+                self._judge(message.system_status)
             case "EXTENDED_SYS_STATE":
                 self.landed_state = message.landed_state
             case "GLOBAL_POSITION_INT":
-                self.latitude, self.longitude = message.lat, message.lon
-                self.height = message.relative_alt
-                self.home_amsl = message.alt - message.relative_alt
-                self.speed = 10 * max(abs(message.vx), abs(message.vy), abs(message.vz))  # from cm/s
+                self._place(message, now_us)
             case "GPS_RAW_INT":
                 self.fix = message.fix_type
             case "SYS_STATUS":
-                healthy = message.onboard_control_sensors_health & message.onboard_control_sensors_present
-                self.prearm = bool(healthy & _PREARM)
-            case "STATUSTEXT":
-                self._say(message)
+                self.prearm = health.would_arm(message)
+                self.unwell = health.unwell(message)
+            case self.estimator.report:
+                self.estimator.take(message.flags, now_us)
+                self.located = self.located and self.estimator.position(now_us)
+                self.levelled = self.levelled and self.estimator.height(now_us)
+
+    def pass_time(self, now_us: int) -> None:
+        """Time goes by: what the estimator last said grows old."""
+        self.now_us = now_us
+        if self.located or self.levelled:
+            self.located = self.located and self.estimator.position(now_us)
+            self.levelled = self.levelled and self.estimator.height(now_us)
+
+    def say(self, severity: int, text: str) -> None:
+        """Keep what it said: the gravest text since `hush`, and the last that says why it would not arm."""
+        if severity <= self.text_severity:
+            self.text, self.text_severity = text, severity
+        if text.startswith(_REASONS):
+            self.prearm_text = text
+
+    def hush(self) -> None:
+        """What it says from now on may be about something new."""
+        self.text, self.text_severity = "", _DEBUG
 
     @property
     def airborne(self) -> bool:
@@ -63,7 +98,7 @@ class Observed:
     @property
     def ready(self) -> bool:
         """It has a position and would arm, or it flies already."""
-        return self.home_amsl is not None and (self.airborne or self.unready is None)
+        return self.airborne or self.unready is None
 
     @property
     def unready(self) -> str | None:
@@ -74,12 +109,42 @@ class Observed:
             return "it does not say whether it is on the ground"
         if self.fix < _FIX_3D:
             return "no 3D position fix"
-        if self.home_amsl is None:
-            return "no position estimate"
-        return None if self.prearm else f"its own checks before arming fail{f': {self.text}' if self.text else ''}"
+        astray = self.estimator.missing(self.now_us)
+        if astray is not None:
+            return astray
+        if not (self.located and self.levelled):
+            return "no position report since its estimator has one"
+        return None if self.prearm else f"its own checks before arming fail{self._reasons()}"
 
-    def _say(self, message: Any) -> None:
-        """Keep the last text; a long one comes in chunks (MAVLink 2, `id` and `chunk_seq`)."""
-        text = message.text if isinstance(message.text, str) else bytes(message.text).decode("utf-8", "replace")
-        text = text.rstrip("\0\t ")
-        self.text = (self.text + text)[:_LONGEST_TEXT] if message.id and message.chunk_seq else text
+    @property
+    def prearm_fails(self) -> bool:
+        """Whether its own checks are all that stands against arming."""
+        return not self.prearm and self.located and self.levelled and self.estimator.missing(self.now_us) is None
+
+    def _reasons(self) -> str:
+        """In its own words, which are untrusted, or by the sensors that it says are not well."""
+        if self.prearm_text:
+            return f": {self.prearm_text}"
+        return f": {', '.join(self.unwell)} not healthy" if self.unwell else ""
+
+    def _judge(self, status: int) -> None:
+        """A failsafe need not change the mode: a low battery on the way home does not."""
+        critical = status in _CRITICAL
+        if critical != self.critical:
+            self.notes.append(
+                "it says that its state is critical" if critical else "its state is not critical any more"
+            )
+        self.critical = critical
+
+    def _place(self, message: Any, now_us: int) -> None:
+        estimator = self.estimator
+        self.located, self.levelled = estimator.position(now_us), estimator.height(now_us)
+        if self.located:
+            self.latitude, self.longitude = message.lat, message.lon
+        if self.levelled:
+            self.height = message.relative_alt
+            if self.located:
+                self.home_amsl = datum.home_amsl_mm(message.alt, message.relative_alt)
+        known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
+        # from cm/s; without a speed that the estimator knows, it does not count as still
+        self.speed = 10 * max(abs(message.vx), abs(message.vy), abs(message.vz)) if known else None

@@ -1,4 +1,6 @@
-"""Telemetry streams: asked for one by one, asked again when they stop, left alone when the vehicle has none such."""
+"""Telemetry streams: asked for one by one, measured, asked again when they stop or come too seldom, left alone when the
+vehicle has none such.
+"""
 
 from collections.abc import Iterable, Mapping
 
@@ -11,6 +13,9 @@ QUIET_US = 3_000_000  # a stream that is silent for so long is asked for again
 #: else may send (RADIO_STATUS comes from the radio).
 PATIENCE_US = 5_000_000
 PATIENCE_REFUSED_US = 2_000_000
+#: A stream is measured over this long, and too slow when it comes at less than one `SLOW`th of the rate asked for.
+MEASURE_US = 5_000_000
+SLOW = 2
 
 #: What effects are seen by, and how often, in us; the heartbeat too, for a change of mode must not be seen late.
 ALWAYS: Mapping[str, int] = {
@@ -25,7 +30,8 @@ ALWAYS: Mapping[str, int] = {
 class Streams:
     """SET_MESSAGE_INTERVAL for each message of `wanted` (its interval in us), one request outstanding at a time.
 
-    `needed` holds groups of messages of which one is enough: the sources of one signal.
+    `needed` holds groups of messages of which one is enough: the sources of one signal. `notes` collects what an
+    operator should know: which streams come too seldom, and when they are right again.
     """
 
     def __init__(self, wanted: Mapping[str, int], needed: Iterable[frozenset[str]]) -> None:
@@ -37,10 +43,16 @@ class Streams:
         self._asking: str | None = None
         self._asked_us = self._looked_us = 0
         self._since_us: int | None = None
+        self._counts = dict.fromkeys(self._wanted, 0)
+        self._measured_us: int | None = None
+        self._slow: set[str] = set()
+        self.notes: list[str] = []
 
     def heard(self, name: str, now_us: int) -> None:
         """A message came."""
         self._heard_us[name] = now_us
+        if name in self._counts:
+            self._counts[name] += 1
 
     def answered(self, accepted: bool) -> None:
         """The outstanding request was acknowledged."""
@@ -58,9 +70,11 @@ class Streams:
                 return []
             self._queue.append(self._asking)
             self._asking = None
-        if not self._queue and now_us - self._looked_us >= ANSWER_US:
-            self._looked_us = now_us
-            self._queue = [name for name in self._wanted if self._is_quiet(name, now_us)]
+        if not self._queue:
+            self._measure(now_us)
+            if now_us - self._looked_us >= ANSWER_US:
+                self._looked_us = now_us
+                self._queue += [name for name in self._wanted if self._is_quiet(name, now_us)]
         if not self._queue:
             return []
         self._asking, self._asked_us = self._queue.pop(0), now_us
@@ -73,6 +87,33 @@ class Streams:
         missing = [group for group in self._needed if not group & self._heard_us.keys()]
         patience_us = PATIENCE_REFUSED_US if all(group <= self._refused for group in missing) else PATIENCE_US
         return not missing or now_us - self._since_us > patience_us
+
+    def _measure(self, now_us: int) -> None:
+        """Once every request was answered: compare what came since with what was asked for."""
+        if self._measured_us is None:
+            self._begin_measuring(now_us)
+            return
+        passed_us = now_us - self._measured_us
+        if passed_us < MEASURE_US:
+            return
+        for name, asked_us in self._wanted.items():
+            count = self._counts[name]
+            if name in self._refused or not count:
+                continue  # silence is told by the age of what it carries
+            came_us = passed_us // count
+            if (came_us > SLOW * asked_us) == (name in self._slow):
+                continue
+            self._slow ^= {name}
+            if name in self._slow:
+                self._queue.append(name)  # somebody may have asked for another rate since
+                self.notes.append(f"{name} comes every {came_us // 1_000} ms, asked for every {asked_us // 1_000} ms")
+            else:
+                self.notes.append(f"{name} comes as often as asked for again")
+        self._begin_measuring(now_us)
+
+    def _begin_measuring(self, now_us: int) -> None:
+        self._measured_us = now_us
+        self._counts = dict.fromkeys(self._wanted, 0)
 
     def _is_quiet(self, name: str, now_us: int) -> bool:
         last_us = max(self._heard_us.get(name, 0), self._since_us or 0)

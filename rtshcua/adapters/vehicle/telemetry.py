@@ -1,6 +1,6 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rtshcua.decision.reads import where
@@ -17,6 +17,23 @@ _WITHIN_STALE = 4
 
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
+#: Messages that go on being sent when their sensor has nothing new, and the field with the time of the measurement.
+_MEASURED = {"GPS_RAW_INT": "time_usec", "GPS2_RAW": "time_usec"}
+
+
+def _always(_: str) -> bool:
+    return True
+
+
+def _never(_: str) -> bool:
+    return False
+
+
+def _says_nothing(name: str, message: Any) -> bool:
+    """A multirotor of ArduPilot's that estimates no wind reports none from the south, and does so in 8 m/s (recorded):
+    `atan2(-0, -0)` is -180 degrees.
+    """
+    return bool(name == "WIND" and message.speed == 0 and message.direction == -180)
 
 
 class UnknownSource(ValueError):
@@ -36,6 +53,7 @@ class Telemetry:
         vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
         self._first: dict[tuple[int, str], Any] = {}
+        self._measured: dict[tuple[int, str], int] = {}
         self._projection = policy.projection
         self._sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
         self._by_message: dict[str, list[tuple[Signal, SignalSource]]] = {}
@@ -55,26 +73,42 @@ class Telemetry:
         """For each signal, the messages that may carry it."""
         return self._sources
 
-    def distance_from_home(self, latitude: int, longitude: int) -> int:
-        """Distance in mm of a place (1e-7 degree) from the declared home."""
-        return hypot_mm(*project(self._projection, latitude, longitude))
+    def read(
+        self, name: str, message: Any, component: int = _AUTOPILOT, vouched: Callable[[str], bool] = _always
+    ) -> tuple[tuple[int, int | None], ...]:
+        """(slot, canonical integer) of every signal that this message carries; None is "reported as not known".
 
-    def read(self, name: str, message: Any, component: int = _AUTOPILOT) -> tuple[tuple[int, int | None], ...]:
-        """(slot, canonical integer) of every signal that this message carries; None is "reported as not known"."""
+        So is a value that rests on a field of the autopilot's which is not `vouched` for. A measurement that was
+        reported before makes nothing younger: of its repetition only what is not known counts.
+        """
         carried = self._by_message.get(name)
         if carried is None or not self._is_first(name, message, component):
             return ()
+        known = vouched if component == _AUTOPILOT else _always
+        if _says_nothing(name, message):
+            known = _never
         values: list[tuple[int, int | None]] = []
         for signal, source in carried:
-            if signal.kind == POSITION:
+            if not all(map(known, source.fields)):
+                values += [(slot, None) for slot in range(signal.slot, signal.slot + 1 + (signal.kind == POSITION))]
+            elif signal.kind == POSITION:
                 x, y = _place(source, message, self._projection)
                 values += [(signal.slot, x), (signal.slot + 1, y)]
             else:
                 values.append((signal.slot, _number(source, message)))
+        if name in _MEASURED and self._is_repeated(name, message, component):
+            values = [(slot, value) for slot, value in values if value is None]
         if component == _AUTOPILOT:
             self._own.update(slot for slot, _ in values)
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
+
+    def _is_repeated(self, name: str, message: Any, component: int) -> bool:
+        """Whether the sensor measured this before; a time of 0 says nothing."""
+        at = getattr(message, _MEASURED[name])
+        before = self._measured.get((component, name))
+        self._measured[component, name] = at
+        return bool(at) and at == before
 
     def _is_first(self, name: str, message: Any, component: int) -> bool:
         """Whether this comes from the lowest instance of its sensor that the component was heard to have."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.mavlink.frames import Received
+from rtshcua.mavlink.framing import unsigned
 from rtshcua.onboard.ports import Command, Event
 
 _LARGEST = 65_535
@@ -73,6 +74,10 @@ class UdpVehicle:
         """Send nothing more that moves the vehicle."""
         self._driver.release()
 
+    def announce(self, severity: int, text: str) -> None:
+        """Tell any ground station on the link."""
+        self._driver.announce(severity, text)
+
     def close(self) -> None:
         """Give the port back."""
         self._socket.close()
@@ -94,7 +99,7 @@ class UdpVehicle:
                     continue
                 self._peer = sender
             for frame in heard.frames:
-                self._keep(now.utc_us, frame.frame)
+                self._keep(now.utc_us, unsigned(frame.frame))
                 self._follow(frame)
             self._send(heard.answers)
             events += heard.events
@@ -110,7 +115,7 @@ class UdpVehicle:
             return
         utc_us = self._clock.now().utc_us
         for frame in frames:
-            self._keep(utc_us, frame)
+            self._keep(utc_us, unsigned(frame))
             try:
                 self._socket.sendto(frame, self._peer)
             except OSError:

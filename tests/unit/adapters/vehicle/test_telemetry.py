@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.adapters.vehicle.preflight import distance_from_home
 from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
 from rtshcua.model.flat.signal import SignalSource
 from virtual.policy import BATTERY, FIX, HEIGHT, LINK, POLICY, POSITION_X, PROJECTION, WIND
@@ -60,7 +61,7 @@ def test_a_vehicle_that_crosses_longitude_180_goes_on_where_it_was() -> None:
         message = position(HOME[0], wrapped)
         expected = position(HOME[0], PROJECTION.longitude + step)
         assert east.read("GLOBAL_POSITION_INT", message) == here.read("GLOBAL_POSITION_INT", expected)
-        assert east.distance_from_home(HOME[0], wrapped) == here.distance_from_home(HOME[0], expected.lon)
+        assert distance_from_home(there, HOME[0], wrapped) == distance_from_home(PROJECTION, HOME[0], expected.lon)
     beyond = dict(east.read("GLOBAL_POSITION_INT", position(HOME[0], 1_800_000_001)))
     assert beyond[POSITION_X] is beyond[POSITION_X + 1] is None, "no longitude is beyond 180 degrees"
 
@@ -73,9 +74,8 @@ def test_asks_often_enough_for_what_grows_stale_and_no_oftener_than_useful() -> 
 
 
 def test_the_distance_from_home() -> None:
-    telemetry = Telemetry(POLICY)
-    assert telemetry.distance_from_home(*HOME) == 0
-    assert abs(telemetry.distance_from_home(HOME[0] + 8_983, HOME[1]) - 100_000) < 20
+    assert distance_from_home(PROJECTION, *HOME) == 0
+    assert abs(distance_from_home(PROJECTION, HOME[0] + 8_983, HOME[1]) - 100_000) < 20
 
 
 AUTOPILOT, COMPANION = 1, 191
@@ -127,3 +127,40 @@ def test_what_is_no_number_is_not_known() -> None:
     message = battery(50)
     message.battery_remaining = "50"
     assert Telemetry(POLICY).read("BATTERY_STATUS", message) == ((BATTERY, None),)
+
+
+def gps(fix: int, at_us: int) -> Any:
+    return mavlink.MAVLink_gps_raw_int_message(at_us, fix, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+def test_a_measurement_that_is_repeated_makes_nothing_younger() -> None:
+    """A receiver that hangs: the autopilot goes on reporting its last measurement, and its fix, for ever."""
+    telemetry = Telemetry(POLICY)
+    assert telemetry.read("GPS_RAW_INT", gps(3, 5)) == ((FIX, 3),)
+    assert telemetry.read("GPS_RAW_INT", gps(3, 5)) == ()
+    assert telemetry.read("GPS_RAW_INT", gps(3, 6)) == ((FIX, 3),)
+    for _ in range(2):
+        assert telemetry.read("GPS_RAW_INT", gps(3, 0)) == ((FIX, 3),), "a time of 0 says nothing"
+
+
+def test_that_there_is_no_fix_counts_however_often_it_is_said() -> None:
+    fix = replace(POLICY.signals[2], sources=(SignalSource("GPS_RAW_INT", ("fix_type",), 1, 1, (0, 1, 2)),))
+    telemetry = Telemetry(replace(POLICY, signals=(*POLICY.signals[:2], fix, *POLICY.signals[3:])))
+    assert telemetry.read("GPS_RAW_INT", gps(3, 5)) == ((FIX, 3),)
+    assert telemetry.read("GPS_RAW_INT", gps(1, 5)) == ((FIX, None),)
+    assert telemetry.read("GPS_RAW_INT", gps(1, 5)) == ((FIX, None),)
+
+
+def test_what_the_estimator_does_not_vouch_for_is_not_known() -> None:
+    telemetry = Telemetry(POLICY)
+    somewhere = position(*HOME)
+    lost = telemetry.read("GLOBAL_POSITION_INT", somewhere, AUTOPILOT, lambda field: field not in ("lat", "lon"))
+    assert dict(lost) == {HEIGHT: 20_000, POSITION_X: None, POSITION_X + 1: None}
+    assert dict(telemetry.read("GLOBAL_POSITION_INT", somewhere, AUTOPILOT, lambda field: False))[HEIGHT] is None
+
+
+def test_no_estimate_of_the_wind_is_no_calm() -> None:
+    telemetry = Telemetry(POLICY)
+    assert telemetry.read("WIND", mavlink.MAVLink_wind_message(-180.0, 0.0, 0.0)) == ((WIND, None),)
+    assert telemetry.read("WIND", mavlink.MAVLink_wind_message(0.0, 0.0, 0.0)) == ((WIND, 0),)
+    assert telemetry.read("WIND", mavlink.MAVLink_wind_message(-180.0, 2.0, 0.0)) == ((WIND, 2_000),)

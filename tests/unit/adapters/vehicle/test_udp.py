@@ -11,8 +11,9 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event, Readings, Sent
-from virtual.policy import POLICY
+from virtual.policy import BATTERY, POLICY
 
 HERE = "127.0.0.1"
 
@@ -40,8 +41,12 @@ class Peer:
 @pytest.fixture
 def link() -> Iterator[UdpVehicle]:
     kept: list[tuple[int, bytes]] = []
-    made = UdpVehicle((HERE, 0), Driver(POLICY), SystemClock(), lambda utc_us, frame: kept.append((utc_us, frame)))
+    frames = FrameSession()
+    made = UdpVehicle(
+        (HERE, 0), Driver(POLICY, frames), SystemClock(), lambda utc_us, frame: kept.append((utc_us, frame))
+    )
     made.kept = kept  # type: ignore[attr-defined]
+    made.frames = frames  # type: ignore[attr-defined]
     yield made
     made.close()
 
@@ -86,17 +91,19 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
     poll(link)
     assert vehicle.hears() == "HEARTBEAT"
     stranger.beat()
-    stranger.send(mavlink.MAVLink_global_position_int_message(0, 1, 1, 1, 1, 0, 0, 0, 0))
+    stranger.send(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, 99))
     assert poll(link) == []
-    vehicle.send(mavlink.MAVLink_global_position_int_message(0, 1, 1, 1, 1_234, 0, 0, 0, 0))
+    vehicle.send(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, 57))
     (readings,) = [event for event in poll(link) if isinstance(event, Readings)]
-    assert (1, 1_234) in readings.values
+    assert readings.values == ((BATTERY, 5_700),)
 
 
 def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
     vehicle.beat()
     poll(link)
-    link.begin(Command(9, "hover", MotionKind.HOLD, (), (), 0, 0), SystemClock().now().monotonic_us)
+    hold, now_us = Command(9, "hover", MotionKind.HOLD, (), (), 0, 0), SystemClock().now().monotonic_us
+    link.frames.open(hold, now_us)  # type: ignore[attr-defined]
+    link.begin(hold, now_us)
     vehicle.beat()
     assert [event.token for event in poll(link) if isinstance(event, Sent)] == [9]
     kept = [Codec(1, 1).parse(frame)[0].name for _, frame in link.kept]  # type: ignore[attr-defined]
@@ -106,4 +113,4 @@ def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
 
 def test_a_busy_port_is_an_os_error(link: UdpVehicle) -> None:
     with pytest.raises(OSError, match="in use"):
-        UdpVehicle((HERE, link.port), Driver(POLICY), SystemClock(), lambda *_: None)
+        UdpVehicle((HERE, link.port), Driver(POLICY, FrameSession()), SystemClock(), lambda *_: None)

@@ -1,0 +1,69 @@
+"""The examination: a driver that also asks the doctor's questions and keeps what everybody says.
+
+It sends what any driver sends before a flight, the fence apart, and questions: each is housekeeping, and passes the
+frame session like all else. Nothing is armed, moved, set or uploaded.
+"""
+
+from typing import Any, Final
+
+from rtshcua.adapters.doctor.facts import Facts
+from rtshcua.adapters.doctor.settings import SETTINGS
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.driver import Driver, Heard
+from rtshcua.adapters.vehicle.parameters import Parameters
+from rtshcua.mavlink.frames import Codec, Verifier
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.ports import Clock, Event, Readings, Said
+
+_ASK_US: Final = 1_000_000
+_ONCE: Final = ("AUTOPILOT_VERSION", "HOME_POSITION", "SYSTEM_TIME")
+
+
+class Examination(Driver):
+    """Listens and asks. `facts` and `parameters` hold the answers."""
+
+    def __init__(self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None) -> None:
+        super().__init__(policy, frames, fence=False, verifier=verifier)
+        self.facts = Facts()
+        self.parameters: Parameters | None = None
+        self._clock = clock
+        self._ears = Codec(0, 0)
+        self._asked_us: int | None = None
+
+    def receive(self, datagram: bytes, now_us: int) -> Heard:
+        """As any driver, and keep what was heard."""
+        heard = super().receive(datagram, now_us)
+        self.facts.system = self._system
+        utc_us = self._clock.now().utc_us
+        for frame in self._ears.parse(datagram, now_us):
+            self.facts.hear(frame, now_us, utc_us)
+            if frame.name == "PARAM_VALUE" and frame.system == self._system and self.parameters is not None:
+                self.parameters.take(frame.message)
+        self._note(heard.events)
+        return heard
+
+    def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
+        """As any driver, and ask what is due."""
+        events, frames = super().tick(now_us)
+        self._note(events)
+        flavour = self.flavour
+        if flavour is None:
+            return events, frames
+        if self.parameters is None:
+            self.parameters = Parameters(bytewise=flavour.bytewise)
+            for setting in SETTINGS[flavour.name]:
+                self.parameters.read(setting.parameter)
+        send: list[Any] = self.parameters.due(self._system, now_us)
+        if self._asked_us is None or now_us - self._asked_us >= _ASK_US:
+            self._asked_us = now_us
+            send.append(messages.time_sync(now_us * 1_000))
+            send += [messages.request(self._system, name) for name in _ONCE if name not in self.facts.streams]
+        return events, frames + self._pack(send, now_us, events)
+
+    def _note(self, events: Any) -> None:
+        for event in events:
+            if isinstance(event, Readings):
+                self.facts.values.update(event.values)
+            elif isinstance(event, Said):
+                self.facts.say(event.text)

@@ -1,0 +1,107 @@
+"""What is settled with a vehicle on the ground before it counts as ready: where it stands, its return altitude, its
+fence.
+
+A vehicle that flies already is left alone.
+"""
+
+from typing import Any, Final
+
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.fencing import Fencing
+from rtshcua.adapters.vehicle.flavour import Flavour, Message, ReturnAltitude
+from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.parameters import Parameters
+from rtshcua.mavlink.quantise import hypot_mm, quantise
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import Projection, project
+
+#: How far the return altitude may be off, in mm: it is a 32-bit float, or whole centimetres.
+SAME_MM: Final = 10
+#: How often it is asked why it would not arm; by itself ArduPilot says so each 30 s.
+CHECK_US: Final = 10_000_000
+
+
+class Preflight:
+    """Compares place and return altitude with the policy's, sees to the fence, and asks why the vehicle would not arm.
+
+    `notes` collects what an operator should know. `fence` False leaves the vehicle's fence as it is. `slack` stretches
+    waits, as in `Driver`.
+    """
+
+    def __init__(self, policy: Policy, flavour: Flavour, seen: Observed, *, fence: bool, slack: int = 1) -> None:
+        self._flavour = flavour
+        self._seen = seen
+        self._projection, self._home_within = policy.projection, policy.vehicle.home_within
+        self._wanted_mm = policy.vehicle.return_altitude
+        self._parameters = Parameters(bytewise=flavour.bytewise, slack=slack)
+        self._fencing = Fencing(policy, flavour, self._parameters, wanted=fence, slack=slack)
+        self._told = False
+        self._checked_us: int | None = None
+        self.notes: list[str] = []
+
+    def due(self, system: int, now_us: int) -> list[Message]:
+        """What to send now."""
+        if self._wanted_mm and self._found is None:
+            for each in self._flavour.returns:
+                self._parameters.read(each.parameter)
+        out = self._parameters.due(system, now_us)
+        if self._seen.prearm_fails and (self._checked_us is None or now_us - self._checked_us >= CHECK_US):
+            self._checked_us = now_us
+            out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
+        out += self._fencing.due(system, now_us)
+        if not self._told and self._fencing.unready is None:
+            self._told = True
+            self.notes.append(self._fencing.note)
+        return out
+
+    def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
+        """A message of the autopilot; what answers it."""
+        if name == "PARAM_VALUE":
+            self._parameters.take(message)
+            return []
+        return self._fencing.take(name, message, system, now_us)
+
+    @property
+    def unready(self) -> str | None:
+        """What is not settled, in words."""
+        return self._far_from_home() or self._return() or self._fencing.unready
+
+    def _far_from_home(self) -> str | None:
+        """Where it stands becomes its home, which all of the policy is drawn around."""
+        away = distance_from_home(self._projection, self._seen.latitude, self._seen.longitude)
+        if away <= self._home_within:
+            return None
+        return f"it stands {away // 1_000} m from the policy's home, more than {self._home_within // 1_000} m"
+
+    @property
+    def _found(self) -> ReturnAltitude | None:
+        values = self._parameters.values
+        return next((each for each in self._flavour.returns if each.parameter in values), None)
+
+    def _return(self) -> str | None:
+        if not self._wanted_mm:
+            return None
+        names = " or ".join(f"`{each.parameter}`" for each in self._flavour.returns)
+        found = self._found
+        if found is None:
+            if all(self._parameters.is_absent(each.parameter) for each in self._flavour.returns):
+                return f"it does not tell its return altitude ({names})"
+            return f"its return altitude ({names}) was not read yet"
+        height = quantise(self._parameters.values[found.parameter], found.mm, 1)
+        if height is not None and abs(height - self._wanted_mm) <= SAME_MM:
+            return None
+        has = "no number" if height is None else f"{_metres(height)} m"
+        should = quantise(self._wanted_mm, 1, found.mm)
+        return (
+            f"it returns at {has} (`{found.parameter}`), and the policy says {_metres(self._wanted_mm)} m: set "
+            f"`{found.parameter}` to {should}, or change `return at`"
+        )
+
+
+def distance_from_home(projection: Projection, latitude: int, longitude: int) -> int:
+    """Distance in mm of a place (1e-7 degree) from the declared home."""
+    return hypot_mm(*project(projection, latitude, longitude))
+
+
+def _metres(mm: int) -> str:
+    return f"{mm / 1_000:g}"

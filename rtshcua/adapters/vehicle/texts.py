@@ -1,0 +1,70 @@
+"""What the vehicle says to people: STATUSTEXT, put together from its chunks, quoted, and not too much of it.
+
+All of it is untrusted: it may hold anything, come in floods, or never end. It explains, and decides nothing.
+"""
+
+from typing import Any, Final
+
+from rtshcua.onboard.ports import Said
+
+LONGEST: Final = 200  # characters
+#: A text whose next chunk does not come is taken as it is after this long.
+CHUNK_US: Final = 1_000_000
+#: So many texts at once, and one more each so often; what is more is counted.
+BURST: Final = 20
+EACH_US: Final = 500_000
+
+_FIELD: Final = 50  # octets in one STATUSTEXT
+
+
+def quoted(text: str) -> str:
+    """The text with everything that does not print, and what a terminal or a log could obey, written as escapes."""
+    return "".join([each if each.isprintable() else each.encode("unicode_escape").decode() for each in text])[:LONGEST]
+
+
+class Texts:
+    """Collects the texts of one component. A long one comes in chunks that share an `id` (MAVLink 2)."""
+
+    def __init__(self) -> None:
+        self._id = 0
+        self._parts: list[str] = []
+        self._severity = 0
+        self._at_us = 0
+        self._left = BURST
+        self._paid_us: int | None = None
+        self._dropped = 0
+
+    def take(self, message: Any, now_us: int) -> list[Said]:
+        """Take in one STATUSTEXT; the texts that are complete now."""
+        raw = message.text if isinstance(message.text, str) else bytes(message.text).decode("utf-8", "replace")
+        part = raw.partition("\0")[0]
+        said: list[Said] = []
+        if not (self._parts and message.id == self._id and message.chunk_seq == len(self._parts)):
+            said += self._finish(now_us)
+        self._id, self._severity, self._at_us = message.id, message.severity, now_us
+        self._parts.append(part)
+        if len(part) < _FIELD or not message.id or len(self._parts) * _FIELD >= LONGEST:
+            said += self._finish(now_us)
+        return said
+
+    def due(self, now_us: int) -> list[Said]:
+        """The text whose end did not come in time."""
+        return self._finish(now_us) if self._parts and now_us - self._at_us > CHUNK_US else []
+
+    def _finish(self, now_us: int) -> list[Said]:
+        text = quoted("".join(self._parts).rstrip("\0\t\r\n "))
+        self._parts = []
+        if not text:
+            return []
+        if self._paid_us is None:
+            self._paid_us = now_us
+        earned = (now_us - self._paid_us) // EACH_US
+        self._left = min(BURST, self._left + earned)
+        self._paid_us += earned * EACH_US
+        if not self._left:
+            self._dropped += 1
+            return []
+        self._left -= 1
+        if self._dropped:
+            text, self._dropped = f"{text} ({self._dropped} texts before it were left out)", 0
+        return [Said(now_us, self._severity, text)]

@@ -1,0 +1,146 @@
+"""`rtshcua doctor`: what a vehicle supports, and what would stop a mission. It asks and listens, and moves nothing."""
+
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from rtshcua import library
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.doctor.diagnosis import diagnose
+from rtshcua.adapters.doctor.examination import Examination
+from rtshcua.adapters.doctor.finding import Finding, Verdict
+from rtshcua.adapters.files.folders import data_folder, state_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.signing import LinkKeyError
+from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.telemetry import UnknownSource
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.faults import fail
+from rtshcua.cli.signing import Signing
+from rtshcua.cli.sources import compile_sources
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.wire import cose
+from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
+from rtshcua.wire.trust import MAX_ROOT, open_root
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_HEARTBEAT_S = 10.0
+_POLL_US = 50_000
+_EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
+
+
+@app.command()
+def doctor(
+    connect: Annotated[str, typer.Option(metavar="udpin:HOST:PORT", help="the address that the vehicle sends to")],
+    bundle: Annotated[Path | None, typer.Argument(help="a mission that it is to fly; else the signals that ship")]
+    = None,
+    seconds: Annotated[float, typer.Option(min=3, max=600, help="how long to listen")] = 10.0,
+    signing_key: Annotated[Path | None, typer.Option(metavar="FILE", help="the link's key, if it is signed")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+) -> ExitCode:  # fmt: skip
+    """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
+
+    Ends with 5 when something would stop a mission, with 8 when no vehicle is heard.
+    """
+    try:
+        link = address.parse(connect)
+    except ValueError as error:
+        return fail(ExitCode.USAGE, str(error))
+    if link.way != "udpin":
+        return fail(ExitCode.USAGE, f"`{link}`: the doctor listens to the vehicle", "`udpin:HOST:PORT`")
+    clock = SystemClock()
+    try:
+        policy, mission = _wanted(bundle, clock.now().utc_us)
+    except Untrusted as error:
+        return fail(ExitCode.UNTRUSTED, str(error))
+    frames = FrameSession()
+    with ExitStack() as stack:
+        try:
+            signing = Signing(signing_key, policy, frames, state_folder(), clock, unsigned_radio=True)
+        except LinkKeyError as error:
+            return fail(ExitCode.UNTRUSTED, str(error))
+        stack.callback(signing.close)
+        try:
+            vehicle = Examination(policy, clock, frames, signing.verifier)
+        except UnknownSource as error:
+            return fail(ExitCode.REFUSED, str(error))
+        socket = UdpVehicle((link.host, link.port), vehicle, clock, lambda _utc_us, _frame: None)
+        stack.callback(socket.close)
+        if not _listen(socket, vehicle, clock, seconds):
+            return fail(
+                ExitCode.LINK, f"no heartbeat of a vehicle at `{link}` within {_HEARTBEAT_S:.0f} s",
+                "is it on, and does it send there? PX4 and ArduPilot are known; with signing, give the right key",
+            )  # fmt: skip
+        error_us = clock.now().utc_error_us
+        findings = list(diagnose(vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=error_us))
+    code = ExitCode.REFUSED if any(each.verdict is Verdict.STOP for each in findings) else ExitCode.OK
+    if as_json:
+        print(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
+    else:
+        _print(findings)
+    return code
+
+
+def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None]:
+    """The policy whose signals count, and the mission to fly. Raises Untrusted, and OSError."""
+    if bundle is None:
+        compiled, _ = compile_sources([library.root() / _EXAMPLE], mission=None, issued_at_us=utc_us)
+        assert compiled.policy is not None
+        return compiled.policy, None
+    with bundle.open("rb") as file:
+        data = file.read(MAX_BUNDLE + 1)
+    signed = KeyStore(data_folder()).root()
+    root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
+    opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)
+    return opened.policy, opened.mission
+
+
+def _listen(socket: UdpVehicle, vehicle: Examination, clock: SystemClock, seconds: float) -> bool:
+    """Wait for a heartbeat, then listen for so long; whether there was one."""
+    begun = time.monotonic()
+    until = begun + _HEARTBEAT_S
+    heard = False
+    while time.monotonic() < until:
+        socket.poll(clock.now().monotonic_us, _POLL_US)
+        if not heard and vehicle.flavour is not None:
+            heard, begun = True, time.monotonic()
+            until = begun + seconds
+        _progress(time.monotonic() - begun, seconds if heard else _HEARTBEAT_S, heard=heard)
+    _progress(None, 0, heard=heard)
+    return heard
+
+
+def _progress(passed: float | None, whole: float, *, heard: bool) -> None:
+    if sys.stderr is None or not sys.stderr.isatty():
+        return
+    what = "listening" if heard else "waiting for a heartbeat"
+    text = "" if passed is None else f"{what}: {passed:.0f} of {whole:.0f} s"
+    print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+_MARKS = {Verdict.OK: "ok", Verdict.WARN: "warn", Verdict.STOP: "STOP", Verdict.UNKNOWN: "?"}
+
+
+def _print(findings: Sequence[Finding]) -> None:
+    """A line a finding; what is wrong, with what is needed and what to do about it."""
+    width = max(len(each.slug) for each in findings)
+    for each in findings:
+        print(f"{_MARKS[each.verdict]:<5} {each.slug:<{width}}  {each.found}")
+        for label, text in (("needed", each.needed), ("help", each.advice)):
+            if text and each.verdict is not Verdict.OK:
+                print(f"{'':<5} {'':<{width}}  {label}: {text}")
+    stops = sum(each.verdict is Verdict.STOP for each in findings)
+    warns = sum(each.verdict is Verdict.WARN for each in findings)
+    end = f"{stops} would stop a mission" if stops else "nothing would stop a mission"
+    print(f"{end}; {warns} to know of")

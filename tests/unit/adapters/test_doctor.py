@@ -1,0 +1,129 @@
+"""The doctor, beside the simulated vehicle in explicit time: what is well, and each thing that would stop a mission."""
+
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.doctor.diagnosis import diagnose
+from rtshcua.adapters.doctor.examination import Examination
+from rtshcua.adapters.doctor.finding import Finding, Verdict
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.policy import Policy
+from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.faults import GpsLoss, LinkLoss
+from rtshcua.simulation.place import Home
+from virtual import case
+from virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
+
+MISSION = case.mission(case.short_steps())
+FLAVOURS = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+Prepare = Callable[[VirtualVehicle], None]
+
+
+def examine(
+    config: SimulationConfig, policy: Policy | None = None, *, prepare: Prepare = lambda _: None, seconds: int = 14
+) -> dict[str, Finding]:
+    """The findings after so many seconds, by slug; of several with one slug, the worst."""
+    policy = policy or case.policy()
+    clock = VirtualClock()
+    vehicle = VirtualVehicle(policy, config, clock, fence=False)
+    vehicle.driver = Examination(policy, clock, vehicle.frames)
+    prepare(vehicle)
+    while clock.elapsed_us < seconds * SECOND:
+        vehicle.poll(clock.now().monotonic_us, SECOND)
+    found: dict[str, Finding] = {}
+    for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, utc_error_us=1_000):
+        if each.slug not in found or each.verdict is Verdict.STOP:
+            found[each.slug] = each
+    return found
+
+
+def stops(found: dict[str, Finding]) -> set[str]:
+    return {slug for slug, each in found.items() if each.verdict is Verdict.STOP}
+
+
+@FLAVOURS
+def test_a_vehicle_that_is_well(flavour: str) -> None:
+    sent: list[bytes] = []
+
+    def watch(vehicle: VirtualVehicle) -> None:
+        vehicle.lose = lambda frame: bool(sent.append(frame))
+
+    found = examine(case.simulated(flavour), prepare=watch)
+    assert stops(found) == set()
+    assert found["autopilot/version"].verdict is Verdict.OK
+    assert found["link/answers"].verdict is found["link/round-trip"].verdict is Verdict.OK
+    assert found["signal/battery"].found.startswith("`battery`: BATTERY_STATUS every ")
+    assert {slug for slug in found if slug.startswith("settings/")} >= {
+        "px4": {"settings/gf_action", "settings/nav_dll_act"},
+        "ardupilot": {"settings/fs_ekf_action", "settings/batt_fs_low_act"},
+    }[flavour]
+    assert found["link/signing"].verdict is Verdict.WARN
+    names = [each.message for frame in sent for each in Codec(0, 0).parse(frame)]
+    assert {each.get_type() for each in names} == {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ", "TIMESYNC"}
+    asked = {each.command for each in names if each.get_type() == "COMMAND_LONG"}
+    own_checks = {mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # it looks again, and says why not
+    assert asked - own_checks == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
+
+
+@FLAVOURS
+def test_without_a_position_it_would_not_fly(flavour: str) -> None:
+    found = examine(case.simulated(flavour, faults=(GpsLoss(0),)))
+    assert {"vehicle/ready", "sensor/gps", "signal/fix"} & stops(found) >= {"vehicle/ready", "sensor/gps"}
+    assert found["sensor/gps"].needed == "a 3D fix"
+
+
+def test_a_vehicle_far_from_the_home_of_the_policy() -> None:
+    found = examine(case.simulated("px4", home=Home(473_980_000, 85_500_000, 488_000)))
+    assert stops(found) == {"mission/unready"}
+    assert "m from the policy's home" in found["mission/unready"].found
+
+
+def test_another_return_altitude_than_the_policy_says() -> None:
+    policy = case.policy()
+    policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=47_000))
+    found = examine(case.simulated("px4"), policy)
+    assert stops(found) == {"mission/unready"}
+    assert "RTL_RETURN_ALT" in found["mission/unready"].found
+
+
+def test_a_vehicle_that_answers_nothing() -> None:
+    def deaf(vehicle: VirtualVehicle) -> None:
+        vehicle.lose = lambda frame: True
+
+    found = examine(case.simulated("px4"), prepare=deaf)
+    assert "link/answers" in stops(found)
+    assert "--signing-key" in found["link/answers"].advice
+    assert found["autopilot/version"].verdict is found["settings/unread"].verdict is Verdict.UNKNOWN
+
+
+def test_a_signal_that_nobody_sends() -> None:
+    def without_wind(vehicle: VirtualVehicle) -> None:
+        codec = Codec(0, 0)
+        vehicle.hurt = lambda frame: [] if any(each.name == "WIND_COV" for each in codec.parse(frame)) else [frame]
+
+    found = examine(case.simulated("px4"), prepare=without_wind)
+    (wind,) = [each for slug, each in found.items() if slug.startswith("signal/wind")]
+    assert wind.verdict in (Verdict.STOP, Verdict.WARN)
+    assert wind.found.endswith("no WIND_COV or WIND")
+
+
+def test_a_lossy_link() -> None:
+    found = examine(case.simulated("px4", faults=(LinkLoss(0, 4_000),)), seconds=20)
+    assert "link/loss" in stops(found)
+
+
+def test_another_one_that_mediates_and_a_ground_station() -> None:
+    twin, station = Codec(1, 191), Codec(255, 190)
+
+    def crowded(vehicle: VirtualVehicle) -> None:
+        beat = mavlink.MAVLink_heartbeat_message
+        vehicle.hurt = lambda frame: [
+            frame, twin.pack(beat(18, 8, 0, 0, 4, 3)), station.pack(beat(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        ]  # fmt: skip
+
+    found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
+    assert "link/component" in stops(found)
+    assert found["link/ground-station"].found == "1 ground station(s) heard"

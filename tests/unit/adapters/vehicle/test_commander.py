@@ -1,0 +1,136 @@
+"""Acknowledgements: retried, extended, doubted, never taken for the effect; streams: asked for and measured."""
+
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.commander import LATE_US, RETRIES, RETRY_US, Commander
+from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.adapters.vehicle.streams import MEASURE_US, QUIET_US, Streams
+
+S = 1_000_000
+ACCEPTED, TEMPORARILY, DENIED, FAILED, IN_PROGRESS = 0, 1, 2, 4, 5
+
+
+def stage(number: int = messages.DO_SET_MODE) -> Stage:
+    return Stage(messages.command(1, number), number, lambda seen: False, frozenset())
+
+
+def begun(number: int = messages.DO_SET_MODE) -> Commander:
+    commander = Commander()
+    assert len(commander.start(stage(number), 0)) == 1
+    return commander
+
+
+def test_an_unanswered_command_is_sent_again_with_its_confirmation_raised() -> None:
+    commander, confirmations = begun(), []
+    for tick in range(200):
+        confirmations += [message.confirmation for message in commander.due(tick * S // 10)]
+    assert confirmations == list(range(1, RETRIES + 1))
+    assert commander.waits
+    assert not commander.accepted
+
+
+def test_px4_answers_a_bogus_mode_twice_and_the_second_answer_counts() -> None:
+    commander = begun()
+    commander.acknowledge(messages.DO_SET_MODE, ACCEPTED, 1)
+    commander.acknowledge(messages.DO_SET_MODE, TEMPORARILY, 2)
+    assert commander.refused == TEMPORARILY
+
+
+def test_two_acceptances_are_one() -> None:
+    commander = begun()
+    for at in (1, 2):
+        commander.acknowledge(messages.DO_SET_MODE, ACCEPTED, at)
+    assert (commander.accepted, commander.refused, commander.waits) == (True, None, False)
+    assert commander.due(60 * S) == []
+
+
+def test_in_progress_extends_the_wait() -> None:
+    commander = begun()
+    for at in range(1, 10):
+        commander.acknowledge(messages.DO_SET_MODE, IN_PROGRESS, at * S - 1)
+        assert commander.due(at * S) == []
+    assert commander.busy_us == 9 * S - 1
+    assert len(commander.due(9 * S + RETRY_US)) == 1
+
+
+def test_a_refusal_of_the_repetition_is_not_one_of_the_first() -> None:
+    commander = begun(messages.ARM_DISARM)
+    commander.due(RETRY_US)
+    commander.acknowledge(messages.ARM_DISARM, FAILED, RETRY_US + 1)
+    assert commander.refused is None
+
+
+@pytest.mark.parametrize(("after_us", "refused"), [(LATE_US - 1, None), (LATE_US, DENIED)])
+def test_a_late_answer_is_not_taken_for_one_to_the_next_command_of_its_kind(after_us: int, refused: int | None) -> None:
+    commander = begun()
+    commander.start(stage(), after_us)
+    commander.acknowledge(messages.DO_SET_MODE, DENIED, after_us + 1)
+    assert commander.refused == refused
+
+
+def test_answers_to_other_commands_are_set_aside() -> None:
+    commander = begun()
+    commander.acknowledge(messages.TAKEOFF, DENIED, 1)
+    assert (commander.accepted, commander.refused) == (False, None)
+    Commander().acknowledge(messages.TAKEOFF, DENIED, 1)
+
+
+class Link:
+    """Streams that come as they are asked for, unless `every` says otherwise."""
+
+    def __init__(self, wanted: dict[str, int]) -> None:
+        self.streams = Streams(wanted, ())
+        self.every = dict(wanted)
+        self.asked: list[str] = []
+        self.now_us = 0
+
+    def run(self, seconds: float) -> list[str]:
+        """Let time pass; what was asked for."""
+        before = len(self.asked)
+        for _ in range(round(seconds * 100)):
+            self.now_us += S // 100
+            for name, us in self.every.items():
+                if us and self.now_us % us < S // 100:
+                    self.streams.heard(name, self.now_us)
+            for message in self.streams.due(1, self.now_us):
+                self.asked.append(self.name(message))
+                self.streams.answered(True)
+        return self.asked[before:]
+
+    @staticmethod
+    def name(message: Any) -> str:
+        return {33: "GLOBAL_POSITION_INT", 24: "GPS_RAW_INT"}[int(message.param1)]
+
+
+def link() -> Link:
+    return Link({"GLOBAL_POSITION_INT": 100_000, "GPS_RAW_INT": 500_000})
+
+
+def test_streams_that_come_as_asked_are_asked_for_once() -> None:
+    one = link()
+    assert sorted(one.run(30)) == ["GLOBAL_POSITION_INT", "GPS_RAW_INT"]
+    assert one.streams.notes == []
+
+
+def test_a_stream_that_somebody_slows_down_is_told_and_asked_for_again() -> None:
+    """As REQUEST_DATA_STREAM of a ground station does on ArduPilot."""
+    one = link()
+    one.run(10)
+    one.every["GLOBAL_POSITION_INT"] = 1_000_000
+    assert one.run(2 * MEASURE_US / S) == ["GLOBAL_POSITION_INT"]
+    assert one.streams.notes == ["GLOBAL_POSITION_INT comes every 1000 ms, asked for every 100 ms"]
+    one.run(30)
+    assert len(one.streams.notes) == 1, "told once"
+    one.every["GLOBAL_POSITION_INT"] = 100_000
+    one.run(2 * MEASURE_US / S)
+    assert one.streams.notes[1:] == ["GLOBAL_POSITION_INT comes as often as asked for again"]
+
+
+def test_a_stream_that_stops_is_asked_for_again_and_again() -> None:
+    one = link()
+    one.run(10)
+    one.every["GPS_RAW_INT"] = 0
+    assert one.run(3 * QUIET_US / S).count("GPS_RAW_INT") >= 3

@@ -1,0 +1,248 @@
+"""What a driver makes of single frames: readiness and its reasons, modes taken over, texts, altitudes."""
+
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.ardupilot import modes as ardupilot_modes
+from rtshcua.adapters.px4 import modes as px4_modes
+from rtshcua.adapters.vehicle.datum import NoDatum, amsl_m, home_amsl_mm, relative_m
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Said, TakenOver
+from virtual.policy import POLICY, PROJECTION
+
+S = 1_000_000
+ARMED = 128
+SENSORS = 0x1020_002F  # gyroscope, accelerometer, magnetometer, barometer, GPS, attitude and heading, pre-arm check
+PX4, ARDUPILOT = 12, 3
+
+
+class Bench:
+    """A driver, and an autopilot that says what it is told to say."""
+
+    def __init__(self, autopilot: int = PX4) -> None:
+        self.autopilot = autopilot
+        self.frames = FrameSession()
+        self.driver = Driver(POLICY, self.frames)
+        self.codec = Codec(1, 1)
+        self.now_us = S
+        self.events: list[Event] = []
+        self.sent: list[Any] = []
+        self.beat(0)
+
+    def hear(self, message: Any) -> None:
+        self.events += self.driver.receive(self.codec.pack(message), self.now_us).events
+
+    def tick(self, seconds: float = 0.1) -> None:
+        for _ in range(round(seconds * 10)):
+            self.now_us += S // 10
+            events, frames = self.driver.tick(self.now_us)
+            self.events += events
+            self.sent += [Codec(0, 0).parse(frame)[0] for frame in frames]
+
+    def begin(self, kind: MotionKind, *geo: int, altitude: int = 0) -> list[Event]:
+        command = Command(7, kind.name.lower(), kind, (0,) * len(geo), geo, altitude, 0)
+        self.frames.open(command, self.now_us)
+        return self.driver.begin(command, self.now_us)[0]
+
+    def beat(self, mode: int, armed: bool = False, status: int = 4) -> None:
+        self.hear(mavlink.MAVLink_heartbeat_message(2, self.autopilot, ARMED if armed else 0, mode, status, 3))
+
+    def landed(self, state: int) -> None:
+        self.hear(mavlink.MAVLink_extended_sys_state_message(0, state))
+
+    def estimator(self, flags: int) -> None:
+        if self.autopilot == PX4:
+            self.hear(mavlink.MAVLink_estimator_status_message(self.now_us, flags, 0, 0, 0, 0, 0, 0, 0, 0))
+        else:
+            self.hear(mavlink.MAVLink_ekf_status_report_message(flags, 0, 0, 0, 0, 0))
+
+    def place(self, height: int = 0, amsl: int = 488_000) -> None:
+        self.hear(mavlink.MAVLink_global_position_int_message(
+            0, PROJECTION.latitude, PROJECTION.longitude, amsl + height, height, 0, 0, 0, 0,
+        ))  # fmt: skip
+
+    def health(self, ill: int = 0, present: int = SENSORS) -> None:
+        self.hear(mavlink.MAVLink_sys_status_message(present, present, SENSORS & ~ill, *[0] * 10))
+
+    def say(self, text: str, severity: int = 6) -> None:
+        self.hear(mavlink.MAVLink_statustext_message(severity, text.encode()))
+
+    def well(self) -> None:
+        """On the ground, with everything that is needed."""
+        self.landed(1)
+        self.hear(mavlink.MAVLink_gps_raw_int_message(1, 3, 0, 0, 0, 0, 0, 0, 0, 0))
+        self.estimator(0x33F)
+        self.place()
+        self.health()
+        self.tick()
+
+    def taken(self) -> list[str]:
+        return [event.mode for event in self.events if isinstance(event, TakenOver)]
+
+
+BOTH = pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
+
+
+@BOTH
+def test_each_reason_in_its_turn(autopilot: int) -> None:
+    one = Bench(autopilot)
+    report = "ESTIMATOR_STATUS" if autopilot == PX4 else "EKF_STATUS_REPORT"
+    reasons = [one.driver.unready]
+    for step in (
+        lambda: one.landed(1),
+        lambda: one.hear(mavlink.MAVLink_gps_raw_int_message(1, 3, 0, 0, 0, 0, 0, 0, 0, 0)),
+        lambda: one.estimator(0x0A7),
+        lambda: one.estimator(0x33F),
+        one.place,
+        lambda: one.health(0x1000_0004),
+        lambda: one.say("PreArm: Compass not calibrated", 2),
+        one.health,
+    ):
+        step()
+        one.tick()
+        reasons.append(one.driver.unready)
+    assert reasons == [
+        "it does not say whether it is on the ground",
+        "no 3D position fix",
+        f"its estimator says nothing (no {report})",
+        "its estimator has no position (flags 0xa7)",
+        "no position report since its estimator has one",
+        "its own checks before arming fail",
+        "its own checks before arming fail: magnetometer not healthy",
+        "its own checks before arming fail: PreArm: Compass not calibrated",
+        None,
+    ]
+
+
+def test_it_is_asked_why_it_would_not_arm_and_not_too_often() -> None:
+    one = Bench(ARDUPILOT)
+    one.well()
+    for _ in range(250):
+        one.estimator(0x33F)
+        one.health(0x1000_0000)
+        one.tick()
+    asked = [frame for frame in one.sent if frame.name == "COMMAND_LONG" and frame.message.command == 401]
+    assert len(asked) == 3
+
+
+def test_the_estimator_must_go_on_speaking() -> None:
+    one = Bench()
+    one.well()
+    assert one.driver.unready is None
+    one.tick(2.5)
+    assert one.driver.unready == "its estimator fell silent (no ESTIMATOR_STATUS)"
+
+
+def test_the_prearm_bit_counts_though_px4_does_not_declare_it() -> None:
+    one = Bench()
+    one.well()
+    one.health(present=SENSORS & ~0x1000_0000)
+    assert one.driver.unready is None
+
+
+def test_a_place_that_nobody_vouches_for_is_reported_as_unknown() -> None:
+    one = Bench()
+    one.well()
+    one.events.clear()
+    one.estimator(0x025)
+    one.place(15_000)
+    (readings,) = [event for event in one.events if isinstance(event, Readings)]
+    assert dict(readings.values) == {1: 15_000, 3: None, 4: None}
+
+
+@pytest.mark.parametrize(("autopilot", "flies", "other", "name"), [
+    (PX4, px4_modes.HOLD, px4_modes.LAND, "Land"),
+    (PX4, px4_modes.TAKEOFF, px4_modes.number(3), "Position"),
+    (ARDUPILOT, ardupilot_modes.GUIDED, ardupilot_modes.LAND, "LAND"),
+    (ARDUPILOT, ardupilot_modes.GUIDED, 99, "mode 99"),
+])  # fmt: skip
+def test_a_mode_that_changes_in_the_air_is_taken_over_without_a_manoeuvre_of_ours(
+    autopilot: int, flies: int, other: int, name: str
+) -> None:
+    one = Bench(autopilot)
+    one.landed(1)
+    one.beat(flies, armed=True)
+    one.landed(2)
+    one.beat(flies, armed=True)
+    assert one.taken() == []
+    one.beat(other, armed=True)
+    assert one.taken() == [name]
+    one.beat(other, armed=True)
+    assert one.taken() == [name]
+
+
+def test_the_end_of_a_takeoff_and_what_happens_on_the_ground_take_nothing_over() -> None:
+    one = Bench()
+    one.landed(1)
+    one.beat(px4_modes.LAND)
+    one.beat(px4_modes.TAKEOFF, armed=True)
+    one.landed(2)
+    one.beat(px4_modes.HOLD, armed=True)
+    assert one.taken() == []
+    one.driver.release()
+    one.beat(px4_modes.LAND, armed=True)
+    assert one.taken() == []
+
+
+@pytest.mark.parametrize("kind", [MotionKind.CLIMB, MotionKind.FLY])
+def test_no_altitude_is_commanded_before_home_is_known(kind: MotionKind) -> None:
+    one = Bench()
+    one.landed(2)
+    (failed,) = one.begin(kind, 1, 1, altitude=20_000)
+    assert isinstance(failed, Failed)
+    assert (failed.token, failed.reason) == (7, "no-datum")
+    assert not any(isinstance(event, Failed) for event in one.begin(MotionKind.LAND)), "a landing needs none"
+
+
+def test_altitudes_are_converted_in_one_place() -> None:
+    assert amsl_m(20_000, 488_200) == 508.2
+    assert amsl_m(-500, -1_000) == -1.5
+    assert relative_m(20_500) == 20.5
+    assert home_amsl_mm(503_000, 15_000) == 488_000
+    with pytest.raises(NoDatum):
+        amsl_m(20_000, None)
+
+
+def test_the_gravest_text_since_a_command_began_is_its_reason() -> None:
+    one = Bench(ARDUPILOT)
+    one.well()
+    one.say("something old", 2)
+    one.begin(MotionKind.CLIMB, altitude=20_000)
+    for severity, text in ((6, "chatter"), (2, "Arm: Accels inconsistent"), (6, "more chatter")):
+        one.say(text, severity)
+    one.tick(6)
+    (failed,) = [event for event in one.events if isinstance(event, Failed)]
+    assert (failed.reason, failed.text) == ("unknown/no-answer", "Arm: Accels inconsistent")
+
+
+def test_what_it_says_is_told_and_quoted() -> None:
+    one = Bench()
+    one.say("allow\x1b[2J takeoff", 3)
+    assert [(event.severity, event.text) for event in one.events if isinstance(event, Said)] == [
+        (3, "allow\\x1b[2J takeoff")
+    ]
+
+
+def test_a_critical_state_is_told() -> None:
+    one = Bench()
+    for status in (4, 5, 6, 4):
+        one.beat(0, status=status)
+        one.tick()
+    assert [event.text for event in one.events if isinstance(event, Noted) and "state" in event.text] == [
+        "it says that its state is critical", "its state is not critical any more",
+    ]  # fmt: skip
+
+
+def test_announcements_go_out_as_texts_of_ours() -> None:
+    one = Bench()
+    one.tick(3)
+    one.driver.announce(4, "deny goto(far): authority/out-of-scope")
+    one.tick(3)
+    (said,) = [frame for frame in one.sent if frame.name == "STATUSTEXT"]
+    assert (said.system, said.component) == (1, 191)
+    assert (said.message.severity, said.message.text) == (4, "deny goto(far): authority/out-of-scope")

@@ -1,0 +1,129 @@
+"""The airspace as a fence: never narrower than the airspace, and what it does not say is told."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.fence import (
+    EXCLUDE_CIRCLE,
+    EXCLUDE_VERTEX,
+    INCLUDE_CIRCLE,
+    INCLUDE_VERTEX,
+    Fence,
+    fence_of,
+)
+from rtshcua.model.flat.policy import Airspace
+from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone, project
+from virtual.policy import POLICY, PROJECTION
+
+M = 1_000
+SQUARE = (-100 * M, -100 * M, 100 * M, -100 * M, 100 * M, 100 * M, -100 * M, 100 * M)
+SMALL = tuple(each // 2 for each in SQUARE)
+HOLE = (10 * M, 10 * M, 10 * M, 20 * M, 20 * M, 20 * M, 20 * M, 10 * M)  # clockwise
+FLAVOURS = pytest.mark.parametrize("flavour", [PX4, ARDUPILOT], ids=lambda flavour: flavour.name)
+
+
+def zone(name: str = "city", shape: int = POLYGON, data: tuple[int, ...] = SQUARE, **more: Any) -> Zone:
+    return Zone(name, shape, **{"floor": LOWEST, "ceiling": HIGHEST, "data": data, **more})
+
+
+def fence(flavour: Any, inside: list[Zone], outside: list[Zone] | None = None) -> Fence:
+    zones = (*inside, *(outside or []))
+    numbers = tuple(range(len(zones)))
+    airspace = Airspace(numbers[: len(inside)], numbers[len(inside) :], "airspace", 0, 0, 0)
+    return fence_of(replace(POLICY, zones=zones, declared=len(zones), airspace=airspace), flavour.fence)
+
+
+def rings(made: Fence) -> list[tuple[int, list[tuple[int, int]]]]:
+    """Command and corners in local mm, ring by ring."""
+    found: list[tuple[int, list[tuple[int, int]]]] = []
+    left = 0.0
+    for item in made.items:
+        if not left:
+            left = item.parameter if item.command in (INCLUDE_VERTEX, EXCLUDE_VERTEX) else 1
+            found.append((item.command, []))
+        found[-1][1].append(project(PROJECTION, item.latitude, item.longitude))
+        left -= 1
+    return found
+
+
+def points(data: tuple[int, ...]) -> list[tuple[int, int]]:
+    return list(zip(data[::2], data[1::2], strict=True))
+
+
+def near(corners: list[tuple[int, int]], data: tuple[int, ...]) -> bool:
+    return len(corners) == len(data) // 2 and all(
+        abs(x - x0) <= 12 and abs(y - y0) <= 12 for (x, y), (x0, y0) in zip(corners, points(data), strict=True)
+    )
+
+
+@FLAVOURS
+def test_a_polygon_is_included_and_another_excluded(flavour: Any) -> None:
+    made = fence(flavour, [zone()], [zone("school", data=SMALL)])
+    (include, corners), (exclude, others) = rings(made)
+    assert (include, exclude) == (INCLUDE_VERTEX, EXCLUDE_VERTEX)
+    assert near(corners, SQUARE)
+    assert near(others, SMALL)
+    assert made.left_out == ()
+
+
+@FLAVOURS
+def test_circles_are_rounded_away_from_the_airspace(flavour: Any) -> None:
+    radius = 80_123
+    circle = (0, 0, radius * radius)
+    included, excluded = fence(flavour, [zone("meadow", CIRCLE, circle)], [zone("school", CIRCLE, circle)]).items
+    assert (included.command, excluded.command) == (INCLUDE_CIRCLE, EXCLUDE_CIRCLE)
+    assert included.parameter == 80.13
+    assert excluded.parameter == 80.12
+
+
+@FLAVOURS
+def test_heights_and_times_of_the_inside_are_left_out_and_said(flavour: Any) -> None:
+    made = fence(flavour, [zone(ceiling=120 * M, daily=(1, 2))])
+    assert len(made.items) == 4
+    assert made.left_out == ("`city`: its heights", "`city`: its times")
+
+
+@FLAVOURS
+@pytest.mark.parametrize(("more", "why"), [
+    ({"ceiling": 50 * M}, "one may fly above or below it"),
+    ({"floor": 10 * M}, "one may fly above or below it"),
+    ({"dates": (1, 2)}, "it is not always there"),
+    ({"shape": AREA, "data": (2, 4, 4, *SQUARE, *HOLE)}, "it has holes"),
+])  # fmt: skip
+def test_what_is_only_at_times_or_heights_forbidden_is_not_excluded(flavour: Any, more: Any, why: str) -> None:
+    made = fence(flavour, [zone()], [zone("school", **more)])
+    assert len(made.items) == 4
+    assert made.left_out == (f"`school`: {why}",)
+
+
+@FLAVOURS
+def test_a_hole_of_the_inside_is_an_exclusion(flavour: Any) -> None:
+    made = fence(flavour, [zone("field", AREA, (2, 4, 4, *SQUARE, *HOLE))])
+    assert [(command, len(corners)) for command, corners in rings(made)] == [(INCLUDE_VERTEX, 4), (EXCLUDE_VERTEX, 4)]
+    assert made.left_out == ()
+
+
+def test_two_zones_to_be_inside_of_at_once_are_both_there_where_that_is_what_it_means() -> None:
+    both = fence(ARDUPILOT, [zone(), zone("part", data=SMALL)])
+    assert len(both.items) == 8
+    smallest = fence(PX4, [zone(), zone("part", data=SMALL)])
+    assert near(rings(smallest)[0][1], SMALL)
+    assert len(smallest.items) == 4
+    assert smallest.left_out == ("`city`: this autopilot joins inclusions instead of intersecting",)
+
+
+def test_a_zone_of_two_parts_is_there_where_inclusions_are_joined() -> None:
+    shifted = tuple(each + 500 * M for each in SQUARE)
+    parts = zone("islands", AREA, (2, 4, 4, *SQUARE, *shifted))
+    assert len(fence(PX4, [parts]).items) == 8
+    none = fence(ARDUPILOT, [parts])
+    assert none.items == ()
+    assert "it has 2 parts" in none.left_out[0]
+
+
+def test_without_an_airspace_there_is_no_fence() -> None:
+    assert fence_of(POLICY, PX4.fence) == Fence((), ("the policy has no airspace",))

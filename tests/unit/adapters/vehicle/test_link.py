@@ -1,0 +1,85 @@
+"""Our end of the link: what the boundary does not let out fails the manoeuvre; what comes in is proved first."""
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from hostile.target import KEY, UTC_US, Target, greeting
+from rtshcua.adapters.vehicle.link import Link
+from rtshcua.mavlink.frames import Codec
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, unsigned
+from rtshcua.mavlink.radio import UnsignedRadio
+from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frames import FrameRefusal, FrameSession
+from rtshcua.onboard.ports import Command, Failed, Sent
+
+LAND = Command(5, "land", MotionKind.LAND, (), (), 0, 0)
+HOLD = Command(6, "hover", MotionKind.HOLD, (), (), 0, 0)
+
+
+def test_what_the_boundary_does_not_let_out_has_failed() -> None:
+    target = Target("px4", keyed=False)
+    assert target.driver.begin(LAND, 7) == ([Failed(7, 5, FrameRefusal.NO_SESSION)], [])
+    assert not [event for event in target.driver.tick(10_000_000)[0] if isinstance(event, Failed)], "told once"
+    target.frames.open(LAND, 20_000_000)
+    events, frames = target.driver.begin(LAND, 11_000_000)
+    assert events == [Sent(11_000_000, 5)]
+    assert len(frames) == 1
+
+
+def test_another_command_than_the_permitted_one_does_not_leave() -> None:
+    target = Target("ardupilot", keyed=False)
+    target.frames.open(LAND, 20_000_000)
+    assert target.driver.begin(HOLD, 7) == ([Failed(7, 6, FrameRefusal.NOT_COVERED)], [])
+
+
+def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
+    target = Target("ardupilot", keyed=False)
+    target.receive(target.says(mavlink.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3)))
+    target.receive(target.says(mavlink.MAVLink_extended_sys_state_message(0, 2)))
+    target.frames.open(LAND, 1_000_000)
+    assert len(target.driver.begin(LAND, 0)[1]) == 1
+    target.frames.close()
+    events, frames = target.driver.tick(1_500_000)
+    assert [event for event in events if isinstance(event, Failed)] == [Failed(1_500_000, 5, FrameRefusal.NO_SESSION)]
+    messages = [received.message for frame in frames for received in Codec(9, 9).parse(frame)]
+    assert mavlink.MAV_CMD_DO_SET_MODE not in [getattr(message, "command", None) for message in messages]
+
+
+def test_with_a_key_whatever_leaves_is_signed() -> None:
+    target = Target("px4", keyed=True)
+    target.frames.open(LAND, 20_000_000)
+    frames = target.driver.begin(LAND, 0)[1] + target.driver.tick(5_000_000)[1]
+    peer = SignedLink(KEY, State(0, {}), UTC_US, 0)
+    assert len(frames) > 1
+    assert all(frame[FLAGS] & FLAG_SIGNED and peer.accept(frame, 5_000_000) for frame in frames)
+
+
+def test_the_boundary_learns_of_the_vehicle_from_proved_frames_alone() -> None:
+    theirs = SignedLink(KEY, State(0, {}), UTC_US, 0)
+    frames = FrameSession()
+    link = Link(frames, SignedLink(KEY, State(0, {}), UTC_US, 0))
+    heartbeat = Codec(1, 1).pack(greeting("px4")[0])
+    own = mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+    assert link.parse(heartbeat, 0) == []
+    assert link.pack([own], 0) == ([], [FrameRefusal.NO_VEHICLE])
+    assert [received.signed for received in link.parse(theirs.sign(heartbeat, 0), 0)] == [True]
+    link.settle(1)
+    assert [len(part) for part in link.pack([own], 0)] == [1, 0]
+
+
+def test_an_unsigned_radio_is_heard_at_its_worst() -> None:
+    link = Link(FrameSession(), UnsignedRadio(SignedLink(KEY, State(0, {}), UTC_US, 0)))
+    radio, told = Codec(1, 68), []
+    for txbuf in (80, 20, 100):
+        (received,) = link.parse(radio.pack(mavlink.MAVLink_radio_status_message(200, 200, txbuf, 0, 0, 0, 0)), 0)
+        told.append(received.message.txbuf)
+    assert told == [80, 20, 20]
+    theirs = SignedLink(KEY, State(0, {}), UTC_US, 0)
+    signed = theirs.sign(radio.pack(mavlink.MAVLink_radio_status_message(200, 200, 90, 0, 0, 0, 0)), 0)
+    assert [received.message.txbuf for received in link.parse(signed, 0)] == [90], "a signed one is believed"
+
+
+def test_what_is_logged_has_no_signature() -> None:
+    signed = SignedLink(KEY, State(0, {}), UTC_US, 0).sign(Codec(1, 1).pack(greeting("px4")[0]), 0)
+    assert len(unsigned(signed)) == len(signed) - 13
+    assert [received.signed for received in Codec(9, 9).parse(unsigned(signed))] == [False]

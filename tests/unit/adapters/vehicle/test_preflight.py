@@ -1,0 +1,291 @@
+"""Before it is ready: the return altitude read and compared, the fence uploaded, read back and switched on."""
+
+import struct
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.flavour import Flavour
+from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.parameters import Parameters
+from rtshcua.adapters.vehicle.preflight import Preflight
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.policy import Airspace
+from rtshcua.model.flat.zone import HIGHEST, LOWEST, POLYGON, Zone
+from virtual.policy import POLICY, PROJECTION, VEHICLE
+
+S = 1_000_000
+SQUARE = (-100_000, -100_000, 100_000, -100_000, 100_000, 100_000, -100_000, 100_000)
+CITY = replace(
+    POLICY, vehicle=replace(VEHICLE, return_altitude=30_000), zones=(Zone("city", POLYGON, LOWEST, HIGHEST, SQUARE),),
+    declared=1, airspace=Airspace((0,), (), "inside city", 0, 0, 0),
+)  # fmt: skip
+FLAVOURS = pytest.mark.parametrize("flavour", [PX4, ARDUPILOT], ids=lambda flavour: flavour.name)
+
+
+class Port:
+    """A vehicle that takes parameters and a fence, as the flavour asks and answers. `lose` decides on each frame."""
+
+    def __init__(self, flavour: Flavour, parameters: dict[str, float] | None = None) -> None:
+        self.flavour = flavour
+        self.legacy = flavour is ARDUPILOT
+        self.parameters = parameters if parameters is not None else {"RTL_RETURN_ALT": 30.0, "RTL_ALT": 3_000.0,
+                                                                    "FENCE_TYPE": 3.0, "FENCE_ENABLE": 0.0}  # fmt: skip
+        self.items: dict[int, Any] = {}
+        self.count = 0
+        self.result = 0
+        self.lose: Callable[[str], bool] = lambda name: False
+        self.bend: Callable[[Any], Any] = lambda message: message
+        self.heard: list[str] = []
+
+    def ask(self, number: int) -> Any:
+        kind = mavlink.MAVLink_mission_request_message if self.legacy else mavlink.MAVLink_mission_request_int_message
+        return kind(1, 191, number, 1)
+
+    def answer(self, m: Any) -> list[Any]:
+        name = m.get_type()
+        match name:
+            case "PARAM_REQUEST_READ" | "PARAM_SET":
+                if m.param_id not in self.parameters:
+                    return []
+                if name == "PARAM_SET":
+                    self.parameters[m.param_id] = m.param_value
+                return [mavlink.MAVLink_param_value_message(m.param_id.encode(), self.parameters[m.param_id], 9, 1, 0)]
+            case "MISSION_COUNT":
+                self.count, self.items = m.count, {}
+                refusal = mavlink.MAVLink_mission_ack_message(1, 191, self.result, 1)
+                return [refusal if self.result else self.ask(0)]
+            case "MISSION_ITEM_INT":
+                self.items[m.seq] = m
+                missing = next((number for number in range(self.count) if number not in self.items), None)
+                return [mavlink.MAVLink_mission_ack_message(1, 191, 0, 1) if missing is None else self.ask(missing)]
+            case "MISSION_REQUEST_LIST":
+                return [mavlink.MAVLink_mission_count_message(1, 191, len(self.items), 1)]
+            case "MISSION_REQUEST_INT":
+                held = self.items[m.seq]
+                return [mavlink.MAVLink_mission_item_int_message(
+                    1, 191, m.seq, held.frame, held.command, 0, 1, held.param1, 0, 0, 0, held.x, held.y, 0, 1,
+                )]  # fmt: skip
+        return []
+
+    def settle(self, preflight: Preflight, seconds: int = 60) -> None:
+        """Let both talk until nothing is outstanding, or for so long."""
+        ours, theirs = Codec(1, 191), Codec(1, 1)
+        for tick in range(seconds * 10):
+            now_us = tick * S // 10
+            waiting = list(preflight.due(1, now_us))
+            while waiting:
+                (sent,) = theirs.parse(ours.pack(waiting.pop(0)))
+                self.heard.append(sent.name)
+                if self.lose(sent.name):
+                    continue
+                for answer in self.answer(sent.message):
+                    (received,) = ours.parse(theirs.pack(self.bend(answer)))
+                    if not self.lose(received.name):
+                        waiting += preflight.take(received.name, received.message, 1, now_us)
+            if preflight.unready is None:
+                preflight.due(1, now_us)
+                return
+
+
+def preflight(flavour: Flavour, *, fence: bool = True) -> Preflight:
+    return Preflight(CITY, flavour, at_home(), fence=fence)
+
+
+def at_home() -> Observed:
+    return Observed(latitude=PROJECTION.latitude, longitude=PROJECTION.longitude)
+
+
+@FLAVOURS
+def test_all_is_settled_and_told_once(flavour: Flavour) -> None:
+    one, port = preflight(flavour), Port(flavour)
+    assert "was not read yet" in (one.unready or "")
+    port.settle(one)
+    assert one.unready is None
+    assert one.notes == ["its fence was set to the policy's airspace (4 items), and read back"]
+    assert [port.items[number].command for number in range(4)] == [5001] * 4
+    assert {item.frame for item in port.items.values()} == {flavour.fence.frame}
+
+
+def test_arducopters_fence_is_switched_on_and_its_other_kinds_stay_on() -> None:
+    port = Port(ARDUPILOT)
+    port.settle(preflight(ARDUPILOT))
+    assert (port.parameters["FENCE_TYPE"], port.parameters["FENCE_ENABLE"]) == (7.0, 1.0)
+    px4 = Port(PX4)
+    px4.settle(preflight(PX4))
+    assert (px4.parameters["FENCE_TYPE"], px4.parameters["FENCE_ENABLE"]) == (3.0, 0.0)
+
+
+@pytest.mark.parametrize(("flavour", "parameters", "says"), [
+    (PX4, {"RTL_RETURN_ALT": 60.0}, "it returns at 60 m (`RTL_RETURN_ALT`), and the policy says 30 m: "
+                                    "set `RTL_RETURN_ALT` to 30, or change `return at`"),
+    (PX4, {"RTL_RETURN_ALT": 3_000.0}, "it returns at 3000 m"),
+    (PX4, {"RTL_RETURN_ALT": float("nan")}, "it returns at no number"),
+    (PX4, {}, "it does not tell its return altitude (`RTL_RETURN_ALT`)"),
+    (ARDUPILOT, {"RTL_ALT": 1_500.0}, "it returns at 15 m (`RTL_ALT`), and the policy says 30 m: "
+                                     "set `RTL_ALT` to 3000"),
+    (ARDUPILOT, {"RTL_ALT": 30.0}, "it returns at 0.3 m"),
+    (ARDUPILOT, {"RTL_ALT_M": 15.0}, "it returns at 15 m (`RTL_ALT_M`), and the policy says 30 m: "
+                                     "set `RTL_ALT_M` to 30"),
+    (ARDUPILOT, {}, "it does not tell its return altitude (`RTL_ALT` or `RTL_ALT_M`)"),
+])  # fmt: skip
+def test_another_return_altitude_keeps_it_from_being_ready(flavour: Flavour, parameters: Any, says: str) -> None:
+    one = preflight(flavour, fence=False)
+    Port(flavour, parameters).settle(one)
+    assert (one.unready or "").startswith(says)
+
+
+@pytest.mark.parametrize(("flavour", "parameters"), [
+    (PX4, {"RTL_RETURN_ALT": 30.004}), (ARDUPILOT, {"RTL_ALT": 3_000.0}), (ARDUPILOT, {"RTL_ALT_M": 30.0}),
+])  # fmt: skip
+def test_the_same_return_altitude_is_ready(flavour: Flavour, parameters: Any) -> None:
+    one = preflight(flavour, fence=False)
+    Port(flavour, parameters).settle(one)
+    assert one.unready is None
+
+
+@FLAVOURS
+def test_a_policy_that_says_no_return_altitude_asks_for_none(flavour: Flavour) -> None:
+    one, port = Preflight(POLICY, flavour, at_home(), fence=False), Port(flavour, {})
+    port.settle(one)
+    one.due(1, 0)
+    assert (one.unready, port.heard) == (None, [])
+    assert one.notes == ["its own fence was left as it is"]
+
+
+@FLAVOURS
+def test_a_vehicle_that_takes_no_fence_flies_without_and_says_so(flavour: Flavour) -> None:
+    one, port = preflight(flavour), Port(flavour)
+    port.result = mavlink.MAV_MISSION_UNSUPPORTED
+    port.settle(one)
+    assert one.unready is None
+    assert one.notes == ["it takes no fence: the policy's airspace is watched by this program alone"]
+
+
+@FLAVOURS
+def test_a_fence_that_is_refused_or_kept_otherwise_keeps_it_from_being_ready(flavour: Flavour) -> None:
+    one, port = preflight(flavour), Port(flavour)
+    port.result = mavlink.MAV_MISSION_NO_SPACE
+    port.settle(one)
+    assert one.unready == "its fence could not be set: it refuses it (no space); `--no-fence` flies without"
+
+    def moved(message: Any) -> Any:
+        if message.get_type() == "MISSION_ITEM_INT" and message.seq == 2:
+            message.x += 1
+        return message
+
+    other, port = preflight(flavour), Port(flavour)
+    port.bend = moved
+    port.settle(other)
+    assert "it holds another item 2 than it was sent" in (other.unready or "")
+
+    def shorter(message: Any) -> Any:
+        if message.get_type() == "MISSION_COUNT":
+            message.count = 3
+        return message
+
+    third, port = preflight(flavour), Port(flavour)
+    port.bend = shorter
+    port.settle(third)
+    assert "it holds 3 items instead of 4" in (third.unready or "")
+
+
+@FLAVOURS
+def test_a_vehicle_that_asks_for_what_is_not_there_is_not_answered(flavour: Flavour) -> None:
+    one, port = preflight(flavour), Port(flavour)
+    port.ask = lambda number: mavlink.MAVLink_mission_request_int_message(1, 191, 9, 1)  # type: ignore[method-assign]
+    port.settle(one)
+    assert "it asks for item 9 of 4" in (one.unready or "")
+
+
+@FLAVOURS
+def test_silence_is_not_waited_for_for_ever(flavour: Flavour) -> None:
+    one, port = preflight(flavour), Port(flavour)
+    port.lose = lambda name: name.startswith("MISSION")
+    port.settle(one)
+    assert "it does not answer" in (one.unready or "")
+
+
+def test_a_fence_without_its_switch_is_none() -> None:
+    one = preflight(ARDUPILOT)
+    Port(ARDUPILOT, {"RTL_ALT": 3_000.0, "FENCE_TYPE": 7.0}).settle(one)
+    assert (
+        one.unready == "its fence could not be switched on: no answer about `FENCE_ENABLE`; `--no-fence` flies without"
+    )
+
+
+@FLAVOURS
+@pytest.mark.parametrize("seed", range(6))
+def test_lost_frames_delay_and_spoil_nothing(flavour: Flavour, seed: int) -> None:
+    one, port, chance = preflight(flavour), Port(flavour), Random(seed)
+    port.lose = lambda name: chance.random() < 0.25
+    port.settle(one, 200)
+    assert one.unready is None or "does not" in one.unready
+    if one.unready is None:
+        assert len(port.items) == 4
+
+
+@FLAVOURS
+def test_what_failed_is_begun_again(flavour: Flavour) -> None:
+    one, port = preflight(flavour), Port(flavour)
+    for lose in ("MISSION", "PARAM"):
+        port.lose = lambda name, lose=lose: name.startswith(lose)
+        port.settle(one, 40)
+        assert "does not" in (one.unready or "")
+    port.lose = lambda name: False
+    port.settle(one)
+    assert one.unready is None
+    assert one.notes == ["its fence was set to the policy's airspace (4 items), and read back"]
+
+
+def test_a_switch_that_is_no_number_is_off() -> None:
+    one, port = preflight(ARDUPILOT), Port(ARDUPILOT)
+    port.parameters["FENCE_TYPE"] = float("nan")
+    port.settle(one)
+    assert one.unready is None
+    assert port.parameters["FENCE_TYPE"] == 4.0
+
+
+def test_fences_of_other_kinds_are_not_ours() -> None:
+    one, port = preflight(PX4), Port(PX4)
+    port.settle(one, 0)
+    one.due(1, 0)
+    mission = mavlink.MAVLink_mission_ack_message(1, 191, 14, 0)
+    assert one.take("MISSION_ACK", mission, 1, 0) == []
+    port.settle(one)
+    assert one.unready is None
+
+
+@pytest.mark.parametrize("value", [0, 1, 2, 255, 4_001, 2**31 - 1, -1, -5])
+def test_px4s_integers_travel_as_their_bytes(value: int) -> None:
+    parameters = Parameters(bytewise=True)
+    parameters.read("GF_ACTION")
+    parameters.due(1, 0)
+    raw = struct.unpack("<f", struct.pack("<i", value))[0]
+    packed = Codec(1, 1).pack(mavlink.MAVLink_param_value_message(b"GF_ACTION", raw, 6, 1, 0))
+    (received,) = Codec(1, 191).parse(packed)
+    parameters.take(received.message)
+    assert parameters.values["GF_ACTION"] == value
+    parameters.write("GF_ACTION", 3.0)
+    (sent,) = parameters.due(1, S)
+    assert struct.pack("<f", sent.param_value) == struct.pack("<i", 3)
+
+
+def test_a_parameter_is_set_when_its_echo_says_so() -> None:
+    parameters = Parameters(bytewise=False)
+    parameters.read("FENCE_ENABLE")
+    parameters.due(1, 0)
+    for value, settled in ((0.0, True), (0.0, False), (1.0, True)):
+        if not settled:
+            parameters.write("FENCE_ENABLE", 1.0)
+            parameters.due(1, S)
+        parameters.take(mavlink.MAVLink_param_value_message(b"FENCE_ENABLE", value, 2, 1, 0))
+        assert parameters.is_settled("FENCE_ENABLE") == settled
+    parameters.take(mavlink.MAVLink_param_value_message(b"OTHER", 1.0, 2, 1, 0))
+    assert "OTHER" not in parameters.values

@@ -1,0 +1,84 @@
+"""MAVSDK flies the simulated vehicle: its server is a process, and so is the program that asks it."""
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.simulator import Simulator
+
+pytest.importorskip("mavsdk_grpc.bin", reason="MAVSDK has no server for this platform")
+
+FLIGHT = Path(__file__).with_name("mavsdk_flight.py")
+SPEED = 15
+PATIENCE_S = 180.0
+STEPS = [
+    "connected",
+    "healthy",
+    "set up",
+    "fence",
+    "armed",
+    "took off",
+    "disarming refused",
+    "went",
+    "mission stored",
+    "mission flown",
+    "returned",
+    "disarmed by itself",
+    "armed",
+    "took off",
+    "landed",
+    "disarmed",
+]
+
+
+@contextmanager
+def process(*command: str) -> Iterator[subprocess.Popen[str]]:
+    """A process that says what it does on its standard output, and is gone when this is left, or this process is."""
+    leash = shutil.which("setpriv")
+    whole = [*([leash, "--pdeathsig", "KILL", "--"] if leash else []), *command]
+    started = subprocess.Popen(
+        whole, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    try:
+        yield started
+    finally:
+        started.kill()
+        started.communicate()
+
+
+def grpc_port(server: subprocess.Popen[str]) -> str:
+    """The port that the server listens on, once it has found a vehicle."""
+    assert server.stdout is not None
+    said = []
+    for line in server.stdout:
+        if found := re.search(r"Server set to listen on [\d.]+:(\d+)", line):
+            return found[1]
+        said.append(line)
+    raise AssertionError(f"the server ended: {said}")
+
+
+@contextmanager
+def server(options: Sequence[str], port: int) -> Iterator[str]:
+    """A simulated vehicle and MAVSDK's server, linked; where programs reach the server."""
+    from mavsdk_grpc import bin as binaries
+
+    path = Path(binaries.__path__[0]) / "mavsdk_server"
+    with (
+        Simulator(["--port", str(port), "--speed", str(SPEED), "--hover", "60", *options]),
+        process(str(path), "-p", "0", f"udpin://127.0.0.1:{port}") as running,
+    ):
+        yield grpc_port(running)
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_program_on_mavsdk_flies_it(flavour: str, port: int) -> None:
+    with server(["--flavour", flavour], port) as there, process(sys.executable, str(FLIGHT), flavour, there) as flight:
+        out, _ = flight.communicate(timeout=PATIENCE_S)
+    assert flight.returncode == 0, out
+    assert out.splitlines() == STEPS

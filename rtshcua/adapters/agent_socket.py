@@ -20,7 +20,7 @@ import msgspec
 from rtshcua.onboard.ports import Presented
 from rtshcua.wire.document import MAX_DOCUMENT
 
-#: how many may follow a flight at once
+#: how many may follow a flight at once; one more takes the place of whoever was quiet for longest
 MOST_READERS: Final = 8
 #: how much may wait for one reader, in bytes
 MOST_WAITING: Final = 4 << 20
@@ -162,8 +162,7 @@ class AgentSocket:
                 return
             link.setblocking(False)
             if len(self._readers) >= MOST_READERS:
-                link.close()
-                continue
+                self._drop(self._readers[0])  # the one that was quiet for longest: a recall must not find it full
             reader = _Reader(link)
             self._readers.append(reader)
             if not reader.tell(self._greeting()):

@@ -93,5 +93,5 @@ def test_the_key_holder_may_rewrite_and_the_report_says_so() -> None:
 
 
 def test_rewritten_without_the_key() -> None:
-    changed = [edit(line, detail="") if read(line)["type"] == "effect" else line for line in LINES]
+    changed = [edit(line, detail="rewritten") if read(line).get("event") == "succeeded" else line for line in LINES]
     assert expect(rewritten(changed)) == ("close/root", LAST)

@@ -38,6 +38,8 @@ _AUTHORITY: Final = 3
 _INTEGRITY: Final = 1
 _STATE: Final = 6
 _PASSED: Final = 8
+#: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
+CLOCKS_PART_US: Final = 3_000_000
 
 
 class SoftwareBoundary:
@@ -70,6 +72,7 @@ class SoftwareBoundary:
         self._consumed: set[int] = set()
         self._now_us = 0  # of the last request: time does not go back
         self._latest = -1  # the last step that was asked for and not denied
+        self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
 
     def enforce(self, request: bytes) -> bytes:
         """Decide one request. Hostile bytes get a refusal; nothing is raised and nothing is remembered of them."""
@@ -78,6 +81,8 @@ class SoftwareBoundary:
             return encode_refusal(Status.MALFORMED)
         now_us = asked.now.monotonic_us
         if not max(self._now_us, asked.released_us) <= now_us:  # a release to come would move the deadline
+            return encode_refusal(Status.MALFORMED)
+        if not self._keeps_time(asked.now):
             return encode_refusal(Status.MALFORMED)
         self._now_us = now_us
         answer = self._step(asked) if asked.kind == STEP else self._link(asked)
@@ -95,6 +100,8 @@ class SoftwareBoundary:
         """
         if now.monotonic_us < self._now_us:
             return encode_receipt(Receipt(UNKNOWN, "time-went-back", "it came before the last request"))
+        if not self._keeps_time(now):
+            return encode_receipt(Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before"))
         self._now_us = now.monotonic_us
         decided = self._latest + int(self._latest in self._consumed)
         receipt = self._in_force.take(document, now, decided=max(decided, 0), released=max(released, self._latest + 1))
@@ -104,6 +111,17 @@ class SoftwareBoundary:
             self._consumed = {step for step in self._consumed if step < receipt.step}
             self._clauses = _ClauseNumbers(self._policy.policy, self._in_force.invocations)
         return encode_receipt(receipt)
+
+    def _keeps_time(self, now: Now) -> bool:
+        """Whether UTC went on as monotonic time did. What has expired would be good again for whoever sets it back, and
+        what is permitted at other hours, now. By a clock that does not know the time, nothing is granted anyway.
+        """
+        if now.utc_error_us > CLOCKS_PART_US:
+            return True
+        ahead_us = now.utc_us - now.monotonic_us
+        if self._ahead_us is None:
+            self._ahead_us = ahead_us
+        return abs(ahead_us - self._ahead_us) <= CLOCKS_PART_US
 
     def _step(self, asked: Request) -> Answer | Status:
         step, invocations = asked.step, self._in_force.invocations

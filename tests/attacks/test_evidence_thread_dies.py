@@ -1,0 +1,25 @@
+"""The thread that writes the evidence dies of what is no fault of the disk: that is told, and no line is kept then."""
+
+from pathlib import Path
+
+from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.files.writer import EvidenceWriter
+
+
+class Breaking(EvidenceFile):
+    """Fails as no file should."""
+
+    def append(self, line: bytes, durable: bool) -> None:
+        if line == b"bad\n":
+            raise ValueError("as no file should")
+        super().append(line, durable)
+
+
+def test_it_is_told_and_no_line_after_it_counts_as_kept(tmp_path: Path) -> None:
+    writer = EvidenceWriter(Breaking(tmp_path / "log"))
+    for line in (b"good\n", b"bad\n", b"lost\n"):
+        writer.append(line, False)
+    writer.close()
+    assert writer.trouble() == "as no file should"
+    assert writer.kept < 2
+    assert writer.waiting, "so the log does not count as whole"

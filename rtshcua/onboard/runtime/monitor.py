@@ -42,7 +42,8 @@ class StateMonitor:
 
     def hides(self, readings: Readings) -> bool:
         """Whether these readings replace a value that nobody has looked at: frames came faster than steps were made."""
-        return any(slot in self._unseen for slot, _ in readings.values)
+        unseen = self._unseen
+        return bool(unseen) and any(slot in unseen for slot, _ in readings.values)
 
     def seen(self) -> None:
         """All values that are held were looked at."""

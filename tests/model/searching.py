@@ -1,0 +1,264 @@
+"""Every reachable state of one bundle in force: the real runtime, boundary and executor, and whatever happens to them.
+
+Explicit states, breadth first. A state is a whole world (`snapshot`); an event is one call of `Runtime.step`. Time is
+an event too: the clock goes on by one `UNIT` and the vehicle reports. What happens is not held to what a sane vehicle
+would do: it may fail, succeed, land, fly or fall silent at any moment.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+from msgspec.structs import replace
+
+from model.small import LIMITS, PROFILES, UNIT, Small
+from model.snapshot import BEGIN_US, Snapshots
+from model.watching import Ear, Gate, Watch
+from reference import documents, world
+from reference.flat_case import ISSUED
+from reference.world import SESSION_KEY
+from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import (
+    AirState,
+    Event,
+    EvidenceFailed,
+    Failed,
+    Interrupted,
+    LinkBack,
+    LinkLost,
+    Presented,
+    Readings,
+    Ready,
+    Sent,
+    Succeeded,
+    TakenOver,
+)
+from rtshcua.onboard.runtime.runtime import Runtime
+from rtshcua.wire.keys import Duty
+
+START = Now(BEGIN_US, ISSUED + 60 * UNIT, 20_000)
+#: nothing in a small world is compared with a longer time
+OLD_US = 2 * UNIT
+#: so many documents are handed over in one run
+MOST_HANDED = 2
+
+EVENTS: dict[str, Callable[["World"], Event]] = {
+    "ready": lambda at: Ready(at.now_us),
+    "on the ground": lambda at: AirState(at.now_us, False, False),
+    "armed": lambda at: AirState(at.now_us, True, False),
+    "in the air": lambda at: AirState(at.now_us, True, True),
+    "succeeded": lambda at: Succeeded(at.now_us, at.token),
+    "failed": lambda at: Failed(at.now_us, at.token, "no-effect"),
+    "late success": lambda at: Succeeded(at.now_us, at.before),
+    "taken over": lambda at: TakenOver(at.now_us, "POSCTL"),
+    "link lost": lambda at: LinkLost(at.now_us),
+    "link back": lambda at: LinkBack(at.now_us),
+    "interrupted": lambda at: Interrupted(at.now_us),
+    "evidence failed": lambda at: EvidenceFailed(at.now_us, "disk full"),
+}
+
+
+def _without_the_second(of: Loaded) -> Mission:
+    mission = of.bundle.mission
+    first, _, *rest = mission.invocations
+    steps = (first, *(replace(each, step=number) for number, each in enumerate(rest, 1)))
+    return replace(mission, issued_at_us=mission.issued_at_us + UNIT, invocations=steps)
+
+
+#: signed by whoever may; an approval is about the second step
+DOCUMENTS: dict[str, Callable[[Loaded], bytes]] = {
+    "recall": lambda of: documents.recall(of, now=START),
+    "granted": lambda of: documents.approval(of, 1, now=START),
+    "refused": lambda of: documents.approval(of, 1, now=START, granted=0),
+    "replaced": lambda of: documents.replacement(of, 1, _without_the_second(of)),
+}
+
+
+@dataclass
+class World:
+    """A run, and what surrounds it."""
+
+    of: Loaded
+    runtime: Runtime
+    ear: Ear
+    profile: str
+    watch: Watch = field(default_factory=Watch)
+    now_us: int = BEGIN_US
+    token: int = 0  # of the command that was sent last,
+    before: int = 0  # and of the one before
+    left: bool = False  # it was left alone: that happens once
+    handed: int = 0  # documents that were handed over: refused ones are counted without end
+
+    def step(self, event: Event | None) -> None:
+        """One call of the runtime, and all that must hold of it."""
+        self.ear.heard.clear()
+        self.ear.passed.clear()
+        self.watch.before(event)
+        now = Now(self.now_us, START.utc_us + self.now_us - BEGIN_US, START.utc_error_us)
+        actions = self.runtime.step(now, () if event is None else (event,))
+        flew = self.watch.flying
+        self.watch.after(self.of, self.ear, event, actions, self.now_us)
+        if self.watch.flying not in (None, flew):
+            self.before, self.token = self.token, self.watch.flying or 0
+            self.step(Sent(self.now_us, self.token))
+
+
+class Broken(AssertionError):
+    """Something happened that must not; says how."""
+
+
+@dataclass
+class Found:
+    """What a search found: the graph, by number of state; `ticks` are the edges along which time passes."""
+
+    states: int = 0
+    transitions: int = 0
+    edges: list[list[tuple[int, int]]] = field(default_factory=list)
+    falling: list[bool] = field(default_factory=list)
+    whole: bool = True
+    endings: set[str] = field(default_factory=set)
+    parents: list[tuple[int, str]] = field(default_factory=list)
+
+    def way(self, state: int) -> list[str]:
+        """What happens from the start to a state."""
+        names = []
+        while state >= 0:
+            state, name = self.parents[state]
+            names.append(name)
+        return names[::-1]
+
+
+class Search:
+    """One search."""
+
+    def __init__(self, of: Small) -> None:
+        self._of = of
+        self._snapshots = Snapshots(SESSION_KEY, START.utc_us, OLD_US, (Ear,))
+        self._ear = Ear(Recorder(lambda data: world.LOG_KEY.sign(data, duty=Duty.LOG), world.LOG_KEY.public))
+        template = world.loaded(of.policy, of.mission)
+        self._template = self._snapshots.take(template)
+        self._documents = {name: DOCUMENTS[name](template) for name in of.documents}
+
+    def run(self, most: int | None = None) -> Found:
+        """All states from a first run, and from one that goes on after a crash; at most so many."""
+        found = Found()
+        numbers: dict[bytes, int] = {}
+        parents = found.parents
+        waiting: deque[tuple[int, bytes]] = deque()
+
+        def number(at: World, parent: int, event: str) -> int:
+            parts: object = at.runtime.ending  # when it is over, how it was is over too
+            if at.runtime.ending is None:
+                parts = (at.runtime, at.of, at.watch, at.profile, at.token, at.before, at.left, at.handed)
+            digest = self._snapshots.canonical(parts, at.now_us)
+            known = numbers.get(digest)
+            if known is not None:
+                return known
+            new = numbers[digest] = len(parents)
+            parents.append((parent, event))
+            found.edges.append([])
+            if at.runtime.ending is not None:
+                found.endings.add(at.runtime.ending.value)
+                _guarded(found, new, "(over)", _over, at)
+            view = at.runtime.view(Now(at.now_us, START.utc_us, START.utc_error_us))
+            found.falling.append(view.stage.value == "falling-back")
+            if at.runtime.ending is None:
+                waiting.append((new, self._snapshots.take(at)))
+            return new
+
+        for resumed in (False, True):
+            number(self._begin(resumed=resumed), -1, "resumed" if resumed else "begun")
+        events = self._events()
+        while waiting:
+            if most is not None and len(parents) > most:
+                found.whole = False
+                break
+            state, data = waiting.popleft()
+            for name, units, happen in events:
+                at = self._snapshots.restore(data)
+                _guarded(found, state, name, happen, at)
+                found.transitions += 1
+                found.edges[state].append((number(at, state, name), units))
+        found.states = len(parents)
+        return found
+
+    def _begin(self, *, resumed: bool) -> World:
+        of = self._snapshots.restore(self._template)
+        of = replace(of, executor=Gate(of.executor, SESSION_KEY, self._ear))
+        at = World(of, Runtime(of, self._ear, limits=LIMITS, resumed=resumed), self._ear, self._of.profiles[0])
+        at.step(_readings(at))
+        return at
+
+    def _events(self) -> list[tuple[str, int, Callable[[World], None]]]:
+        """All that can happen: its name, how many units pass, and how."""
+        happen: list[tuple[str, int, Callable[[World], None]]] = []
+        for name in self._of.events:
+            if name in PASSING:
+                happen.append((name, *PASSING[name]))
+            else:
+                happen.append((name, 0, partial(_happens, make=EVENTS[name])))
+        for name, document in self._documents.items():
+            happen.append((name, 0, partial(_presented, document=document)))
+        return happen + [(name, 0, partial(_turns, profile=name)) for name in self._of.profiles]
+
+
+def _guarded(found: Found, state: int, name: str, happen: Callable[[World], None], at: World) -> None:
+    try:
+        happen(at)
+    except Exception as error:
+        raise Broken(f"{error!r} after {[*found.way(state), name]}") from error
+
+
+def _over(at: World) -> None:
+    """A run that ended does nothing any more, whatever happens."""
+    for make in EVENTS.values():
+        at.step(make(at))
+    _tick(at)
+
+
+def _happens(at: World, make: Callable[[World], Event]) -> None:
+    at.step(make(at))
+
+
+def _presented(at: World, document: bytes) -> None:
+    if at.handed < MOST_HANDED:
+        at.handed += 1
+        at.step(Presented(at.now_us, document))
+
+
+def _readings(at: World) -> Readings:
+    return Readings(at.now_us, tuple(PROFILES[at.profile].items()))
+
+
+def _turns(at: World, profile: str) -> None:
+    at.profile = profile
+    at.step(_readings(at))
+
+
+def _tick(at: World) -> None:
+    at.now_us += UNIT
+    at.step(_readings(at))
+
+
+def _silence(at: World) -> None:
+    at.now_us += UNIT
+    at.step(None)
+
+
+def _leave(at: World) -> None:
+    if not at.left:
+        at.left = True
+        at.runtime.leave()
+        at.step(None)
+
+
+#: what is no event of the ports: its name, how many units pass, and how
+PASSING: dict[str, tuple[int, Callable[[World], None]]] = {
+    "time": (1, _tick),
+    "silence": (1, _silence),
+    "left alone": (0, _leave),
+}

@@ -1,0 +1,134 @@
+"""Small policies and missions for the model: times are a unit long, so that all orders of them can be tried.
+
+`UNIT` is how far the clock goes at once. Limits are whole units, so that a time which just equals one is tried as well.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from reference.flat_case import BATTERY, FIX, GOTO, HOME, HOVER, LAND, NOMINAL, TAKEOFF, WIND, M, S
+from rtshcua.model.flat.contract import Contract, Link, MotionKind
+from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
+from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.onboard.runtime.flight import Limits
+
+UNIT = S
+LIMITS = Limits(ready_us=UNIT, silent_us=UNIT, retry_us=UNIT, tries=1, again_us=UNIT // 2)
+
+GOOD = dict(NOMINAL)
+#: what the vehicle may report: all is well; too windy for a step, not for links; no position; nothing known; no charge
+PROFILES: dict[str, dict[int, int | None]] = {
+    "good": GOOD,
+    "windy": GOOD | {WIND: 12 * M},
+    "no-fix": GOOD | {FIX: 0},
+    "blind": GOOD | {WIND: None, FIX: None},
+    "low": GOOD | {BATTERY: 2_000},
+}
+
+CONFIRM = flat.rule(RuleKind.CONFIRM, GOTO, approver=flat.SUPERVISOR, within_us=UNIT)
+
+
+@dataclass(frozen=True)
+class Small:
+    """What one search is about: policy, mission, what the vehicle may report and which documents come."""
+
+    name: str
+    policy: Policy
+    mission: Mission
+    profiles: tuple[str, ...]
+    events: tuple[str, ...]
+    documents: tuple[str, ...] = ()
+
+
+#: what happens, by who brings it about
+VEHICLE = ("ready", "on the ground", "in the air", "succeeded", "failed", "time")
+LINK = ("link lost", "link back")
+PEOPLE = ("taken over", "interrupted", "left alone")
+REST = ("armed", "late success", "evidence failed", "silence")
+
+
+def policy(
+    contingency: tuple[Link, ...], chain: tuple[Link, ...], *, confirm: bool = False, degrade: bool = False
+) -> Policy:
+    """Permits everything; `chain` stands behind each step that flies, but for a take-off, which lands."""
+
+    def contract(of: Contract) -> Contract:
+        duration_us = UNIT
+        fallback = of.fallback and ((flat.link(LAND),) if of is flat.CONTRACTS[TAKEOFF] else chain)
+        require = tuple(each for each in of.require if each is flat.FIX_IS_GOOD)
+        assume = tuple(each for each in of.assume if each is flat.CALM)
+        return replace(
+            of, deadline_us=UNIT, duration_us=duration_us, grace_us=UNIT, fallback=fallback, phases=(),
+            require=require, assume=assume, maintain=(), reads=(WIND,) * len(assume) + (FIX,) * len(require),
+        )  # fmt: skip
+
+    rules = [flat.rule(RuleKind.PERMIT, *range(len(flat.CONTRACTS)))]
+    rules += [CONFIRM] if confirm else []
+    rules += [replace(flat.RULES[-1], target=flat.link(HOME))] if degrade else []
+    stale_us = UNIT + UNIT // 2
+    return replace(
+        flat.POLICY,
+        contracts=tuple(map(contract, flat.CONTRACTS)),
+        signals=tuple(replace(each, stale_us=stale_us) for each in flat.POLICY.signals),
+        contingency=contingency, rules=tuple(rules), airspace=None,
+        vehicle=replace(flat.POLICY.vehicle, reserve=0),
+    )  # fmt: skip
+
+
+def mission(of: Policy, skills: tuple[int, ...], otherwise: OnInadmissible = OnInadmissible.ABORT) -> Mission:
+    """These skills, one after the other."""
+    plans = {
+        TAKEOFF: (Plan(MotionKind.CLIMB, (), 20 * M, 0), (20 * M,)),
+        GOTO: (Plan(MotionKind.FLY, (110 * M, -20 * M), 20 * M, 0), (110 * M, -20 * M, 20 * M)),
+        HOME: (Plan(MotionKind.HOME, (0, 0), 0, 0), ()),
+    }
+
+    def step(number: int, skill: int) -> Invocation:
+        plan, arguments = plans[skill]
+        made = flat.invocation(number, flat.INSPECTION, skill, plan, *arguments)
+        return replace(made, contract=of.contracts[skill], on_inadmissible=otherwise)
+
+    return replace(flat.MISSION, invocations=tuple(step(*each) for each in enumerate(skills)))
+
+
+HOLD, BACK, DOWN = flat.link(HOVER, limit_us=UNIT), flat.link(HOME), flat.link(LAND)
+
+
+def small(
+    name: str, skills: tuple[int, ...], profiles: tuple[str, ...], events: tuple[str, ...], *,
+    contingency: tuple[Link, ...] = (HOLD, BACK, DOWN), chain: tuple[Link, ...] = (HOLD, BACK),
+    otherwise: OnInadmissible = OnInadmissible.ABORT, confirm: bool = False, degrade: bool = False,
+    documents: tuple[str, ...] = (),
+) -> Small:  # fmt: skip
+    made = policy(contingency, chain, confirm=confirm, degrade=degrade)
+    return Small(name, made, mission(made, skills, otherwise), profiles, events, documents)
+
+
+#: in `make test`
+TINY = small(
+    "tiny", (TAKEOFF, HOME), ("good", "windy"), (*VEHICLE, *PEOPLE), contingency=(BACK, DOWN), chain=(HOLD,)
+)  # fmt: skip
+
+_STEPS = (TAKEOFF, GOTO, HOME)
+
+
+def _little(name: str, skills: tuple[int, ...], profiles: tuple[str, ...], *events: str, **more: Any) -> Small:
+    return small(name, skills, profiles, (*VEHICLE, *events), contingency=(BACK, DOWN), chain=(HOLD,), **more)
+
+
+#: in `make soak`
+ALL = (
+    small("chain", _STEPS, ("good", "windy", "no-fix"), (*VEHICLE, *PEOPLE)),
+    _little("everything", (TAKEOFF, HOME), ("good",), *PEOPLE, *LINK, *REST),
+    _little("link", (TAKEOFF, HOME), ("good", "windy"), *LINK, "interrupted", "silence"),
+    _little("unknown", _STEPS, ("good", "blind"), "silence"),
+    _little("hold", _STEPS, ("good", "no-fix"), "interrupted", otherwise=OnInadmissible.HOLD),
+    _little("skip", _STEPS, ("good", "no-fix"), "interrupted", otherwise=OnInadmissible.SKIP),
+    _little("degrade", _STEPS, ("good", "low"), "interrupted", degrade=True),
+    _little("recall", (TAKEOFF, HOME), ("good", "windy"), *LINK, documents=("recall",)),
+    _little("approval", (TAKEOFF, GOTO), ("good",), confirm=True, documents=("granted", "refused")),
+    _little("replacement", _STEPS, ("good",), documents=("replaced", "recall")),
+)

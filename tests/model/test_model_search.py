@@ -1,0 +1,80 @@
+"""Every reachable state of small runs, on the real runtime, boundary and executor (docs/model-checking.md).
+
+While a search goes on, `watching` holds each dispatch, end and stand-down against what may be. Afterwards, the graph
+says whether every path ends, and how long the longest takes.
+"""
+
+from dataclasses import replace as with_fields
+
+import pytest
+
+from model.graph import longest
+from model.searching import Found, Search
+from model.small import ALL, LIMITS, TINY, UNIT, Small
+from reference.flat_case import S
+from rtshcua.onboard.runtime.bounds import falling_us, run_us
+
+
+def check(of: Small) -> Found:
+    """Search it, and hold it to its bounds; prints the figures that docs/model-checking.md has."""
+    found = Search(of).run()
+    assert found.whole
+    times, endless = longest(found.edges)
+    assert not endless, f"time may pass for ever: {found.way(endless[0])}"
+    whole = run_us(of.policy, of.mission, LIMITS, UNIT)
+    assert whole is not None
+    assert max(times) * UNIT <= whole
+    chains = [falling_us(of.policy, contract, LIMITS, UNIT) for contract in {*_contracts(of), None}]
+    falling = max(time for time, falls in zip(times, found.falling, strict=True) if falls)
+    assert falling * UNIT <= max(chains)
+    figures = f"{found.states} states, {found.transitions} transitions, ends within {max(times)} of {whole // UNIT}"
+    print(f"{of.name}: {figures}, falls back within {falling} of {max(chains) // UNIT}")
+    return found
+
+
+def _contracts(of: Small) -> list[object]:
+    return [invocation.contract for invocation in of.mission.invocations]
+
+
+def test_every_state_of_a_tiny_run() -> None:
+    found = check(TINY)
+    assert found.states > 400, "the search must not be cut off by what it does not try"
+    assert {"completed", "aborted", "refused", "interrupted", "stood-down"} <= found.endings
+
+
+def test_a_run_that_silence_ended_does_nothing_more() -> None:
+    found = Search(with_fields(TINY, profiles=("good",), events=("ready", "link lost", "time"))).run()
+    assert "link-lost" in found.endings
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("of", ALL, ids=lambda of: of.name)
+def test_every_state_of_a_small_run(of: Small) -> None:
+    check(of)
+
+
+@pytest.mark.parametrize(
+    ("edges", "times", "endless"),
+    [
+        ([[]], [0], []),
+        ([[(1, 1)], [(2, 0)], []], [1, 0, 0], []),
+        ([[(0, 0), (1, 2)], []], [2, 0], []),
+        ([[(1, 0), (2, 1)], [(0, 0), (2, 3)], []], [3, 3, 0], []),
+        ([[(1, 0)], [(0, 1)]], [0, 0], [0, 1]),
+        ([[(1, 0)], [(1, 1)], [(0, 0)], []], [0, 0, 0, 0], [0, 1, 2]),
+    ],
+)
+def test_the_longest_way(edges: list[list[tuple[int, int]]], times: list[int], endless: list[int]) -> None:
+    found = longest(edges)
+    assert found[1] == endless
+    assert endless or found[0] == times
+
+
+def test_the_bounds_of_a_policy_are_sums_over_its_chains() -> None:
+    policy, takeoff = TINY.policy, TINY.mission.invocations[0].contract
+    slack = LIMITS.silent_us + UNIT
+    last = S + slack
+    insisting = LIMITS.tries * (LIMITS.retry_us + slack + last) + slack
+    contingency = 2 * (S + slack) + insisting + last + insisting
+    assert falling_us(policy, None, LIMITS, UNIT) == contingency
+    assert falling_us(policy, takeoff, LIMITS, UNIT) == S + slack + contingency

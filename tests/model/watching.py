@@ -1,0 +1,169 @@
+"""What is watched from outside while a run goes on, and what must never be seen. Knows nothing of how a run works.
+
+`Gate` stands before the executor and opens every permit itself; `Ear` hears what is recorded; `Watch` holds both, and
+what was sent, against the bundle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.executor import PermitRefusal
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Action, AirState, Dispatch, End, Ending, Event, Release, Reply, Succeeded
+from rtshcua.wire.permit import LINK_VALID_US, open_permit
+from rtshcua.wire.request import STEP
+
+_OVER = ("succeeded", "failed", "violated", "time-over", "replaced", "landed", "released")
+_HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
+
+
+class Ear(Recorder):
+    """A recorder that keeps what it is told in one step instead of writing lines."""
+
+    def __init__(self, of: Recorder) -> None:
+        super().__init__(of._sign, of._public)
+        self.heard: list[tuple[str, dict[str, Any]]] = []
+        self.passed: list[Dispatch] = []
+
+    def effect(self, now: object, event: str, **fields: Any) -> bytes:  # type: ignore[override]
+        self.heard.append((event, fields))
+        return b""
+
+    def decision(self, now: object, **fields: Any) -> bytes:  # type: ignore[override]
+        self.heard.append(("decision", fields))
+        return b""
+
+
+class Gate:
+    """The executor, and what its permits say when somebody else opens them."""
+
+    def __init__(self, executor: Any, key: bytes, ear: Ear) -> None:
+        self._of = executor
+        self._key = key
+        self._ear = ear
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._of, name)
+
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | PermitRefusal:
+        result = self._of.dispatch(sealed, now_us)
+        if isinstance(result, Dispatch):
+            permit = open_permit(sealed, self._key)
+            assert permit is not None, "forged"
+            assert permit.serial == result.command.token
+            assert now_us <= permit.not_after_us, "late"
+            assert result.not_after_us <= permit.not_after_us, "longer than permitted"
+            self._ear.passed.append(result)
+        return result
+
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | PermitRefusal:
+        result = self._of.stand_in(sealed, kind, link, now_us)
+        if isinstance(result, Dispatch):
+            permit = open_permit(sealed, self._key)
+            assert permit is not None, "forged"
+            assert permit.kind == STEP
+            assert kind != STEP, "only links stand behind a permit"
+            assert permit.serial < result.command.token
+            self._ear.passed.append(result)
+        return result
+
+
+@dataclass
+class Watch:
+    """What was seen so far."""
+
+    flying: int | None = None  # the token of the command that flies
+    command: object | None = None
+    step: int = -1  # the last step that was sent
+    tokens: set[int] = field(default_factory=set)
+    allowed: set[int] = field(default_factory=set)  # steps
+    homeward: bool = False  # a link began a return or a landing
+    recalled: bool = False
+    released: bool = False
+    ours: bool = False  # a flight of this run has not landed
+    airborne: bool | None = None
+    armed: bool | None = None
+    ending: Ending | None = None
+
+    def before(self, event: Event | None) -> None:
+        """What the vehicle says, as it says it."""
+        if isinstance(event, AirState):
+            self.airborne, self.armed = event.airborne, event.armed
+
+    def after(self, of: Loaded, ear: Ear, event: Event | None, actions: Sequence[Action], now_us: int) -> None:
+        """Check one step of the runtime."""
+        sent = [action for action in actions if isinstance(action, Dispatch)]
+        assert [id(each) for each in sent] == [id(each) for each in ear.passed], "sent past the executor"
+        assert not (self.ending and actions), f"after the end: {list(map(type, actions))}"
+        order = iter(sent)
+        if isinstance(event, Succeeded) and event.token == self.flying and self.command in _HOMEWARD:
+            self.ours = False  # that is what its success means; who flies it next is somebody else
+        fresh: set[tuple[int, int, int]] = set()
+        for what, said in ear.heard:
+            key = (said.get("kind", -1), said.get("step", -1), said.get("link", -1))
+            if what == "decision":
+                if said["outcome"].name == "ALLOW":
+                    fresh.add((key[0], key[1], said["link"]))
+                    if key[0] == STEP:
+                        self.allowed.add(key[1])
+            elif what == "dispatched":
+                self._dispatched(of, next(order), key, said, fresh, now_us)
+            elif what in _OVER and said.get("token", -1) >= 0:
+                assert said["token"] == self.flying, "what ended did not fly"
+                self.flying = None
+                self.ours = self.ours and what != "landed"
+            elif what == "recall":
+                self.recalled = True
+        assert next(order, None) is None, "sent, and not recorded"
+        self._ended(actions)
+
+    def _dispatched(
+        self, of: Loaded, dispatch: Dispatch, key: tuple[int, int, int], said: dict[str, Any],
+        fresh: set[tuple[int, int, int]], now_us: int,
+    ) -> None:  # fmt: skip
+        command, (kind, step, link) = dispatch.command, key
+        assert not self.released, "sent after standing down"
+        assert self.flying is None, "two commands at once"
+        assert command.token == said["token"]
+        assert command.token not in self.tokens, "one permit, sent twice"
+        policy = of.bundle.policy
+        if kind == STEP:
+            assert key in fresh, "a step without its decision"
+            assert not self.homeward, "a step after a return or a landing began"
+            assert not self.recalled, "a step after a recall"
+            assert step > self.step, "a step again, or behind one that was sent"
+            assert dispatch.needs_record
+            invocation = of.bundle.mission.invocations[step]
+            plan, contract = invocation.plan, invocation.contract
+            bounds = (plan.kind, plan.path, plan.altitude, plan.speed)
+            assert (command.kind, command.path, command.altitude, command.speed) == bounds, "not what was permitted"
+            assert dispatch.not_after_us <= now_us + contract.deadline_us
+            self.step = step
+        else:
+            assert key in fresh or self.allowed, "a link that nothing stands for"
+            assert kind == 2 or step in self.allowed or key in fresh
+            chain = policy.contingency if kind == 2 else of.bundle.mission.invocations[step].contract.fallback
+            contract = policy.contracts[chain[link].skill if link >= 0 else policy.rules[-1 - link].target.skill]  # type: ignore[union-attr]
+            assert dispatch.not_after_us <= now_us + LINK_VALID_US or key not in fresh
+            self.homeward = self.homeward or contract.motion.kind in _HOMEWARD
+        assert (command.skill, command.kind) == (contract.name, contract.motion.kind), "another skill"
+        self.ours = True
+        self.flying, self.command = command.token, command.kind
+        self.tokens.add(command.token)
+
+    def _ended(self, actions: Sequence[Action]) -> None:
+        for number, action in enumerate(actions):
+            if isinstance(action, Release):
+                self.released = True
+            if isinstance(action, End):
+                after = [each for each in actions[number + 1 :] if not isinstance(each, Reply)]
+                assert not after, f"after the end: {after}"
+                self.ending = action.ending
+                at_rest = self.airborne is False and self.armed is False
+                assert self.released or at_rest or not self.ours, "it ended in the air"
+                assert self.flying is None, "it ended under way"

@@ -37,11 +37,12 @@ Made: TypeAlias = dict[Subject, int]
 class Changes:
     """Looks for changes to what an environment knows. None means that no change of a value helps, or none is known.
 
-    What a temporal monitor says, no value of this moment changes; and an invocation stays in its phase.
+    What a temporal monitor says, no value of this moment changes; and an invocation stays in its phase. With
+    `signals_only` the arguments stay as they are too, where a comparison has both.
     """
 
-    def __init__(self, at: Environment, tables: Tables) -> None:
-        self._at, self._tables = at, tables
+    def __init__(self, at: Environment, tables: Tables, *, signals_only: bool = False) -> None:
+        self._at, self._tables, self._signals_only = at, tables, signals_only
 
     def find(self, node: tree.Node, goal: bool) -> tuple[Change, ...] | None:
         """Changes which, made together, give the condition the truth `goal`; as few as possible."""
@@ -111,7 +112,7 @@ class Changes:
 
     def _split(self, terms: tuple[tree.Term, ...]) -> tuple[tree.Term, int, int] | None:
         """The term to change (an argument rather than a signal), and the bounds of the sum of the others."""
-        movable = sorted((term for term in terms if term.factor), key=lambda term: not term.argument)
+        movable = sorted((term for term in terms if term.factor), key=lambda term: term.argument == self._signals_only)
         if not movable:
             return None
         others = tuple(term for term in terms if term != movable[0])

@@ -86,7 +86,7 @@ def _content(
     sets = situation(_state(values), policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     node = policy.compiler.node(clause, invocation.invocation.contract)
-    for change in Changes(at, policy.tables).find(node, True) or ():
+    for change in Changes(at, policy.tables, signals_only=True).find(node, True) or ():
         if change.argument or change.at is None or change.at in fixed:
             continue
         choices = change.choices

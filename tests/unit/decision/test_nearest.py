@@ -141,12 +141,14 @@ FALSE_NOW = flat.apply(Op.LT, SIG(WIND), N(0))
 TIME = (Op.TIME_IN, 1 * flat.H, 2 * flat.H)
 
 
-def changes(code: tuple[int, ...], goal: bool = True, values: dict[int, int | None] | None = None) -> Any:
+def changes(
+    code: tuple[int, ...], goal: bool = True, values: dict[int, int | None] | None = None, signals_only: bool = False
+) -> Any:
     node = parse(code, SCOPE)
     assert not isinstance(node, str), node
     sets = situation(flat.state(values), POLICY, NOW)
     at = Environment([*sets.values, MISSING], tuple(map(point, STEP.arguments)), sets.utc_us, sets.utc_error_us)
-    return Changes(at, POLICY.tables).find(node, goal)
+    return Changes(at, POLICY.tables, signals_only=signals_only).find(node, goal)
 
 
 def bounds(code: tuple[int, ...], goal: bool = True, **given: Any) -> Any:
@@ -154,6 +156,12 @@ def bounds(code: tuple[int, ...], goal: bool = True, **given: Any) -> Any:
     return answer and [
         (c.argument, c.at, c.low if c.low > -(1 << 52) else None, c.high if c.high < 1 << 52 else None) for c in answer
     ]
+
+
+def test_where_arguments_stay_the_signal_is_changed() -> None:
+    code = flat.apply(Op.LE, SIG(WIND), flat.apply(Op.SUB, A(1), N(19_000)))  # altitude is 20 m
+    assert bounds(code) == [(True, 1, 23_000, None)]
+    assert bounds(code, signals_only=True) == [(False, WIND, None, 1_000)]
 
 
 @pytest.mark.parametrize(

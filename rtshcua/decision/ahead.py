@@ -33,20 +33,24 @@ UNKNOWN_AHEAD = Ahead(UNKNOWN_VOLUME, 0)
 def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -> Ahead:
     """The predicted path in one situation, and the ages of its slots; nothing is known where a signal of it is."""
     known, vehicle = policy.tables.known, policy.policy.vehicle
-    where = (known.x, known.y, known.height)
-    if any(slots[slot][2] != PRESENT for slot in where):
+    x, _, x_gap, _ = slots[known.x]
+    y, _, y_gap, _ = slots[known.y]
+    height, _, height_gap, _ = slots[known.height]
+    if x_gap != PRESENT or y_gap != PRESENT or height_gap != PRESENT:
         return UNKNOWN_AHEAD
     if not vehicle.braking:
         return Ahead(policy.still.volume(slots, known), 0)
-    moves = (known.east, known.north, known.down)
-    if any(slots[slot][2] != PRESENT for slot in moves):
+    east, _, east_gap, _ = slots[known.east]
+    north, _, north_gap, _ = slots[known.north]
+    down, _, down_gap, _ = slots[known.down]
+    if east_gap != PRESENT or north_gap != PRESENT or down_gap != PRESENT:
         return UNKNOWN_AHEAD
-    x, y, height = (slots[slot][0] for slot in where)
-    east, north, down = (slots[slot][0] for slot in moves)
     speed = _root(east * east + north * north + down * down)
     if speed > MAX_SPEED:
         return UNKNOWN_AHEAD
-    age_us = max(ages[slot] for slot in (*where, *moves))
+    age_us = max(
+        ages[known.x], ages[known.y], ages[known.height], ages[known.east], ages[known.north], ages[known.down]
+    )
     goes_us, braking = age_us + vehicle.reaction_us, vehicle.braking
     part, whole = 2 * braking * goes_us + speed * SECOND, 2 * braking * SECOND
     to_x, to_y = x + _away(east * part, whole), y + _away(north * part, whole)

@@ -1,7 +1,5 @@
 """What a running skill's assumptions and limits are now (paper symbols `sc`, `inv`)."""
 
-from collections.abc import Iterator
-
 from rtshcua.decision.ahead import Ahead, ahead
 from rtshcua.decision.airspace import keeps
 from rtshcua.decision.case import environment, situation
@@ -24,12 +22,15 @@ def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     path = ahead(at.slots, state.ages, policy)
-    return tuple(unkept for unkept in _held(invocation, policy, at, path) if unkept.truth != TRUE)
+    return tuple(_unkept(invocation, policy, at, path))
 
 
-def _held(invocation: PreparedInvocation, policy: PreparedPolicy, at: Environment, path: Ahead) -> Iterator[Unkept]:
+def _unkept(invocation: PreparedInvocation, policy: PreparedPolicy, at: Environment, path: Ahead) -> list[Unkept]:
+    unkept: list[Unkept] = []
     for clause, condition in invocation.assume:
-        yield Unkept(clause.text, condition(at))
+        truth = condition(at)
+        if truth != TRUE:
+            unkept.append(Unkept(clause.text, truth))
     volume, lasts_us = path
     if invocation.maintain:
         over = ranging(at, volume, policy.tables.known.height, lasts_us)
@@ -37,11 +38,18 @@ def _held(invocation: PreparedInvocation, policy: PreparedPolicy, at: Environmen
             truth = EVERYWHERE[condition(over)]
             if truth == UNKNOWN:  # what is wrong already where it is, is wrong wherever it goes
                 truth = EVERYWHERE[truth | condition(at) & FALSE]
-            yield Unkept(clause.text, truth)
+            if truth != TRUE:
+                unkept.append(Unkept(clause.text, truth))
     if policy.airspace is not None:
-        truth = keeps(volume.place, policy.airspace, at, lasts_us)
-        yield Unkept(policy.airspace.airspace.text, EVERYWHERE[truth])
+        truth = EVERYWHERE[keeps(volume.place, policy.airspace, at, lasts_us)]
+        if truth != TRUE:
+            unkept.append(Unkept(policy.airspace.airspace.text, truth))
     if invocation.energy.stays:
-        yield Unkept(WAY_HOME, way_home(at, volume, policy))
+        truth = way_home(at, volume, policy)
+        if truth != TRUE:
+            unkept.append(Unkept(WAY_HOME, truth))
     for rule in invocation.candidates.degrades:
-        yield Unkept(rule.rule.text, NOT[rule.condition(at)])
+        truth = NOT[rule.condition(at)]
+        if truth != TRUE:
+            unkept.append(Unkept(rule.rule.text, truth))
+    return unkept

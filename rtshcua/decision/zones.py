@@ -38,17 +38,17 @@ class Circle:
     def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
         """Whether the widened leg is wholly inside, or wholly outside by a margin of at most 3 mm."""
         west, south, east, north = box
+        if self._holds(x0, y0, box) and self._holds(x1, y1, box):  # a disc is convex
+            return True
         reach_x, reach_y = max(-west, east), max(-south, north)
         reach = self._radius + isqrt(reach_x * reach_x + reach_y * reach_y) + 1
-        if self._outside(x0, y0, x1, y1, reach):
-            return True
-        return self._holds(x0, y0, box) and self._holds(x1, y1, box)  # a disc is convex
+        return self._outside(x0, y0, x1, y1, reach)
 
     def _holds(self, x: int, y: int, box: Box) -> bool:
         """Whether a widened place is inside: its corner farthest from the centre is."""
         west, south, east, north = box
-        dx = max(abs(x + west - self._x), abs(x + east - self._x))
-        dy = max(abs(y + south - self._y), abs(y + north - self._y))
+        dx, dy = x - self._x, y - self._y
+        dx, dy = max(dx + east, -dx - west), max(dy + north, -dy - south)
         return dx * dx + dy * dy < self._square
 
     def _outside(self, x0: int, y0: int, x1: int, y1: int, radius: int) -> bool:

@@ -178,19 +178,19 @@ class Recorder:
         """The line of something that happened; `detail` is the world's own text, kept as it came."""
         chain = self._chain
         return chain.add(
-            Effect(
-                prev=chain.prev,
-                at_us=now.monotonic_us,
-                detail=_storable(detail),
-                event=event,
-                kind=kind,
-                link=link,
-                seq=chain.seq,
-                step=step,
-                token=token,
-                type="effect",
-                utc_error_us=now.utc_error_us,
-                utc_us=now.utc_us,
+            Effect(  # by position, as above
+                chain.prev,
+                now.monotonic_us,
+                _storable(detail),
+                event,
+                kind,
+                link,
+                chain.seq,
+                step,
+                token,
+                "effect",
+                now.utc_error_us,
+                now.utc_us,
             )
         )
 
@@ -219,4 +219,4 @@ class Recorder:
 
 def _storable(text: str) -> str:
     """The text, with what UTF-8 cannot carry (lone surrogates) replaced: the world's text must not stop a record."""
-    return text.encode("utf-8", "replace").decode()
+    return text if text.isascii() else text.encode("utf-8", "replace").decode()

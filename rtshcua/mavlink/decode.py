@@ -5,14 +5,15 @@ is not filled in, for who sent it stands in `Received`. pymavlink lets an enviro
 nothing here looks at it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
+from operator import attrgetter
 from struct import Struct
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.mavlink.framing import CHECKSUM, HEADER, checksum
+from rtshcua.mavlink.framing import HEADER, checksum
 
 Message = Any
 """An instance of a generated `MAVLink_..._message` class; pymavlink ships no types."""
@@ -26,8 +27,10 @@ class Kind(NamedTuple):
     """The octet that the checksum takes in behind the payload: a digest of the message's layout."""
     fields: Struct
     build: Callable[[tuple[Any, ...]], Message]
-    plain: tuple[str, ...] | None
-    """The fields in the order of the wire, if each of them is one number."""
+    number: bytes
+    """As it stands in a frame's header."""
+    values: Callable[[Message], Iterable[Any]] | None
+    """The numbers of a message in the order of the wire; None where it holds texts."""
 
 
 @cache
@@ -36,46 +39,83 @@ def kind_of(number: int) -> Kind | None:
     of = ardupilotmega.mavlink_map.get(number)
     if of is None:
         return None
-    extra = bytes([of.crc_extra])
-    if _is_plain(of):
-        return Kind(of.msgname, extra, of.unpacker, _plain(of), tuple(of.ordered_fieldnames))
-    return Kind(of.msgname, extra, of.unpacker, _any(of), None)
+    extra, octets = bytes([of.crc_extra]), number.to_bytes(3, "little")
+    if "char" in of.fieldtypes:
+        return Kind(of.msgname, extra, of.unpacker, _any(of), octets, None)
+    if all(length == 1 for length in of.lengths) and len(of.lengths) > 1:
+        return Kind(of.msgname, extra, of.unpacker, _plain(of), octets, attrgetter(*of.ordered_fieldnames))
+    return Kind(of.msgname, extra, of.unpacker, _arrays(of), octets, _flat(of))
 
 
 def decode(frame: bytes, kind: Kind) -> Message | None:
     """The message in a whole frame, signed or not; None if its checksum is wrong."""
     end = HEADER + frame[1]
-    if checksum(frame[1:end] + kind.extra) != int.from_bytes(frame[end : end + CHECKSUM], "little"):
+    if checksum(frame[1:end] + kind.extra) != frame[end] | frame[end + 1] << 8:
         return None
-    # Zeros at the end are not sent; what is longer than we know comes of a newer dialect.
-    size = kind.fields.size
-    payload = frame[HEADER : min(end, HEADER + size)].ljust(size, b"\0")
-    return kind.build(kind.fields.unpack(payload))
+    fields = kind.fields
+    if frame[1] >= fields.size:  # what is longer than we know comes of a newer dialect
+        return kind.build(fields.unpack_from(frame, HEADER))
+    return kind.build(fields.unpack(frame[HEADER:end].ljust(fields.size, b"\0")))  # zeros at the end are not sent
 
 
-def _is_plain(of: Any) -> bool:
-    """Whether all fields are single numbers."""
-    return all(length == 1 for length in of.lengths) and "char" not in of.fieldtypes
+def _bare(of: Any) -> dict[str, Any]:
+    """What a message holds beside its fields."""
+    made = of(*[0] * len(of.fieldnames))
+    return {name: value for name, value in vars(made).items() if name not in of.fieldnames}
 
 
 def _plain(of: Any) -> Callable[[tuple[Any, ...]], Message]:
-    """A message without the generated constructor, which takes longer than all the rest."""
-    made = of(*[0] * len(of.fieldnames))
-    rest = {name: value for name, value in vars(made).items() if name not in of.fieldnames}
-    names = tuple(of.ordered_fieldnames)
-    new = of.__new__
+    """A message of single numbers, without the generated constructor, which takes longer than all the rest."""
+    rest, names, new = _bare(of), tuple(of.ordered_fieldnames), of.__new__
 
     def build(values: tuple[Any, ...]) -> Message:
         message = new(of)
-        message.__dict__.update(rest)
-        message.__dict__.update(zip(names, values, strict=True))
+        held = message.__dict__
+        held.update(rest)
+        held.update(zip(names, values, strict=True))
         return message
 
     return build
 
 
+def _layout(of: Any) -> tuple[tuple[str, int, int], ...]:
+    """Each field in the order of the wire, where it starts among the values, and its length."""
+    starts = [sum(of.lengths[:place]) for place in range(len(of.lengths))]
+    return tuple(zip(of.ordered_fieldnames, starts, of.lengths, strict=True))
+
+
+def _arrays(of: Any) -> Callable[[tuple[Any, ...]], Message]:
+    """A message with arrays of numbers, without the generated constructor."""
+    rest, layout, new = _bare(of), _layout(of), of.__new__
+
+    def build(values: tuple[Any, ...]) -> Message:
+        message = new(of)
+        held = message.__dict__
+        held.update(rest)
+        for name, start, length in layout:
+            held[name] = list(values[start : start + length]) if length > 1 else values[start]
+        return message
+
+    return build
+
+
+def _flat(of: Any) -> Callable[[Message], Iterable[Any]]:
+    layout = _layout(of)
+
+    def values(message: Message) -> Iterable[Any]:
+        held, found = message.__dict__, []
+        for name, _, length in layout:
+            if length > 1:
+                found += held[name][:length]
+            else:
+                found.append(held[name])
+        return found
+
+    return values
+
+
 def _any(of: Any) -> Callable[[tuple[Any, ...]], Message]:
-    """A message with arrays or texts, by the generated constructor."""
+    """A message with texts, by the generated constructor."""
     starts = [sum(of.lengths[:place]) for place in range(len(of.lengths))]
     pick = [(starts[place], of.lengths[place]) for place in of.orders]
 

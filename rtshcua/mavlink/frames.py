@@ -57,17 +57,18 @@ class Codec:
     def pack(self, message: Message) -> bytes:
         """The message's frame, with the next sequence number."""
         sender = self._sender
-        number: int = type(message).id  # some messages have a field of this name
-        kind = kind_of(number)
-        if kind is None or kind.plain is None:
+        kind = kind_of(type(message).id)  # of the class: some messages have a field of this name
+        if kind is None or kind.values is None:
             frame: bytes = message.pack(sender)
         else:
-            # What pymavlink does, in half the time. Zeros at the end of a payload are not sent, but for the first.
-            payload = kind.fields.pack(*map(message.__dict__.__getitem__, kind.plain))
-            payload = payload[:1] + payload[1:].rstrip(b"\0")
-            head = bytes((len(payload), 0, 0, sender.seq, sender.srcSystem, sender.srcComponent))
-            head += number.to_bytes(3, "little") + payload
-            frame = b"\xfd" + head + checksum(head + kind.extra).to_bytes(2, "little")
+            # What pymavlink does, in a third of the time. Zeros at the end of a payload are not sent, but for the
+            # first octet.
+            payload = kind.fields.pack(*kind.values(message))
+            if not payload[-1]:
+                payload = payload[:1] + payload[1:].rstrip(b"\0")
+            head = bytes((len(payload), 0, 0, sender.seq, sender.srcSystem, sender.srcComponent)) + kind.number
+            covered = head + payload
+            frame = b"\xfd" + covered + checksum(covered + kind.extra).to_bytes(2, "little")
         sender.seq = (sender.seq + 1) % 256
         return frame
 

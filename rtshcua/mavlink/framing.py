@@ -23,7 +23,7 @@ def frame_length(data: bytes, start: int) -> int:
 
 def message_id(data: bytes, start: int) -> int:
     """The message's number, from the frame's header."""
-    return int.from_bytes(data[start + 7 : start + HEADER], "little")
+    return data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
 
 
 def checksum(octets: bytes, start: int = 0xFFFF) -> int:

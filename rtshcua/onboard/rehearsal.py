@@ -16,6 +16,7 @@ from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US
+from rtshcua.onboard.unheard import stranded
 
 #: a deferral that ends by itself once the mission is under way,
 _COMES: Final = frozenset({Reason.AWAITING_APPROVAL, Reason.PHASE_NOT_REACHED})
@@ -32,10 +33,14 @@ class Rehearsed(NamedTuple):
     hopeful: bool
 
 
-def rehearse(loaded: Loaded, state: State, now: Now) -> tuple[Rehearsed, ...]:
-    """Decide every step of the mission in force. Changes nothing."""
+def rehearse(loaded: Loaded, state: State, now: Now, unheard: frozenset[int] = frozenset()) -> tuple[Rehearsed, ...]:
+    """Decide every step of the mission in force. Changes nothing.
+
+    `unheard` are slots that nothing can fill: a step that needs one waits in vain.
+    """
     policy = loaded.policy
     found: list[Rehearsed] = []
+    vain = {each.step for each in stranded(policy.policy, loaded.bundle.mission, unheard)}
     for prepared in loaded.invocations:
         invocation = prepared.invocation
         context = Context(
@@ -51,7 +56,8 @@ def rehearse(loaded: Loaded, state: State, now: Now) -> tuple[Rehearsed, ...]:
         decision = decide(prepared, state, policy, context, now)
         would = () if decision.outcome is Outcome.ALLOW else nearest(decision, prepared, state, policy, now)
         comes = _COMES_LATER if invocation.step else _COMES
-        hopeful = decision.outcome is Outcome.ALLOW or (decision.outcome is Outcome.DEFER and decision.reason in comes)
+        waits = decision.outcome is Outcome.DEFER and decision.reason in comes and invocation.step not in vain
+        hopeful = decision.outcome is Outcome.ALLOW or waits
         found.append(Rehearsed(invocation.step, decision, would, hopeful))
         state = flown(state, invocation.plan, policy.policy.vehicle)
     return tuple(found)

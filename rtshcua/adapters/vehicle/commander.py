@@ -10,6 +10,8 @@ RETRIES = 5
 #: An answer may come this late; within it, a refusal may belong to an earlier sending of the same command.
 LATE_US = 5_000_000
 
+NEVER = (1 << 63) - 1  # us
+
 _ACCEPTED, _IN_PROGRESS = 0, 5
 #: MAV_RESULT as slugs
 RESULTS = {
@@ -61,6 +63,16 @@ class Commander:
         """Whether a command of the present stage was sent and not answered yet."""
         stage = self._stage
         return stage is not None and stage.command is not None and not self.accepted and self.refused is None
+
+    @property
+    def due_us(self) -> int:
+        """When `due` may next have something to send, unless something is acknowledged before."""
+        stage = self._stage
+        if stage is None or stage.message is None:
+            return NEVER
+        if stage.command is None:
+            return self._sent_us + stage.repeat_us if stage.repeat_us else NEVER
+        return NEVER if self.accepted or self._tries >= RETRIES else self._sent_us + RETRY_US * self.slack
 
     def acknowledge(self, command: int, result: int, now_us: int) -> None:
         """Take in one COMMAND_ACK of the vehicle. PX4 answers some twice: accepted, and then what came of it."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
@@ -12,10 +11,10 @@ from rtshcua.adapters.vehicle.commander import Commander
 from rtshcua.adapters.vehicle.datum import NoDatum
 from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
 from rtshcua.adapters.vehicle.flavour import Flavour, Message, Stages, mode_name
-from rtshcua.adapters.vehicle.link import Link
+from rtshcua.adapters.vehicle.link import Heard, Link
 from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
 from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.preflight import Preflight
+from rtshcua.adapters.vehicle.preflight import HEEDED, Preflight
 from rtshcua.adapters.vehicle.streams import ALWAYS, Streams
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Texts
@@ -46,14 +45,6 @@ _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
 
 
-class Heard(NamedTuple):
-    """What a datagram brought: events, frames that answer it, and its good frames, for the raw log."""
-
-    events: Sequence[Event]
-    answers: Sequence[bytes]
-    frames: Sequence[Received]
-
-
 class Driver:
     """One vehicle, chosen by the first heartbeat of an autopilot that we know; frames of other systems do not count.
 
@@ -61,11 +52,13 @@ class Driver:
     faster than life that the machine's own hold-ups would count as silence. `fence` False: the vehicle's own fence is
     left as it is. Whatever is sent goes out through `frames`; with a `verifier` only what it accepts comes in.
     `manoeuvres` are ways to fly by flavour (`px4`) and by flavour and skill (`px4.spray_area`): see `adapters.packs`.
+    With a `system` only the autopilot of this MAVLink system id is chosen; without, it is not ready beside another one.
     """
 
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
         verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
+        system: int | None = None,
     ) -> None:  # fmt: skip
         self._policy = policy
         self._fence = fence
@@ -75,7 +68,7 @@ class Driver:
         self._preflight: Preflight | None = None
         self._texts = Texts()
         self._announcer = Announcer()
-        self._link = Link(frames, verifier)
+        self.link = Link(frames, verifier, system)
         self._flavour: Flavour | None = None
         self._seen = Observed()
         self._system = 0
@@ -87,6 +80,7 @@ class Driver:
         self._was_ready = False
         self._released = False
         self._was_air: tuple[bool, bool] | None = None
+        self._heeded: set[str] = set()  # what more is made of than readings
 
     @property
     def flavour(self) -> Flavour | None:
@@ -103,20 +97,27 @@ class Driver:
         """What `Ready` waits for, in words; None once it was given, or when only streams are still to come."""
         if self._was_ready:
             return None
-        return self._seen.unready or (None if self._seen.airborne else self._unsettled())
+        if self._preflight is None or self._seen.airborne:
+            return self.link.crowd or self._seen.unready
+        return self.link.crowd or self._preflight.astray or self._seen.unready or self._preflight.unready
+
+    def overhear(self, datagram: bytes, now_us: int) -> None:
+        """Take in a datagram of another sender than the vehicle's."""
+        self.link.overhear(datagram, now_us)
 
     def receive(self, datagram: bytes, now_us: int) -> Heard:
         """Take in a datagram; whatever its bytes, never raises."""
         events: list[Event] = []
         send: list[Message] = []
-        received = self._link.parse(datagram, now_us)
+        received = self.link.parse(datagram, now_us)
         for frame in received:
             if self._flavour is None:
                 self._choose(frame)
             if frame.system == self._system and self._flavour is not None:
-                self._take(frame, now_us, events, send)
-                self._advance(now_us, send, events)
-        return Heard(events, self._pack(send, now_us, events), received)
+                told = self._take(frame, now_us, events, send)
+                if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
+                    self._advance(now_us, send, events)
+        return Heard(events, self._pack(send, now_us, events) if send else [], received)
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """What is due at a time: heartbeat, requests for streams, retries, a link that fell silent."""
@@ -147,6 +148,7 @@ class Driver:
         """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard."""
         if self._flavour is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
+        self.link.begin()
         before = frozenset[int]() if self._manoeuvre is None else self._manoeuvre.modes
         try:
             stages = self._way(self._flavour, command)(command, self._seen, self._system)
@@ -178,28 +180,31 @@ class Driver:
         flavour = self._flavour = _FLAVOURS.get(frame.message.autopilot)
         if flavour is not None:
             self._system = frame.system
-            self._link.settle(frame.system)
+            self.link.settle(frame.system)
             self._seen.estimator = Estimator(flavour.estimator)
             wanted = {**self._telemetry.intervals, **ALWAYS, flavour.estimator: STALE_US // _WITHIN_STALE}
             self._streams = Streams(wanted, self._telemetry.sources)
             slack = self._commander.slack
             self._preflight = Preflight(self._policy, flavour, self._seen, fence=self._fence, slack=slack)
+            self._heeded = {*self._seen.heeded, *HEEDED, "STATUSTEXT"}
 
-    def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> None:
-        name, message = frame.name, frame.message
-        if frame.component == _AUTOPILOT:
+    def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
+        """Take in one frame; False if a manoeuvre sees nothing new in it."""
+        name, message, component = frame.name, frame.message, frame.component
+        if component == _AUTOPILOT:
             self._spoken.add(name)
         elif name in self._spoken:
-            return  # what the autopilot itself tells is not taken from anybody else
+            return False  # what the autopilot itself tells is not taken from anybody else
         if name == "COMMAND_ACK":
             self._acknowledge(frame, now_us)
-            return
+            return True
         self._streams.heard(name, now_us)
-        values = self._telemetry.read(name, message, frame.component, partial(self._vouched, name, now_us))
-        if values:
-            events.append(Readings(now_us, values))
-        if frame.component != _AUTOPILOT:
-            return
+        if name in self._telemetry.carriers:
+            values = self._telemetry.read(name, message, component, partial(self._vouched, name, now_us))
+            if values:
+                events.append(Readings(now_us, values))
+        if component != _AUTOPILOT or name not in self._heeded:
+            return False
         before = self._seen.mode
         self._seen.take(name, message, now_us)
         match name:
@@ -216,6 +221,7 @@ class Driver:
         if air != self._was_air and self._seen.landed_state:
             self._was_air = air
             events.append(AirState(now_us, *air))
+        return True
 
     def _acknowledge(self, frame: Received, now_us: int) -> None:
         message = frame.message
@@ -251,13 +257,12 @@ class Driver:
             return []
         return self._preflight.due(self._system, now_us)
 
-    def _unsettled(self) -> str | None:
-        return None if self._preflight is None else self._preflight.unready
-
     def _notes(self, now_us: int) -> list[Event]:
         told = [self._seen.notes, self._streams.notes]
         if self._preflight is not None:
             told.append(self._preflight.notes)
+        if not any(told):
+            return []
         events: list[Event] = [Noted(now_us, text) for notes in told for text in notes]
         for notes in told:
             notes.clear()
@@ -281,11 +286,13 @@ class Driver:
 
     def _is_ready(self, now_us: int) -> bool:
         seen = self._seen
-        return seen.ready and self._streams.settled(now_us) and (seen.airborne or self._unsettled() is None)
+        if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us):
+            return False
+        return seen.airborne or self._preflight is None or self._preflight.unready is None
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""
-        frames, refused = self._link.pack(send, now_us)
+        frames, refused = self.link.pack(send, now_us)
         if refused and self._manoeuvre is not None and not self._manoeuvre.over:
             self._manoeuvre.over = True
             events.append(Failed(now_us, self._manoeuvre.token, refused[0]))

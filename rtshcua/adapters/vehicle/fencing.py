@@ -13,7 +13,8 @@ from rtshcua.model.flat.policy import Policy
 #: After a failure it waits so long before it begins again.
 AGAIN_US: Final = 10_000_000
 
-_MISSION: Final = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT")
+#: The messages of the mission protocol that `take` looks at.
+HEEDED: Final = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT")
 
 
 class Fencing:
@@ -47,7 +48,7 @@ class Fencing:
 
     def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
         """A message of the mission protocol; what answers it."""
-        if self._upload is None or name not in _MISSION or message.mission_type != FENCE:
+        if self._upload is None or name not in HEEDED or message.mission_type != FENCE:
             return []
         return self._upload.take(name, message, system, now_us)
 
@@ -106,5 +107,6 @@ class Fencing:
 def _told(fence: Fence) -> str:
     if not fence.items:
         return f"no fence was set, for none can say this airspace: {'; '.join(fence.left_out)}"
-    text = f"its fence was set to the policy's airspace ({len(fence.items)} items), and read back"
+    many = f"{len(fence.items)} item{'' if len(fence.items) == 1 else 's'}"
+    text = f"its fence was set to the policy's airspace ({many}), and read back"
     return f"{text}; not in it: {'; '.join(fence.left_out)}" if fence.left_out else text

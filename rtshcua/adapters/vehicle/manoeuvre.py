@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rtshcua.adapters.vehicle.commander import RESULTS, Commander
+from rtshcua.adapters.vehicle.commander import NEVER, RESULTS, Commander
 from rtshcua.adapters.vehicle.effects import still
 from rtshcua.adapters.vehicle.flavour import Flavour, Message, Stage, mode_name
 from rtshcua.adapters.vehicle.observed import Observed
@@ -38,6 +38,8 @@ class Manoeuvre:
         self._modes: frozenset[int] = frozenset()
         self._taken = False
         self.over = False
+        #: until then `advance` has nothing to say, unless something is observed or acknowledged
+        self.due_us = 0
 
     @property
     def token(self) -> int:
@@ -56,6 +58,11 @@ class Manoeuvre:
 
     def advance(self, seen: Observed, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         """Messages to send and events, after something was observed or time went by."""
+        out = self._advance(seen, now_us)
+        self.due_us = self._due_us()
+        return out
+
+    def _advance(self, seen: Observed, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         if self._taken_over(seen):
             self.over = self._taken = True
             return [], [TakenOver(now_us, mode_name(self._flavour, seen.mode or 0))]
@@ -72,6 +79,18 @@ class Manoeuvre:
             self.over = True
             return send, [Failed(now_us, self._command.token, reason, seen.text)]
         return send + self._commander.due(now_us), ()
+
+    def _due_us(self) -> int:
+        if self.over:
+            return NEVER
+        if not self._left:
+            ends = self._held_us is not None and self._command.hold_us
+            return (self._held_us or 0) + self._command.hold_us if ends else NEVER
+        stage, commander = self._left[0], self._commander
+        due_us = commander.due_us
+        if stage.timeout_us:
+            due_us = min(due_us, max(self._entered_us, commander.busy_us or 0) + stage.timeout_us * commander.slack)
+        return due_us if self._stopped_us is None else min(due_us, self._stopped_us + STOPPED_US)
 
     def _enter(self, now_us: int) -> list[Message]:
         self._entered_us, self._stopped_us = now_us, None

@@ -12,6 +12,7 @@ _IN_AIR = (2, 3, 4)  # IN_AIR, TAKEOFF, LANDING
 _FIX_3D = 3
 _CRITICAL = (5, 6)  # MAV_STATE: CRITICAL, EMERGENCY
 _DEBUG = 7  # MAV_SEVERITY
+_HEEDED = ("HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "SYS_STATUS")
 _REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
 
 
@@ -44,6 +45,11 @@ class Observed:
     text: str = ""
     text_severity: int = _DEBUG
     prearm_text: str = ""
+
+    @property
+    def heeded(self) -> tuple[str, ...]:
+        """The messages that `take` looks at."""
+        return (*_HEEDED, self.estimator.report)
 
     def take(self, name: str, message: Any, now_us: int) -> None:
         """Take in one message of the autopilot's component."""

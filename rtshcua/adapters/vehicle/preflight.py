@@ -7,6 +7,7 @@ A vehicle that flies already is left alone.
 from typing import Any, Final
 
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.fencing import HEEDED as FENCE_HEEDED
 from rtshcua.adapters.vehicle.fencing import Fencing
 from rtshcua.adapters.vehicle.flavour import Flavour, Message, ReturnAltitude
 from rtshcua.adapters.vehicle.observed import Observed
@@ -19,6 +20,8 @@ from rtshcua.model.flat.zone import Projection, project
 SAME_MM: Final = 10
 #: How often it is asked why it would not arm; by itself ArduPilot says so each 30 s.
 CHECK_US: Final = 10_000_000
+#: What `take` looks at.
+HEEDED: Final = (*FENCE_HEEDED, "PARAM_VALUE")
 
 
 class Preflight:
@@ -48,7 +51,8 @@ class Preflight:
         if self._seen.prearm_fails and (self._checked_us is None or now_us - self._checked_us >= CHECK_US):
             self._checked_us = now_us
             out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
-        out += self._fencing.due(system, now_us)
+        if self._placed and self._return() is None and self._far_from_home() is None:  # a fence is of one place only
+            out += self._fencing.due(system, now_us)
         if not self._told and self._fencing.unready is None:
             self._told = True
             self.notes.append(self._fencing.note)
@@ -64,7 +68,26 @@ class Preflight:
     @property
     def unready(self) -> str | None:
         """What is not settled, in words."""
-        return self._far_from_home() or self._return() or self._fencing.unready
+        return self.unplaced or self.astray or self._return() or self._fencing.unready
+
+    @property
+    def astray(self) -> str | None:
+        """What is known to be otherwise than the policy has it, in words."""
+        return (self._far_from_home() if self._placed else None) or (None if self._found is None else self._return())
+
+    @property
+    def unplaced(self) -> str | None:
+        """That it is not known where it stands, in words."""
+        return None if self._placed else "it does not say where it stands"
+
+    @property
+    def unread(self) -> str | None:
+        """That its return altitude is not known, in words."""
+        return self._return() if self._found is None else None
+
+    @property
+    def _placed(self) -> bool:
+        return self._seen.located
 
     def _far_from_home(self) -> str | None:
         """Where it stands becomes its home, which all of the policy is drawn around."""

@@ -1,6 +1,6 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from rtshcua.decision.reads import where
@@ -60,6 +60,11 @@ class Telemetry:
         for signal in policy.signals:
             for source in signal.sources:
                 self._by_message.setdefault(source.message, []).append((signal, source))
+
+    @property
+    def carriers(self) -> Collection[str]:
+        """The messages that carry some signal."""
+        return self._by_message.keys()
 
     @property
     def intervals(self) -> Mapping[str, int]:

@@ -21,8 +21,8 @@ _SLICE_US, _SLICE_S = 50_000, 0.002
 class UdpVehicle:
     """Listens where the vehicle sends to (`udpin`), and answers the first sender that proves to be a vehicle.
 
-    Datagrams of other senders are read and dropped from then on. `keep` gets every good frame that came, and every one
-    that was sent, with its UTC time in us.
+    Datagrams of other senders are read from then on only to learn whether there is a second vehicle. `keep` gets every
+    good frame that came from the vehicle, and every one that was sent, with its UTC time in us.
     Raises OSError where the address cannot be bound.
     """
 
@@ -90,9 +90,12 @@ class UdpVehicle:
                 return
             except ConnectionError:  # an ICMP answer to something we sent: the peer is not there (yet)
                 continue
-            if self._peer is not None and sender != self._peer:
-                continue
             now = self._clock.now()
+            if self._peer is not None and sender != self._peer:
+                self._driver.overhear(datagram, now.monotonic_us)
+                if now.monotonic_us > until_us:
+                    return
+                continue
             heard = self._driver.receive(datagram, now.monotonic_us)
             if self._peer is None:
                 if self._driver.flavour is None:

@@ -147,7 +147,7 @@ class Conduct:
     def stand_down(self, now: Now, ending: Ending) -> None:
         """Send nothing more, whatever flies, and end."""
         self.dispatcher.release(now)
-        self._journal.effect(now, "stood-down")
+        self._journal.effect(now, "stood-down", detail=self.craft.last_seen)
         self.end(now, ending)
 
     def end(self, now: Now, ending: Ending) -> None:

@@ -14,6 +14,13 @@ class Craft:
     lost_since_us: int | None = None
 
     @property
+    def last_seen(self) -> str:
+        """Where the vehicle was when it last said so, for whoever has to look for it."""
+        if self.airborne is None:
+            return "it never said whether it was in the air"
+        return "last seen in the air" if self.airborne else "last seen on the ground"
+
+    @property
     def at_rest(self) -> bool:
         """On the ground and disarmed, as it said itself."""
         return self.armed is False and self.airborne is False

@@ -121,7 +121,10 @@ class Happenings:
         conduct = self._conduct
         if not conduct.dispatcher.flies(event.token):
             return
-        conduct.dispatcher.end(now, "failed", f"{event.reason}: {event.text}" if event.text else event.reason)
+        detail = f"{event.reason}: {event.text}" if event.text else event.reason
+        if conduct.craft.lost_since_us is not None:
+            detail += "; the link is silent: what the vehicle does is not known"
+        conduct.dispatcher.end(now, "failed", detail)
         if conduct.stage is not Stage.RUNNING:
             return
         if conduct.aloft:

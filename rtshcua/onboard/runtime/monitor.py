@@ -22,6 +22,7 @@ class StateMonitor:
         self._policy = policy
         self._values: list[int | None] = [None] * policy.policy.slots
         self._stamps: list[int | None] = [None] * policy.policy.slots
+        self._held: tuple[int | None, ...] | None = None  # the values, while none of them changes
         self._state: tuple[int, State] | None = None  # the last that was asked for, and when
         self._unseen: set[int] = set()  # slots with a value that came after the last observation
         self._memory = initial(policy)
@@ -29,7 +30,7 @@ class StateMonitor:
 
     def update(self, readings: Readings) -> None:
         """Take over what one frame reported at `readings.at_us`."""
-        self._state = None
+        self._state = self._held = None
         for slot, value in readings.values:
             if not 0 <= slot < len(self._values):
                 continue
@@ -69,6 +70,8 @@ class StateMonitor:
                 for stamp in self._stamps
             ]
         )
-        state = State(tuple(self._values), ages, self._truths)
+        if self._held is None:
+            self._held = tuple(self._values)
+        state = State(self._held, ages, self._truths)
         self._state = (now_us, state)
         return state

@@ -13,6 +13,8 @@ from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.snapshot import view_of
 from rtshcua.onboard.runtime.view import View
 
+_RUNNING, _ENDED = Stage.RUNNING, Stage.ENDED  # an enumeration's attributes are slow to find
+
 
 class Runtime:
     """Flies one loaded bundle once.
@@ -41,14 +43,14 @@ class Runtime:
         one observation of the policy's temporal monitors, after what was received and before what is decided. Once the
         run ended, nothing is done any more.
         """
-        conduct = self._conduct
+        conduct, monitor = self._conduct, self._conduct.monitor
         for event in events:
-            if isinstance(event, Readings) and conduct.stage is Stage.RUNNING and conduct.monitor.hides(event):
+            if isinstance(event, Readings) and conduct.stage is _RUNNING and monitor.hides(event):
                 conduct.turn(now)  # no state goes by unwatched, however many came at once
-                conduct.monitor.seen()
-            if conduct.stage is not Stage.ENDED:
+                monitor.seen()
+            if conduct.stage is not _ENDED:
                 self._happenings.take(now, event)
-        conduct.monitor.observe(now)
+        monitor.observe(now)
         while conduct.turn(now):
             pass
         return self._journal.take()
@@ -56,6 +58,11 @@ class Runtime:
     def leave(self) -> None:
         """Nobody will watch any more: the next step sends the last link, unless a return or a landing flies."""
         self._conduct.leave()
+
+    @property
+    def aloft(self) -> bool:
+        """Whether a motion command may be needed to bring the vehicle down."""
+        return self._conduct.aloft
 
     @property
     def homeward(self) -> bool:

@@ -17,12 +17,17 @@ class Grace:
         self._since: dict[str, int] = {}
 
     def over(self, broken: Iterable[tuple[str, Truth]], at_us: int, grace_us: int) -> str | None:
-        """The first text that is FALSE, or was UNKNOWN at each call for longer than `grace_us`; else None."""
+        """The first text that is FALSE, or was UNKNOWN at each call for longer than `grace_us`; else None.
+
+        Which of the two it was is said, for they ask for different things of whoever reads the log.
+        """
         since: dict[str, int] = {}
         for text, truth in broken:
             since[text] = self._since.get(text, at_us)
-            if truth & FALSE or at_us - since[text] > grace_us:
+            if truth & FALSE:
                 return text
+            if at_us - since[text] > grace_us:
+                return f"{text}: unknown for longer than its grace of {grace_us // 1_000} ms"
         self._since = since
         return None
 

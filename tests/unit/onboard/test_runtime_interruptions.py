@@ -145,6 +145,10 @@ def test_a_link_that_stays_away_ends_the_run(situation: Situation) -> None:
     assert run.ending is Ending.LINK_LOST
     assert run.flown == flown, "nothing is sent that would not arrive"
     assert run.clock.now().monotonic_us - began >= 30 * S
+    (detail,) = [record["detail"] for record in run.records if record.get("event") == "stood-down"]
+    seen = {waiting: "it never said whether it was in the air"}
+    seen |= dict.fromkeys((deferred_on_the_ground, taking_off), "last seen on the ground")
+    assert detail == seen.get(situation, "last seen in the air")
 
 
 def test_a_failsafe_while_the_link_was_lost_is_the_autopilots() -> None:
@@ -159,6 +163,8 @@ def test_what_failed_meanwhile_falls_back_once_the_link_is_back() -> None:
     token = run.vehicle.commands[-1].token
     run.tick(LinkLost(0), Failed(0, token, "no-effect"))
     assert run.flown[-1] == "inspect_area"
+    (detail,) = [record["detail"] for record in run.records if record.get("event") == "failed"]
+    assert detail == "no-effect; the link is silent: what the vehicle does is not known"
     run.tick(LinkBack(0))
     assert run.flown[-1] == "hover"
     assert run.until_over().ending is Ending.ABORTED
@@ -312,3 +318,8 @@ def test_the_boundary_fails_while_a_chain_is_flown() -> None:
     assert run.vehicle.released
     assert run.events[-2:] == ["stranded", "stood-down"]
     assert_audited(run)
+
+
+@pytest.mark.parametrize("situation", GROUND + AIR)
+def test_whether_it_has_to_be_brought_down_can_be_told(situation: Situation) -> None:
+    assert situation().runtime.aloft is (situation in AIR)

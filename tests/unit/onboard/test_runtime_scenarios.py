@@ -159,6 +159,8 @@ def test_a_signal_that_stays_away_longer_counts_as_false() -> None:
     run.until_over()
     assert run.ending is Ending.ABORTED
     assert run.flown[-2:] == ["hover", "return_home"]
+    (detail,) = [str(record["detail"]) for record in run.records if record.get("event") == "violated"]
+    assert detail.endswith(": unknown for longer than its grace of 500 ms"), "it is told from what was false"
 
 
 def test_a_signal_that_falls_silent_grows_stale_without_an_event() -> None:

@@ -145,7 +145,7 @@ def waiting_aloft() -> Run:
     ("slot", "value", "text"),
     [
         (BATTERY, 2_400, POLICY.rules[-1].text),
-        (BATTERY, None, POLICY.rules[-1].text),
+        (BATTERY, None, f"{POLICY.rules[-1].text}: unknown for longer than its grace of 500 ms"),
         (POSITION_X, 900 * M, "airspace inside city outside school"),
     ],
 )

@@ -99,7 +99,7 @@ def preflight(flavour: Flavour, *, fence: bool = True) -> Preflight:
 
 
 def at_home() -> Observed:
-    return Observed(latitude=PROJECTION.latitude, longitude=PROJECTION.longitude)
+    return Observed(latitude=PROJECTION.latitude, longitude=PROJECTION.longitude, located=True)
 
 
 @FLAVOURS
@@ -289,3 +289,26 @@ def test_a_parameter_is_set_when_its_echo_says_so() -> None:
         assert parameters.is_settled("FENCE_ENABLE") == settled
     parameters.take(mavlink.MAVLink_param_value_message(b"OTHER", 1.0, 2, 1, 0))
     assert "OTHER" not in parameters.values
+
+
+@FLAVOURS
+@pytest.mark.parametrize("what", ["far away", "nowhere", "another return altitude"])
+def test_a_fence_is_written_only_where_place_and_return_altitude_are_right(flavour: Flavour, what: str) -> None:
+    port, seen = Port(flavour), at_home()
+    if what == "far away":
+        seen.latitude += 400_000
+    elif what == "nowhere":
+        seen.located = False
+    else:
+        port.parameters |= {"RTL_RETURN_ALT": 60.0, "RTL_ALT": 6_000.0}
+    one = Preflight(CITY, flavour, seen, fence=True)
+    port.settle(one)
+    assert not port.items
+    says = {"far away": "m from the policy's home", "nowhere": "where it stands"}.get(what, "it returns at 60 m")
+    assert says in (one.unready or "")
+    assert (one.astray is None) == (what == "nowhere")
+    seen.latitude, seen.located = PROJECTION.latitude, True
+    if what != "another return altitude":
+        port.settle(one)
+        assert len(port.items) == 4
+        assert one.unready is None

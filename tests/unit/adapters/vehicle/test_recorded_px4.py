@@ -89,5 +89,5 @@ def test_a_command_that_is_never_answered_has_an_unknown_outcome(flown: Recorded
 
 
 def test_frames_that_the_dialect_does_not_have_are_passed_over(watched: Recorded) -> None:
-    assert watched.driver._link._codec.unknown > 340
-    assert watched.driver._link._codec.damaged == 0
+    assert watched.driver.link._codec.unknown > 340
+    assert watched.driver.link._codec.damaged == 0

@@ -114,3 +114,54 @@ def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
 def test_a_busy_port_is_an_os_error(link: UdpVehicle) -> None:
     with pytest.raises(OSError, match="in use"):
         UdpVehicle((HERE, link.port), Driver(POLICY, FrameSession()), SystemClock(), lambda *_: None)
+
+
+def crowd(link: UdpVehicle) -> str | None:
+    """Another vehicle, after what was sent could come."""
+    for _ in range(3):
+        link.poll(SystemClock().now().monotonic_us, 20_000)
+    return link.driver.link.crowd
+
+
+@pytest.mark.parametrize(("system", "autopilot", "says"), [(2, 3, "systems 1 and 2"), (1, 12, "two vehicles speak")])
+def test_a_second_vehicle_keeps_the_first_from_being_ready(
+    link: UdpVehicle, vehicle: Peer, system: int, autopilot: int, says: str
+) -> None:
+    vehicle.beat()
+    assert crowd(link) is None
+    other = Peer(link.port)
+    other.codec = Codec(system, 1)
+    other.send(mavlink.MAVLink_heartbeat_message(2, autopilot, 0, 0, 4, 3))
+    assert says in (crowd(link) or "")
+    assert link.driver.unready == link.driver.link.crowd
+    other.socket.close()
+
+
+def test_a_ground_station_is_no_vehicle(link: UdpVehicle, vehicle: Peer) -> None:
+    vehicle.beat()
+    crowd(link)
+    other = Peer(link.port)
+    for codec, kind, autopilot in ((Codec(255, 190), 6, 8), (Codec(2, 1), 26, 8), (Codec(2, 51), 2, 3)):
+        other.codec = codec
+        other.send(mavlink.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 4, 3))
+    assert crowd(link) is None
+    other.socket.close()
+
+
+def test_the_system_that_was_named_is_flown_and_others_may_speak() -> None:
+    frames = FrameSession()
+    link = UdpVehicle((HERE, 0), Driver(POLICY, frames, system=2), SystemClock(), lambda *_: None)
+    peers = [Peer(link.port), Peer(link.port)]
+    peers[1].codec = Codec(2, 1)
+    for peer in (peers[0], peers[1], peers[0]):
+        peer.beat()
+        assert crowd(link) is None
+    assert link.driver.flavour is not None
+    assert link.driver.seen.heartbeat_us is not None
+    assert peers[1].hears() == "HEARTBEAT"
+    peers[0].socket.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        peers[0].socket.recv(100)
+    for peer in peers:
+        peer.socket.close()
+    link.close()

@@ -1,0 +1,29 @@
+"""Frames in which a manoeuvre sees nothing new are not shown to it: nothing comes of it, whatever goes wrong."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
+from rtshcua.onboard.ports import Event
+from rtshcua.simulation.fault_text import parse_fault
+from virtual import case
+from virtual.flight import Flight
+from virtual.shipped import shipped
+
+FAULTS = ("link-loss,at=5s,loss=40%", "link-delay,at=0s,delay=400ms")
+
+
+def flown(flavour: str, fault: str) -> tuple[list[bytes], Sequence[Event]]:
+    flight = Flight(shipped("short"), case.simulated(flavour, faults=(parse_fault(fault),)))
+    return flight.fly().lines, flight.events
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_flight_is_the_same_when_every_frame_is_shown(
+    flavour: str, fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spared = flown(flavour, fault)
+    monkeypatch.setattr(Manoeuvre, "due_us", property(lambda _: 0, lambda _, value: None), raising=False)
+    assert flown(flavour, fault) == spared

@@ -45,7 +45,14 @@ class _Handed(msgspec.Struct, forbid_unknown_fields=True):
     id: int = 0
 
 
+class _Numbered(msgspec.Struct):
+    """What is read of a line that is wrong otherwise: the number to answer to."""
+
+    id: int = 0
+
+
 _read = msgspec.json.Decoder(_Handed).decode
+_read_number = msgspec.json.Decoder(_Numbered).decode
 _encode = msgspec.json.Encoder().encode
 
 
@@ -173,7 +180,9 @@ class AgentSocket:
             handed = _read(line)
             document = b64decode(handed.document, validate=True)
         except (ValueError, msgspec.DecodeError):
-            if not reader.tell(_answer(0, "malformed", "not a line of the kind {id, document}, document in base64")):
+            if not reader.tell(
+                _answer(_number(line), "malformed", "not a line of the kind {id, document}, document in base64")
+            ):
                 self._drop(reader)
             return None
         self._count += 1
@@ -185,6 +194,14 @@ class AgentSocket:
             self._readers.remove(reader)
             self._senders = {key: value for key, value in self._senders.items() if value[0] is not reader}
             reader.link.close()
+
+
+def _number(line: bytes) -> int:
+    """The sender's own number for a line that is none of ours, as far as it can be read; else 0."""
+    try:
+        return _read_number(line).id
+    except (ValueError, msgspec.DecodeError, RecursionError):
+        return 0
 
 
 def _answer(number: int, slug: str, text: str) -> bytes:
@@ -208,7 +225,7 @@ def _listen(path: Path) -> socket.socket:
         if error.errno == errno.EADDRINUSE:
             text = "another program listens there, or it is no socket"
             raise SocketTaken(errno.EADDRINUSE, text, str(path)) from None
-        raise
+        raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         os.umask(before)
     listener.setblocking(False)

@@ -11,7 +11,8 @@ from importlib import import_module
 from typing import cast
 
 from rtshcua import __version__
-from rtshcua.cli.faults import barrier, fail, say
+from rtshcua.cli.faults import as_json, barrier, fail, say
+from rtshcua.cli.streams import mend_streams
 from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -22,9 +23,12 @@ _REPORTING = ("check", "compile")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and gives its exit code back, for `sys.exit`; nothing but SystemExit rises from it."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    mend_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a poor terminal must not turn a degree sign into a fault
-    return int(barrier(lambda: _dispatch(words)))
+    options = words[: words.index("--")] if "--" in words else words
+    with as_json(wanted="--json" in options):
+        return int(barrier(lambda: _dispatch(words)))
 
 
 def _dispatch(words: list[str]) -> int:

@@ -21,7 +21,8 @@ from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import code_of, distrust, fail
+from rtshcua.cli.meeting import PORT_HELP, unmet
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.diagnostics.exits import ExitCode
@@ -47,6 +48,12 @@ def doctor(
     = None,
     seconds: Annotated[float, typer.Option(min=3, max=600, help="how long to listen")] = 10.0,
     signing_key: Annotated[Path | None, typer.Option(metavar="FILE", help="the link's key, if it is signed")] = None,
+    unsigned_radio: Annotated[
+        bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, as for `run`")
+    ] = False,
+    system: Annotated[
+        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
 ) -> ExitCode:  # fmt: skip
     """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
@@ -59,31 +66,41 @@ def doctor(
         return fail(ExitCode.USAGE, str(error))
     if link.way != "udpin":
         return fail(ExitCode.USAGE, f"`{link}`: the doctor listens to the vehicle", "`udpin:HOST:PORT`")
+    if unsigned_radio and signing_key is None:
+        return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
     clock = SystemClock()
     try:
         policy, mission = _wanted(bundle, clock.now().utc_us)
     except Untrusted as error:
-        return fail(ExitCode.UNTRUSTED, str(error))
+        return distrust(error)
     frames = FrameSession()
     with ExitStack() as stack:
         try:
-            signing = Signing(signing_key, policy, frames, state_folder(), clock, unsigned_radio=True)
+            signing = Signing(signing_key, policy, frames, state_folder(), clock, unsigned_radio=unsigned_radio)
         except LinkKeyError as error:
-            return fail(ExitCode.UNTRUSTED, str(error))
+            return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
         stack.callback(signing.close)
         try:
-            vehicle = Examination(policy, clock, frames, signing.verifier)
+            vehicle = Examination(policy, clock, frames, signing.verifier, system)
         except UnknownSource as error:
             return fail(ExitCode.REFUSED, str(error))
-        socket = UdpVehicle((link.host, link.port), vehicle, clock, lambda _utc_us, _frame: None)
+        try:
+            socket = UdpVehicle((link.host, link.port), vehicle, clock, lambda _utc_us, _frame: None)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            return fail(
+                ExitCode.LINK, f"cannot listen at udp {link.host}:{link.port}: {reason}", PORT_HELP, slug="port"
+            )
         stack.callback(socket.close)
         if not _listen(socket, vehicle, clock, seconds):
-            return fail(
-                ExitCode.LINK, f"no heartbeat of a vehicle at `{link}` within {_HEARTBEAT_S:.0f} s",
-                "is it on, and does it send there? PX4 and ArduPilot are known; with signing, give the right key",
-            )  # fmt: skip
-        error_us = clock.now().utc_error_us
-        findings = list(diagnose(vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=error_us))
+            text, help = unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected)
+            return fail(ExitCode.LINK, text, help, slug="no-vehicle")
+        findings = list(
+            diagnose(
+                vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=clock.now().utc_error_us,
+                unheard=signing.unheard, named=system is not None,
+            )
+        )  # fmt: skip
     code = ExitCode.REFUSED if any(each.verdict is Verdict.STOP for each in findings) else ExitCode.OK
     if as_json:
         print(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
@@ -143,4 +160,7 @@ def _print(findings: Sequence[Finding]) -> None:
     stops = sum(each.verdict is Verdict.STOP for each in findings)
     warns = sum(each.verdict is Verdict.WARN for each in findings)
     end = f"{stops} would stop a mission" if stops else "nothing would stop a mission"
-    print(f"{end}; {warns} to know of")
+    unknown = sum(each.verdict is Verdict.UNKNOWN for each in findings)
+    if unknown and not stops:
+        end = "nothing that was learned would stop a mission"
+    print(f"{end}; {warns} to know of" + (f"; {unknown} that it did not say" if unknown else ""))

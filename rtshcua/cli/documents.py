@@ -8,7 +8,7 @@ from rtshcua.adapters.agent_client import hand_in
 from rtshcua.adapters.files.durable import PRIVATE_FILE
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import distrust, fail
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import cose
@@ -40,7 +40,7 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
 def refuse(error: Untrusted) -> ExitCode:
     """How a command ends that was given what is not to be trusted."""
     help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-    return fail(ExitCode.UNTRUSTED, str(error), help)
+    return distrust(error, help)
 
 
 def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:

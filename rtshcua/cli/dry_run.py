@@ -1,12 +1,14 @@
 """`rtshcua run --dry-run`: listen to the vehicle, decide the whole mission against the present, and send no motion."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
+from msgspec import structs
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.faults import say
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.showing.page import Page, for_terminal
 from rtshcua.cli.showing.why import would_pass
@@ -21,21 +23,35 @@ from rtshcua.onboard.runtime.monitor import StateMonitor
 READY_S = 60.0
 #: and then for a signal that it has not told yet
 TOLD_S = 3.0
+#: how often it is said what is waited for
+SAID_S = 5.0
 
 _POLL_S = 0.05
 
 
 def dry_run(
     loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts, events: Sequence[Event],
-    *, as_json: bool,
+    *, as_json: bool, notes: Sequence[str] = (), refusal: str | None = None, unheard: frozenset[int] = frozenset(),
+    say: Callable[[str], None] = say,
 ) -> ExitCode:  # fmt: skip
-    """Rehearse the mission on the vehicle as it stands. `events` came while it was met."""
+    """Rehearse the mission on the vehicle as it stands. `events` came while it was met.
+
+    `notes` are what a run would tell first, `refusal` why it would not begin at all. `unheard` are the slots that
+    nothing can fill on this link. It is judged by the UTC time at which it was asked for: the wait is not the flight's.
+    """
     monitor = StateMonitor(loaded.policy)
+    asked_us, interrupted = clock.now().utc_us, False
+    for note in notes:
+        say(f"note: {note}")
     ready, begun_s = False, time.monotonic()
-    until_s = begun_s + READY_S
+    until_s, said_s = begun_s + READY_S, begun_s
     while time.monotonic() < until_s:
         if interrupts.wish() is not None:
-            return ExitCode.INTERRUPTED
+            interrupted = True
+            break
+        if not ready and time.monotonic() - said_s >= SAID_S:
+            said_s = time.monotonic()
+            say(f"waiting for the vehicle: {vehicle.driver.unready or 'its telemetry'}; until {READY_S:.0f} s")
         for event in events:
             if isinstance(event, Readings):
                 monitor.update(event)
@@ -46,20 +62,27 @@ def dry_run(
         if ready and None not in monitor.state(now.monotonic_us).values:
             break
         events = vehicle.poll(now.monotonic_us, clock.us_in(_POLL_S))
-    now = clock.now()
-    found = rehearse(loaded, monitor.state(now.monotonic_us), now)
+    now = structs.replace(clock.now(), utc_us=asked_us)
+    found = rehearse(loaded, monitor.state(now.monotonic_us), now, unheard)
     unready = None if ready else (vehicle.driver.unready or "it did not say that it is")
-    code = ExitCode.OK if ready and all(each.hopeful for each in found) else ExitCode.REFUSED
+    would = ready and refusal is None and all(each.hopeful for each in found)
+    code = ExitCode.INTERRUPTED if interrupted else ExitCode.OK if would else ExitCode.REFUSED
     if as_json:
-        print(msgspec.json.encode(_object(loaded, found, unready, code)).decode())
+        told = {"refusal": refusal, "notes": list(notes), "interrupted": interrupted}
+        print(msgspec.json.encode(_object(loaded, found, unready, code) | told).decode())
     else:
-        print(_page(loaded, found, unready))
+        page = _page(loaded, found, unready, refusal)
+        if interrupted:
+            page.text("(interrupted: this is as it stood then)")
+        print(page)
     return code
 
 
-def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None) -> Page:
+def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, refusal: str | None) -> Page:
     mission, page = loaded.bundle.mission, for_terminal()
     page.head(f"Rehearsal of {mission.name} on {loaded.vehicle}: nothing is sent, nothing is used up")
+    if refusal is not None:
+        page.row("would not begin", refusal)
     if unready is not None:
         page.row("not ready", unready)
     for each in found:

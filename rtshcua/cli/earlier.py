@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from rtshcua.cli.faults import code_of
 from rtshcua.cli.programs import SOURCE, SPECIFICATION, Unusable, programs, unfolded
 from rtshcua.cli.showing.bundle import claimed
 from rtshcua.cli.sources import examine
@@ -47,5 +48,5 @@ def _bundled(path: Path) -> Earlier | Unusable:
     try:
         return Earlier(str(path), (claimed(data).policy,))
     except Untrusted as error:
-        code = ExitCode.INPUT if error.slug == "malformed" else ExitCode.UNTRUSTED
+        code = code_of(error.slug)
         return Unusable(code, error.slug, f"`{path}`: {error}", "accepted: a bundle, a source or a folder of sources")

@@ -1,14 +1,21 @@
 """How commands fail: one line on the standard error, a documented exit code, and never a traceback.
 
+A command that was given `--json` also says it in one JSON object on the standard output.
+
 RTSHCUA_DEBUG=1 shows the traceback of an internal fault.
 """
 
 import errno
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.untrusted import Untrusted
+
+_json = ContextVar("json", default=False)  # whether this command was asked for JSON
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EPIPE}
 _LINK = {
@@ -21,16 +28,57 @@ _INPUT = {
 }  # fmt: skip
 
 
-def fail(code: ExitCode, message: str, help: str | None = None) -> ExitCode:
-    """Says `message` (and `help`) on the standard error, and gives `code` back: `return fail(ExitCode.INPUT, ...)`."""
+@contextmanager
+def as_json(*, wanted: bool) -> Iterator[None]:
+    """Within this, `fail` also prints {"error": {"slug", "text", "help"}, "exit_code"}, if that is wanted."""
+    before = _json.set(wanted)
+    try:
+        yield
+    finally:
+        _json.reset(before)
+
+
+def fail(code: ExitCode, message: str, help: str | None = None, *, slug: str | None = None) -> ExitCode:
+    """Says `message` (and `help`) on the standard error, and gives `code` back: `return fail(ExitCode.INPUT, ...)`.
+
+    `slug` is for programs, where there is a more exact one than the exit code's own.
+    """
+    if _json.get():
+        _print_object(code, slug or code.slug, message, help)
+    return tell(code, message, help)
+
+
+def distrust(error: Untrusted, help: str | None = None, *, where: str = "") -> ExitCode:
+    """Fails for something that is not to be trusted; `where` says what it was, before the text."""
+    return fail(code_of(error.slug), f"{where}{error}", help, slug=error.slug)
+
+
+def code_of(slug: str) -> ExitCode:
+    """The exit code for an `Untrusted`: what cannot be read at all is bad input, whoever signed it."""
+    return ExitCode.INPUT if slug == "malformed" else ExitCode.UNTRUSTED
+
+
+def tell(code: ExitCode, message: str, help: str | None = None) -> ExitCode:
+    """`fail` for a person alone: of a command that has told the program in its own way."""
     say(f"error: {message}")
     if help is not None:
         say(f" help: {help}")
     return code
 
 
+def _print_object(code: ExitCode, slug: str, text: str, help: str | None) -> None:
+    import json
+
+    try:
+        print(json.dumps({"error": {"slug": slug, "text": text, "help": help}, "exit_code": int(code)}), flush=True)
+    except OSError:
+        _discard("stdout")
+
+
 def say(line: str) -> None:
     """Prints one line on the standard error; when even that is gone there is nobody left to tell."""
+    if sys.stderr is None:
+        return  # `print` would take the standard output for it
     try:
         print(line, file=sys.stderr, flush=True)
     except OSError:
@@ -38,17 +86,23 @@ def say(line: str) -> None:
 
 
 def barrier(command: Callable[[], int]) -> int:
-    """Runs `command` and gives its exit code back, whatever rises out of it; SystemExit alone passes."""
+    """Runs `command` and gives its exit code back, whatever rises out of it; SystemExit alone passes, if meant."""
     try:
         code = command()
         _flush()  # a full disk or a closed pipe shows here, not after the exit code is out
         return code
     except KeyboardInterrupt:
         return fail(ExitCode.INTERRUPTED, "interrupted")
+    except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # rich's own way of leaving when the reader has left
+            return ExitCode.FULL
+        raise
     except BrokenPipeError:
         return ExitCode.FULL  # quiet, for the reader left on purpose; not 0, for it may have missed the verdict
     except OSError as error:
         return fail(exit_code_of(error), _words_of(error))
+    except Untrusted as error:
+        return distrust(error)
     except Exception as error:  # noqa: BLE001  the barrier is the one place that may catch everything
         return _fault(error)
     finally:

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-import msgspec
-
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, Loop
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.closing import close_log, keep_summary
 from rtshcua.cli.interrupts import Interrupts, Wish
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
@@ -46,6 +45,7 @@ _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
 
 _LANDING = "interrupted: it falls back and lands first, and the log is closed then"
+_ON_GROUND = "interrupted on the ground: nothing is sent, and the log is closed"
 _KNOWING = (
     "it is brought down; Ctrl-C once more within 3 s tells it to land where it is, stops watching, and closes the log"
 )
@@ -102,14 +102,12 @@ class Flight:
         self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
         if ending is Ending.REFUSED and self._vehicle.driver.unready is not None:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
-        whole = self._close(ending)
+        missing = self._close(ending)
         code = EXIT_CODES[ending]
-        if code is ExitCode.OK and not whole:
+        if missing and code is ExitCode.OK:
             code = ExitCode.FULL
-        summary = self._summary(ending, code, whole)
-        with suppress(OSError):
-            self._run.write_summary(msgspec.structs.asdict(summary))
-        return code, summary
+        summary = keep_summary(self._run, self._summary(ending, code, missing))
+        return (code if summary.whole or code is not ExitCode.OK else ExitCode.FULL), summary
 
     def _plan(self) -> Plan:
         bundle = self._loaded.bundle
@@ -128,7 +126,7 @@ class Flight:
         while True:
             match self._interrupts.wish():
                 case Wish.LAND:
-                    self._feed.post(Note(_LANDING))
+                    self._feed.post(Note(_LANDING if self._runtime.aloft else _ON_GROUND))
                     also.append(Interrupted(self._clock.now().monotonic_us))
                 case Wish.KNOW:
                     self._feed.post(Note(_KNOWING))
@@ -163,29 +161,15 @@ class Flight:
         self._feed.post(Note(f"left: {told}; nothing more is sent"))
         return Ending.INTERRUPTED
 
-    def _close(self, ending: Ending | None) -> bool:
-        """Sign and close the log; whether all of it is on the disk. Without an ending (a fault) it stays unsigned."""
-        digest: bytes | None = None
-        with suppress(OSError):
-            digest = self._frames.finish()
-        if self._frames.lost:
-            self._feed.post(Note(f"the disk did not keep up: {self._frames.lost} frames are not in the telemetry log"))
-        whole = ending is not None
-        try:
-            if ending is not None:
-                line = self._recorder.close(self._clock.now(), ending=ending, tlog=digest)
-                self._sink.append(line, True)
-                if self._agents is not None:
-                    self._agents.tell(line)
-        except OSError:
-            whole = False
-        try:
-            self._sink.close()
-        except OSError:
-            whole = False
-        return whole and not self._sink.waiting
+    def _close(self, ending: Ending | None) -> tuple[str, ...]:
+        """Sign and close the log; what of the evidence is missing. Without an ending (a fault) it stays unsigned."""
+        return close_log(
+            self._recorder, self._sink, self._frames, self._clock.now, ending,
+            lambda text: self._feed.post(Note(text)),
+            self._agents.tell if self._agents is not None else lambda line: None,
+        )  # fmt: skip
 
-    def _summary(self, ending: Ending, code: ExitCode, whole: bool) -> Summary:
+    def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...]) -> Summary:
         loaded, policy, mission = self._loaded, self._loaded.bundle.policy, self._loaded.bundle.mission
         flavour = self._vehicle.driver.flavour
         log = _short(self._run.path / LOG)
@@ -202,7 +186,8 @@ class Flight:
             outcomes=self._teller.outcomes,
             flight_us=self._clock.now().monotonic_us - self._start_us,
             records=self._recorder.count,
-            whole=whole,
+            whole=not missing,
+            missing=missing,
             folder=str(self._run.path),
             log=log,
             next=f"rtshcua verify-log {shlex.quote(log)}",

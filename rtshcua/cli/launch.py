@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore, read_root
-from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.files.replay import FileReplayStore, looked_up
 from rtshcua.adapters.files.runs import RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
@@ -21,24 +21,28 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.faults import code_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
+from rtshcua.cli.meeting import PORT_HELP, meet
+from rtshcua.cli.refused import Refused as Refused
+from rtshcua.cli.showing.document import HANDED_IN, kind_of_document
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.tape import Tape
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
 from rtshcua.onboard.ports import Event, Opening
+from rtshcua.onboard.unheard import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-#: How long a heartbeat is waited for, and then word of whether the vehicle is in the air, in seconds.
-HEARTBEAT_S = 10.0
+#: How long word of whether the vehicle is in the air is waited for, in seconds.
 AIR_S = 5.0
 
 #: up to this many times as fast as life, a real vehicle's time limits leave the machine enough
@@ -53,7 +57,7 @@ _NOT_HERE = ("mode-refused", "wrong-vehicle")
 class Launch:
     """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`.
 
-    `fence` False: the vehicle's own fence is left as it is.
+    `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
     """
 
     bundle: Path
@@ -74,16 +78,7 @@ class Launch:
     unsigned_radio: bool = False
     agent_socket: Path | None = None
     dry_run: bool = False
-
-
-class Refused(Exception):
-    """The flight does not begin: exit code, a stable slug, a text for a person, and perhaps help."""
-
-    def __init__(self, code: ExitCode, slug: str, text: str, help: str | None = None) -> None:
-        super().__init__(text)
-        self.code = code
-        self.slug = slug
-        self.help = help
+    system: int | None = None
 
 
 def launch(order: Launch) -> ExitCode:
@@ -95,23 +90,27 @@ def launch(order: Launch) -> ExitCode:
         loaded = _load(order, bundle, root, clock)
     except Untrusted as error:
         help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-        raise Refused(ExitCode.UNTRUSTED, error.slug, str(error), help) from None
+        raise Refused(code_of(error.slug), error.slug, str(error), help) from None
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
             slack = max(1, round(order.speed / _UNHURRIED))
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
+            _hear(order, loaded, signing)
             vehicle = _listen(order, _driver(order, loaded, slack, signing), clock, tape)
             stack.callback(vehicle.close)
             if order.link is None:
                 stack.enter_context(_simulate(order, loaded, vehicle.port))
             agents = None if order.agent_socket is None else stack.enter_context(Agents(order.agent_socket, loaded))
-            events = _meet(order, vehicle, clock, interrupts)
+            events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             if order.dry_run:
                 from rtshcua.cli.dry_run import dry_run  # shows what would pass as `why` does, which is of the ground
 
-                return dry_run(loaded, vehicle, clock, interrupts, events, as_json=order.style == "json")
+                return dry_run(
+                    loaded, vehicle, clock, interrupts, events, as_json=order.style == "json", notes=signing.notes,
+                    refusal=_flown_before(order, loaded), unheard=signing.unheard,
+                )  # fmt: skip
             resumed = _opened_before(order, loaded, vehicle, clock, events)
             run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
             feed = view.enter_context(Feed(order.style))
@@ -136,6 +135,9 @@ def _read(path: Path) -> bytes:
         data = file.read(MAX_BUNDLE + 1)
     if len(data) > MAX_BUNDLE:
         raise Refused(ExitCode.INPUT, "too-large", f"`{path}` is larger than a bundle may be")
+    kind = kind_of_document(data)
+    if kind is not None:
+        raise Refused(ExitCode.INPUT, "wrong-kind", f"`{path}` is no bundle, but `{kind.name}`", HANDED_IN[kind])
     return data
 
 
@@ -164,7 +166,8 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), peer_is_own_simulator=order.link is None,
     )  # fmt: skip
     if isinstance(loaded, LoadRefusal):
-        raise Refused(ExitCode.REFUSED if loaded.slug in _NOT_HERE else ExitCode.UNTRUSTED, loaded.slug, loaded.text)
+        code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)
+        raise Refused(code, loaded.slug, loaded.text)
     return loaded
 
 
@@ -175,12 +178,23 @@ def _sign(order: Launch, loaded: Loaded, clock: LinkClock) -> Signing:
             unsigned_radio=order.unsigned_radio,
         )  # fmt: skip
     except LinkKeyError as error:
-        raise Refused(ExitCode.UNTRUSTED, f"link-key-{error.slug}", str(error), error.help) from None
+        raise Refused(code_of(error.slug), f"link-key-{error.slug}", str(error), error.help) from None
     if order.signing_key is None and order.link is not None and not order.link.is_loopback:
         signing.notes.append(
             f"`{order.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"
         )
     return signing
+
+
+def _hear(order: Launch, loaded: Loaded, signing: Signing) -> None:
+    """A mission that would break off in the air for a signal that cannot come does not begin; a rehearsal tells."""
+    steps = stranded(loaded.bundle.policy, loaded.bundle.mission, signing.unheard)
+    if steps and not order.dry_run:
+        raise Refused(
+            ExitCode.REFUSED, "signal-unsigned",
+            f"`{steps[0].text}` needs a signal of RADIO_STATUS, which radios do not sign: it would wait for it in vain",
+            "`--unsigned-radio` takes it unsigned, and the worst of the last seconds counts",
+        )  # fmt: skip
 
 
 def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driver:
@@ -197,6 +211,7 @@ def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driv
             fence=order.fence and not order.dry_run,
             manoeuvres=own,
             verifier=signing.verifier,
+            system=order.system,
         )
     except UnknownSource as error:
         raise Refused(ExitCode.REFUSED, "unknown-source", str(error)) from None
@@ -209,8 +224,7 @@ def _listen(order: Launch, driver: Driver, clock: LinkClock, tape: Tape) -> UdpV
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise Refused(
-            ExitCode.LINK, "port", f"cannot listen at udp {host}:{port}: {reason}",
-            "another program may listen there; a vehicle can be told to send to another port",
+            ExitCode.LINK, "port", f"cannot listen at udp {host}:{port}: {reason}", PORT_HELP
         ) from None  # fmt: skip
 
 
@@ -224,21 +238,19 @@ def _simulate(order: Launch, loaded: Loaded, port: int) -> Simulator:
         raise Refused(ExitCode.LINK, "simulator", str(error)) from None
 
 
-def _meet(order: Launch, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts) -> list[Event]:
-    """Wait for the first heartbeat of an autopilot; what happened meanwhile."""
-    events: list[Event] = []
-    until_s = time.monotonic() + HEARTBEAT_S
-    while vehicle.driver.flavour is None:
-        if interrupts.wish() is not None:
-            raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
-        if time.monotonic() > until_s:
-            where = "the simulated vehicle" if order.link is None else f"a vehicle at `{order.link}`"
-            raise Refused(
-                ExitCode.LINK, "no-vehicle", f"no heartbeat of {where} within {HEARTBEAT_S:.0f} s",
-                "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try",
-            )  # fmt: skip
-        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    return events
+def _flown_before(order: Launch, loaded: Loaded) -> str | None:
+    """Why the bundle would not be opened, in words; nothing of it is used up."""
+    policy = loaded.bundle.policy
+    digest = loaded.bundle.mission_digest
+    opening = looked_up(order.state, loaded.vehicle, digest, loaded.expires_us, policy.name, policy.version)
+    return None if opening is Opening.OPENED else _not_opened(loaded, opening)
+
+
+def _not_opened(loaded: Loaded, opening: Opening) -> str:
+    policy = loaded.bundle.policy
+    if opening is Opening.OLD_POLICY:
+        return f"a later version of `{policy.name}` than {policy.version} was in force on `{loaded.vehicle}`"
+    return f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
 
 
 def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
@@ -254,14 +266,13 @@ def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: Li
     if opening is Opening.OPENED:
         return False
     if opening is Opening.OLD_POLICY:
-        text = f"a later version of `{policy.name}` than {policy.version} was in force on `{loaded.vehicle}`"
         help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
-        raise Refused(ExitCode.REFUSED, opening, text, help)
+        raise Refused(ExitCode.REFUSED, opening, _not_opened(loaded, opening), help)
     seen = vehicle.driver.seen
     until_s = time.monotonic() + AIR_S
     while not seen.landed_state and time.monotonic() < until_s:
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if seen.airborne:
         return True
-    text = f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
-    raise Refused(ExitCode.REFUSED, opening, text, "compile the mission again, which issues it anew")
+    help = "compile the mission again, which issues it anew"
+    raise Refused(ExitCode.REFUSED, opening, _not_opened(loaded, opening), help)

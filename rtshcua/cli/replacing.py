@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.documents import subject
+from rtshcua.cli.faults import code_of
 from rtshcua.cli.findings import Findings
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -39,6 +40,10 @@ def replace_with(
     """Sign a compiled mission as the replacement of another, if it leaves alone what stays. The policy stays too."""
     try:
         over = subject(order.replaces[0], order.replaces[1:], order.root, order.issued_at_us)
+        flown = len(over.mission.invocations)
+        if order.first > flown:
+            text = f"`--from {order.first}`: the mission that flies has {flown} steps"
+            return findings.refuse(ExitCode.USAGE, "usage", text, f"accepted: 0 to {flown}")
         if policy_digest(policy_payload(policy)) != over.policy_digest:
             text = f"the sources make another policy than the `{over.policy.name}@{over.policy.version}` that is flown"
             return findings.refuse(ExitCode.REFUSED, "wrong-policy", text, _SAME_POLICY)
@@ -48,7 +53,7 @@ def replace_with(
         return findings.refuse(ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` stay as they fly")
     except Untrusted as error:
         help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-        return findings.refuse(ExitCode.UNTRUSTED, error.slug, str(error), help)
+        return findings.refuse(code_of(error.slug), error.slug, str(error), help)
     if len(document) > MAX_DOCUMENT:
         text = f"the replacement has {len(document)} bytes, and a flight reads {MAX_DOCUMENT} at most"
         return findings.refuse(ExitCode.REFUSED, "too-large", text)

@@ -13,7 +13,7 @@ import typer
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
 from rtshcua.cli import simulated
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import fail, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import Mode
@@ -46,6 +46,9 @@ def run(
     unsigned_radio: Annotated[
         bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, the worst of the last seconds")
     ] = False,
+    system: Annotated[
+        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
+    ] = None,
     runs: Annotated[Path, typer.Option(help="where the run's folder is made")] = Path("runs"),
     state_dir: Annotated[Path | None, typer.Option(help="where it is kept which bundles flew (the data folder)")]
     = None,
@@ -73,6 +76,8 @@ def run(
         return fail(ExitCode.USAGE, "options of the simulated vehicle do not go with `--connect`", _SIM_HELP)
     if not own and vehicle is None:
         return fail(ExitCode.USAGE, "`--connect` needs `--vehicle`: which vehicle is it?", _VEHICLE_HELP)
+    if own and system is not None:
+        return fail(ExitCode.USAGE, "`--system` goes with `--connect`: the simulated vehicle is alone")
     if fresh_state and (state_dir is not None or not own):
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
@@ -108,6 +113,7 @@ def run(
             agent_socket=agent_socket,
             dry_run=rehearsal,
             fence=not no_fence and not rehearsal,
+            system=system,
         )
         try:
             return launch(order)
@@ -131,4 +137,4 @@ def _say(refused: Refused, *, as_json: bool) -> ExitCode:
     if as_json:
         said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
         print(msgspec.json.encode(said).decode())
-    return fail(refused.code, str(refused), refused.help)
+    return (tell if as_json else fail)(refused.code, str(refused), refused.help)

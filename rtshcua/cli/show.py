@@ -1,4 +1,4 @@
-"""`rtshcua show`: print a bundle, a key, a trust root or a log for a person."""
+"""`rtshcua show`: print a bundle, a document for a flight, a key, a trust root or a log for a person."""
 
 import json
 import time
@@ -9,8 +9,9 @@ import typer
 
 from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.files.runs import LOG
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.showing.bundle import show_bundle
+from rtshcua.cli.showing.document import kind_of_document, show_document
 from rtshcua.cli.showing.keys import KEY_FILE, show_key, show_root
 from rtshcua.cli.showing.log import show_log
 from rtshcua.cli.showing.page import Page, for_terminal
@@ -29,7 +30,9 @@ _ENVELOPE = b"\xd2"  # COSE_Sign1
 
 @app.command()
 def show(
-    path: Annotated[Path, typer.Argument(metavar="FILE", help="a bundle, key, trust root or log, or a run's folder")],
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE", help="a bundle, document, key, trust root or log, or a run's folder")
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
     """Print what a file says, whatever kind it is, with nothing left unsaid. Showing is not verifying."""
@@ -38,10 +41,10 @@ def show(
     try:
         shown = _show(page, file)
     except Untrusted as error:
-        return fail(ExitCode.INPUT if error.slug == "malformed" else ExitCode.UNTRUSTED, f"`{path}`: {error}")
+        return distrust(error, where=f"`{path}`: ")
     if shown is None:
         help = "sources are shown by any editor; `rtshcua check` reports on them"
-        return fail(ExitCode.INPUT, f"`{path}` is no bundle, key, trust root or log of this program", help)
+        return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
     print(json.dumps(shown, ensure_ascii=False) if as_json else page)
     return ExitCode.OK
 
@@ -61,4 +64,4 @@ def _show(page: Page, path: Path) -> dict[str, object] | None:
         return show_key(page, data)
     if head.startswith(_ENVELOPE) and cose.unverified(data, limit=MAX_BUNDLE).content_type == names.ROOT.content_type:
         return show_root(page, data, now_us)
-    return None
+    return show_document(page, data) if kind_of_document(data) is not None else None

@@ -8,15 +8,18 @@ from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.unheard import unheard
 
 _RADIO = "the policy reads RADIO_STATUS, which radios do not sign: it is not known without `--unsigned-radio`"
+#: messages that nobody signs
+_UNSIGNED = frozenset({"RADIO_STATUS"})
 
 
 class Signing:
     """Signs what `frames` lets out to a vehicle, and verifies what comes in. Without a key it does neither.
 
     `state` is the folder where timestamps are kept, by the vehicle's identity. Raises LinkKeyError, and OSError where
-    they cannot be.
+    they cannot be. `unheard` holds the slots of the signals that cannot come, for nobody signs what carries them.
     """
 
     def __init__(
@@ -26,6 +29,8 @@ class Signing:
         self.verifier: SignedLink | UnsignedRadio | None = None
         self.trouble: str | None = None
         self.notes: list[str] = []
+        self.unheard: frozenset[int] = frozenset()
+        self._link: SignedLink | None = None
         self._keeper: LinkKeeper | None = None
         if key_file is None:
             return
@@ -39,10 +44,28 @@ class Signing:
             store.close()
             raise
         frames.sign_with(link)
+        self._link = link
         self.verifier = UnsignedRadio(link) if unsigned_radio else link
         read = {source.message for signal in policy.signals for source in signal.sources}
-        if "RADIO_STATUS" in read and not unsigned_radio:
-            self.notes.append(_RADIO)
+        if not unsigned_radio:
+            self.unheard = unheard(policy, _UNSIGNED)
+            if not read.isdisjoint(_UNSIGNED):
+                self.notes.append(_RADIO)
+
+    @property
+    def rejected(self) -> str | None:
+        """What came and was not believed, in words, while nothing else came; None if nothing did."""
+        counts = None if self._link is None else self._link.counts
+        if counts is None or counts.accepted:
+            return None
+        why = (
+            (counts.forged, "signed with another key"),
+            (counts.unsigned, "not signed"),
+            (counts.stale, "older than what was heard before, or than a minute"),
+            (counts.strayed + counts.crowded, "of another link"),
+        )
+        told = ", ".join(f"{count} {what}" for count, what in why if count)
+        return f"frames come, and none is believed: {told}" if told else None
 
     def close(self) -> None:
         """Keep the last timestamps. What went wrong with keeping them is in `trouble`, for a person."""

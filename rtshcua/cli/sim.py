@@ -11,7 +11,7 @@ from rtshcua.adapters.files.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.vehicle import address
 from rtshcua.cli import simulated
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import code_of, fail
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.simulation.config import Boot, Kind
 
@@ -71,7 +71,9 @@ def sim(
     if signing_key is not None:
         try:
             read_link_key(signing_key)
-        except (LinkKeyError, OSError) as error:
+        except LinkKeyError as error:
+            return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+        except OSError as error:
             return fail(ExitCode.INPUT, str(error))
         words.append(f"--signing-key={signing_key}")
     words += ["--usb"] if usb else []
@@ -95,7 +97,7 @@ def sim(
 def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None) -> list[str]:
     """What was started, and what a person types to fly it."""
     flavour = Kind(ready["flavour"])
-    key = f" --signing-key {signing_key}" if signing_key is not None else ""
+    key = f" --signing-key {signing_key} --unsigned-radio" if signing_key is not None else ""
     finds = "start it: it listens on this port by itself"
     adds = f"Application Settings, Comm Links, Add: type UDP, port {port}"
     return [

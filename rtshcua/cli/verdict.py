@@ -21,12 +21,16 @@ MEANINGS = {
     "chain": "The log was changed after it was written, or records were taken out, added or moved.",
     "clock": "The recorded times contradict each other: records were put together from elsewhere, or the clock failed.",
     "close": "The end of the log was forged or damaged: its signature does not cover these records.",
-    "trust": "The log may be sound in itself, but it does not rest on the root that you trust.",
+    "trust": "Not trusted here: the log may be sound in itself, but it does not rest on the root that you trust.",
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
     "document": "An approval, a recall or a replacement was forged, or taken in where it should have been refused.",
     "dispatch": "The vehicle was commanded without the permission that the log should show first.",
     "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",
     "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",
+}
+#: what to do about a failure, by its slug
+_HELPS = {
+    "trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key",
 }
 _INCOMPLETE = "The program stopped before it closed the log, or its end was cut off. What came after is not known."
 
@@ -72,7 +76,9 @@ def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str
 
 
 def _finding(finding: Finding | None) -> dict[str, object] | None:
-    return None if finding is None else {**finding._asdict(), "line": finding.record + 1}
+    if finding is None:
+        return None
+    return {**finding._asdict(), "line": finding.record + 1, "help": _HELPS.get(finding.slug)}
 
 
 def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
@@ -111,6 +117,8 @@ def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
         yield "", f"  found     {shorten(plain(finding.found), _SHOWN)}"
     meaning = MEANINGS[kind] if failed or kind == "tail" else _INCOMPLETE
     yield from (("", f"  {line}") for line in wrap(meaning, _WIDTH))
+    if finding.slug in _HELPS:
+        yield "", f"  help      {_HELPS[finding.slug]}"
 
 
 def _counts(report: Report) -> Iterable[tuple[str, str]]:

@@ -12,8 +12,8 @@ from typing import Annotated, BinaryIO
 import typer
 
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.runs import BUNDLE, LOG, TELEMETRY
-from rtshcua.cli.faults import fail
+from rtshcua.adapters.files.runs import BUNDLE, LOG, SUMMARY, TELEMETRY
+from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.verdict import as_object, as_text
 from rtshcua.diagnostics.exits import ExitCode
@@ -46,7 +46,7 @@ def verify_log(
         pinned = pin(root)
     except Untrusted as error:
         help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else None
-        return fail(ExitCode.UNTRUSTED, f"no root to trust: {error}", help)
+        return distrust(error, help, where="no root to trust: ")
     codes = [_verify(path, pinned, as_json=as_json, first=number == 0) for number, path in enumerate(logs)]
     return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
 
@@ -61,7 +61,9 @@ def _verify(given: Path, pinned: Pin, *, as_json: bool, first: bool) -> ExitCode
         file.seek(0)
         audit = _audit(file, size, pinned, _beside(folder))
     if folder is not None:
-        audit = audit._replace(report=_with_telemetry(audit.report, folder / TELEMETRY))
+        audit = audit._replace(
+            report=_with_summary(_with_telemetry(audit.report, folder / TELEMETRY), folder / SUMMARY)
+        )
     code = exit_code(audit.report)
     if as_json:
         print(json.dumps(as_object(audit, path, pinned, code), ensure_ascii=False))
@@ -120,11 +122,24 @@ def _progress(file: BinaryIO, size: int) -> Iterator[Iterator[bytes]]:
         yield counted()
 
 
+def _with_summary(report: Report, path: Path) -> Report:
+    """The report, with what it says of the summary beside the log."""
+    if report.failure is not None or not path.exists():
+        return report
+    claim = Claim("summary", f"`{path.name}`: nothing signs it, and it was not read; what counts stands in the log")
+    return report._replace(unproven=(*report.unproven, claim))
+
+
 def _with_telemetry(report: Report, path: Path) -> Report:
     """The report, with what it says of the raw frames whose digest the close signs."""
     close = report.close
-    if close is None or close.tlog is None or report.failure is not None:
+    if close is None or report.failure is not None:
         return report
+    if close.tlog is None:
+        if not path.exists():
+            return report
+        claim = Claim("telemetry", f"the raw frames: the log does not vouch for `{path.name}`, which is not whole")
+        return report._replace(unproven=(*report.unproven, claim))
     if not path.exists():
         claim = Claim("telemetry", f"the raw frames: `{path.name}` does not lie beside the log")
         return report._replace(unproven=(*report.unproven, claim))

@@ -48,7 +48,7 @@ def test_a_flight_among_hostile_frames_is_the_same_flight(flavour: str) -> None:
     quiet, hostile = fly(flavour, hostile=False), fly(flavour, hostile=True)
     assert quiet.ending is Ending.COMPLETED
     assert hostile.lines == quiet.lines
-    link = hostile.vehicle.driver._link._verifier
+    link = hostile.vehicle.driver.link._verifier
     assert isinstance(link, SignedLink)
     assert min(link.counts.unsigned, link.counts.forged, link.counts.stale) > 20
 

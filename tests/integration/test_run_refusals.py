@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.cli import launch
+from rtshcua.cli import meeting
 from rtshcua.cli.app import main
 
 IDENTITY = ("--vehicle", "quad-07")
@@ -18,7 +18,7 @@ IDENTITY = ("--vehicle", "quad-07")
 def here(ground: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """In the ground's folder, with little patience, and no simulated vehicle that could be spoken to."""
     monkeypatch.chdir(ground.folder)
-    monkeypatch.setattr(launch, "HEARTBEAT_S", 0.3)
+    monkeypatch.setattr(meeting, "HEARTBEAT_S", 0.3)
     yield
     assert not Path("runs").exists()
 
@@ -64,7 +64,7 @@ def test_an_address_that_is_none(ground: Any, capfd: Any, text: str) -> None:
     assert refused(capfd, ground.bundle(), "--connect", text, *IDENTITY)[0] == 2
 
 
-def test_any_changed_byte_is_untrusted(ground: Any, capfd: Any) -> None:
+def test_a_bundle_with_any_changed_byte_is_refused(ground: Any, capfd: Any) -> None:
     bundle = ground.bundle()
     good = Path(bundle).read_bytes()
     chance = Random(11)
@@ -73,20 +73,21 @@ def test_any_changed_byte_is_untrusted(ground: Any, capfd: Any) -> None:
         bad[at] ^= 1 << chance.randrange(8)
         Path("bad.bundle").write_bytes(bad)
         code, _ = refused(capfd, "bad.bundle")
-        assert code == 4, at
+        # where the byte held the format together it is malformed, elsewhere it fails its signature or digest
+        assert code == 4 if at == len(good) - 1 else code in (3, 4), at
 
 
 @pytest.mark.parametrize("data", [b"", b"\0" * 5_000, b"mission m {}\n", bytes(range(256)) * 9], ids=len)
-def test_what_is_no_bundle_is_untrusted(ground: Any, capfd: Any, data: bytes) -> None:
+def test_what_is_no_bundle_is_malformed(ground: Any, capfd: Any, data: bytes) -> None:
     Path("no.bundle").write_bytes(data)
-    assert refused(capfd, "no.bundle")[0] == 4
+    assert refused(capfd, "no.bundle")[0] == 3
 
 
-def test_a_truncated_bundle_is_untrusted(ground: Any, capfd: Any) -> None:
+def test_a_truncated_bundle_is_malformed(ground: Any, capfd: Any) -> None:
     good = Path(ground.bundle()).read_bytes()
     for length in range(1, len(good), len(good) // 17):
         Path("cut.bundle").write_bytes(good[:length])
-        assert refused(capfd, "cut.bundle")[0] == 4
+        assert refused(capfd, "cut.bundle")[0] == 3
 
 
 def test_a_missing_bundle(ground: Any, capfd: Any) -> None:

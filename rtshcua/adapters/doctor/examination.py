@@ -9,8 +9,10 @@ from typing import Any, Final
 from rtshcua.adapters.doctor.facts import Facts
 from rtshcua.adapters.doctor.settings import SETTINGS
 from rtshcua.adapters.vehicle import messages
-from rtshcua.adapters.vehicle.driver import Driver, Heard
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.link import Heard
 from rtshcua.adapters.vehicle.parameters import Parameters
+from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.mavlink.frames import Codec, Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -23,8 +25,11 @@ _ONCE: Final = ("AUTOPILOT_VERSION", "HOME_POSITION", "SYSTEM_TIME")
 class Examination(Driver):
     """Listens and asks. `facts` and `parameters` hold the answers."""
 
-    def __init__(self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None) -> None:
-        super().__init__(policy, frames, fence=False, verifier=verifier)
+    def __init__(
+        self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None,
+        system: int | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(policy, frames, fence=False, verifier=verifier, system=system)
         self.facts = Facts()
         self.parameters: Parameters | None = None
         self._clock = clock
@@ -32,16 +37,30 @@ class Examination(Driver):
         self._asked_us: int | None = None
 
     def receive(self, datagram: bytes, now_us: int) -> Heard:
-        """As any driver, and keep what was heard."""
+        """As any driver, and keep what was heard: who speaks, and of what is believed what it says."""
         heard = super().receive(datagram, now_us)
         self.facts.system = self._system
         utc_us = self._clock.now().utc_us
         for frame in self._ears.parse(datagram, now_us):
+            self.facts.meet(frame)
+        for frame in heard.frames:
             self.facts.hear(frame, now_us, utc_us)
             if frame.name == "PARAM_VALUE" and frame.system == self._system and self.parameters is not None:
                 self.parameters.take(frame.message)
         self._note(heard.events)
         return heard
+
+    def overhear(self, datagram: bytes, now_us: int) -> None:
+        """Somebody else speaks at this port; under the vehicle's own id that is no talker to be counted."""
+        super().overhear(datagram, now_us)
+        for frame in self._ears.parse(datagram, now_us):
+            if frame.system != self._system:
+                self.facts.meet(frame)
+
+    @property
+    def settled(self) -> Preflight | None:
+        """What is compared with the policy; None before a heartbeat."""
+        return self._preflight
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """As any driver, and ask what is due."""

@@ -19,7 +19,8 @@ class Talker:
     frames: int = 0
     missing: int = 0
     signed: int = 0
-    kind: int | None = None  # MAV_TYPE of its heartbeat
+    kind: int | None = None  # MAV_TYPE of its heartbeat,
+    autopilot: int | None = None  # and MAV_AUTOPILOT
     sequence: int | None = None
 
     def hear(self, frame: Received) -> None:
@@ -31,7 +32,7 @@ class Talker:
         self.frames += 1
         self.signed += frame.signed
         if frame.name == "HEARTBEAT":
-            self.kind = frame.message.type
+            self.kind, self.autopilot = frame.message.type, frame.message.autopilot
 
 
 @dataclass(slots=True)
@@ -62,11 +63,14 @@ class Facts:
     answered: bool = False  # it answered something that we asked
     values: dict[int, int | None] = field(default_factory=dict)  # of the policy's signals, by state slot
 
-    def hear(self, frame: Received, now_us: int, utc_us: int) -> None:
-        """Take in one good frame, of anybody."""
+    def meet(self, frame: Received) -> None:
+        """Count one good frame, of anybody, believed or not."""
         key = (frame.system, frame.component)
         if key in self.talkers or len(self.talkers) < _MOST_TALKERS:
             self.talkers.setdefault(key, Talker()).hear(frame)
+
+    def hear(self, frame: Received, now_us: int, utc_us: int) -> None:
+        """Take in what one frame says."""
         if frame.system != self.system:
             return
         stream = self.streams.get(frame.name)

@@ -9,6 +9,7 @@ from rtshcua.onboard.enforcement.frames import OURS
 
 _AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
 _GROUND_STATION: Final = 6  # MAV_TYPE_GCS
+_NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT_INVALID
 _SLOW_HEARTBEAT_US: Final = 1_500_000
 _SLOW_US, _TOO_SLOW_US = 200_000, 1_000_000
 #: parts of the frames that are missing, in 1/1000
@@ -20,13 +21,18 @@ _TESTED: Final = {"px4": (1, 16), "ardupilot": (4, 7)}
 _FENCE, _TARGETS, _COMMAND_INT, _MAVLINK2 = 0x4000, 0x100, 0x08, 0x2000
 
 
-def link(facts: Facts, flavour: str, *, keyed: bool) -> Iterator[Finding]:
-    """`keyed`: a link key was given, and what is not signed with it was dropped."""
+def link(facts: Facts, flavour: str, *, keyed: bool, crowd: str | None, named: bool) -> Iterator[Finding]:
+    """`keyed`: a link key was given, and what is not signed with it was dropped. `crowd`: another vehicle, as a run
+    would refuse it; `named`: the operator said which system is meant.
+    """
     yield _heartbeat(facts, flavour)
     yield _loss(facts)
     yield _signing(facts, keyed=keyed)
     yield _answers(facts)
-    yield from _others(facts)
+    others = list(_others(facts, named=named))
+    yield from others
+    if crowd is not None and not any(each.slug == "link/other-vehicle" for each in others):
+        yield Finding("link/other-vehicle", Verdict.STOP, crowd, "one vehicle")
     yield _round_trip(facts)
     yield _version(facts, flavour)
     yield from _capabilities(facts, flavour)
@@ -71,7 +77,7 @@ def _answers(facts: Facts) -> Finding:
     return Finding("link/answers", Verdict.STOP, "it answers nothing that it was asked", "answers", advice)
 
 
-def _others(facts: Facts) -> Iterator[Finding]:
+def _others(facts: Facts, *, named: bool) -> Iterator[Finding]:
     stations = 0
     for (system, component), talker in facts.others():
         if (system, component) == (facts.system, OURS):
@@ -79,6 +85,10 @@ def _others(facts: Facts) -> Iterator[Finding]:
             yield Finding("link/component", Verdict.STOP, f"another component {OURS} speaks here", "", advice)
         elif talker.kind == _GROUND_STATION:
             stations += 1
+        elif system != facts.system and component == _AUTOPILOT and talker.autopilot not in (None, _NO_AUTOPILOT):
+            found = f"another vehicle speaks here too, system {system}"
+            verdict = Verdict.WARN if named else Verdict.STOP
+            yield Finding("link/other-vehicle", verdict, found, "one vehicle", "`--system` says which one is meant")
         elif system != facts.system:
             yield Finding("link/other-system", Verdict.WARN, f"system {system}, component {component} speaks here too")
     words = "no ground station is heard on this link" if not stations else f"{stations} ground station(s) heard"

@@ -8,25 +8,39 @@ from rtshcua.adapters.doctor.finding import Finding, Verdict
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION, Signal
+from rtshcua.onboard.unheard import needed
 
 #: a message should come this often within the time to stale of what it carries
 _TIMES: Final = 2
 _CLOCK_US: Final = 1_000_000
 
 
-def signals(vehicle: Examination, policy: Policy, mission: Mission | None) -> Iterator[Finding]:
+def signals(
+    vehicle: Examination, policy: Policy, mission: Mission | None, unheard: frozenset[int]
+) -> Iterator[Finding]:
     """Whether each signal of the policy is known, and comes often enough to stay so."""
-    needed = _needed(policy, mission)
+    wanted = _needed(policy, mission)
     for signal in policy.signals:
         slots = range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1))
-        yield _signal(vehicle, signal, needed=not needed.isdisjoint(slots), slots=slots)
+        is_needed = not wanted.isdisjoint(slots)
+        if unheard.isdisjoint(slots):
+            yield _signal(vehicle, signal, is_needed=is_needed, slots=slots)
+        else:
+            names = " or ".join(source.message for source in signal.sources)
+            found = f"`{signal.name}` stays unknown: nobody signs {names}, and nothing unsigned is believed here"
+            bad = Verdict.STOP if is_needed else Verdict.WARN
+            yield Finding(f"signal/{signal.name}", bad, found, names, "`--unsigned-radio`, here and for `run`")
 
 
 def bound(vehicle: Examination, policy: Policy, utc_error_us: int) -> Iterator[Finding]:
     """What stands between this vehicle and a bundle that was made for it."""
-    unready = vehicle.unready
-    if unready is not None and unready != vehicle.seen.unready:
-        yield Finding("mission/unready", Verdict.STOP, unready, "as the policy has it")
+    preflight = vehicle.settled
+    astray = None if preflight is None else preflight.astray
+    unknown = None if preflight is None else preflight.unplaced or preflight.unread
+    if astray is not None:
+        yield Finding("mission/unready", Verdict.STOP, astray, "as the policy has it")
+    elif unknown is not None or preflight is None:
+        yield Finding("mission/place", Verdict.UNKNOWN, unknown or "nothing was heard", "as the policy has it")
     else:
         yield Finding("mission/place", Verdict.OK, "home and return altitude are those of the policy")
     ahead_us = vehicle.facts.ahead_us
@@ -45,15 +59,15 @@ def _needed(policy: Policy, mission: Mission | None) -> set[int]:
     well_known = policy.vehicle.position, policy.vehicle.position + 1, policy.vehicle.height, policy.vehicle.battery
     slots = {slot for slot in well_known if slot >= 0}
     for invocation in () if mission is None else mission.invocations:
-        slots.update(invocation.contract.reads)
+        slots.update(needed(policy, invocation))
     return slots
 
 
-def _signal(vehicle: Examination, signal: Signal, *, needed: bool, slots: Sequence[int]) -> Finding:
+def _signal(vehicle: Examination, signal: Signal, *, is_needed: bool, slots: Sequence[int]) -> Finding:
     slug = f"signal/{signal.name}"
     facts = vehicle.facts
     heard = [source.message for source in signal.sources if source.message in facts.streams]
-    bad = Verdict.STOP if needed else Verdict.WARN
+    bad = Verdict.STOP if is_needed else Verdict.WARN
     if not heard:
         names = " or ".join(source.message for source in signal.sources)
         return Finding(slug, bad, f"`{signal.name}` stays unknown: no {names}", names, _ADVICE)

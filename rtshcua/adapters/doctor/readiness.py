@@ -16,6 +16,9 @@ def readiness(vehicle: Examination) -> Iterator[Finding]:
         yield Finding("vehicle/airborne", Verdict.STOP, "it is in the air", "on the ground", "somebody else flies it")
     elif seen.armed:
         yield Finding("vehicle/armed", Verdict.STOP, "its motors are armed", "disarmed", "somebody else holds it")
+    elif not seen.landed_state:
+        found = "it does not say whether it is on the ground (EXTENDED_SYS_STATE)"
+        yield Finding("vehicle/down", Verdict.UNKNOWN, found, "on the ground, disarmed")
     else:
         yield Finding("vehicle/down", Verdict.OK, "on the ground, disarmed")
     if seen.unready is None:

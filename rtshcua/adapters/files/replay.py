@@ -27,7 +27,7 @@ class FileReplayStore:
     """The missions that were opened on the vehicle called `vehicle` (its identity)."""
 
     def __init__(self, state: Path, vehicle: str) -> None:
-        self.folder = state / "replay" / f"vehicle-{quote(vehicle, safe='')}"
+        self.folder = _folder(state, vehicle)
         make_folder(self.folder, mode=PRIVATE_FOLDER)
 
     def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
@@ -38,29 +38,16 @@ class FileReplayStore:
         """
         marker = self.folder / digest.hex()
         with _alone(self.folder):
-            if marker.exists() or expires_us <= self._floor():
-                return Opening.REPLAYED
-            versions = self._versions()
-            if version < versions.get(policy, version):
-                return Opening.OLD_POLICY
+            refusal = _refusal(self.folder, digest, expires_us, policy, version)
+            if refusal is not None:
+                return refusal
+            versions = _versions(self.folder)
             self._prune(now_utc_us)
             if versions.get(policy) != version:
                 raised = json.dumps(versions | {policy: version}, sort_keys=True).encode()
                 replace(self.folder / _POLICIES, raised, mode=PRIVATE_FILE)
             write_new(marker, b"%d\n" % expires_us, mode=PRIVATE_FILE)
         return Opening.OPENED
-
-    def _floor(self) -> int:
-        try:
-            return int((self.folder / _FLOOR).read_bytes())
-        except FileNotFoundError:
-            return -1
-
-    def _versions(self) -> dict[str, int]:
-        try:
-            return dict(json.loads((self.folder / _POLICIES).read_bytes()))
-        except FileNotFoundError:
-            return {}
 
     def _prune(self, now_utc_us: int) -> None:
         expired = {}
@@ -70,10 +57,43 @@ class FileReplayStore:
                 expired[marker] = expires_us
         if not expired:
             return
-        replace(self.folder / _FLOOR, b"%d\n" % max(self._floor(), *expired.values()), mode=PRIVATE_FILE)
+        replace(self.folder / _FLOOR, b"%d\n" % max(_floor(self.folder), *expired.values()), mode=PRIVATE_FILE)
         for marker in expired:
             marker.unlink(missing_ok=True)
         sync_folder(self.folder)
+
+
+def looked_up(state: Path, vehicle: str, digest: bytes, expires_us: int, policy: str, version: int) -> Opening:
+    """What `open_once` would say; nothing is made, written or used up. Raises OSError."""
+    folder = _folder(state, vehicle)
+    if not folder.exists():
+        return Opening.OPENED
+    with _alone(folder):
+        return _refusal(folder, digest, expires_us, policy, version) or Opening.OPENED
+
+
+def _folder(state: Path, vehicle: str) -> Path:
+    return state / "replay" / f"vehicle-{quote(vehicle, safe='')}"
+
+
+def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version: int) -> Opening | None:
+    if (folder / digest.hex()).exists() or expires_us <= _floor(folder):
+        return Opening.REPLAYED
+    return Opening.OLD_POLICY if version < _versions(folder).get(policy, version) else None
+
+
+def _floor(folder: Path) -> int:
+    try:
+        return int((folder / _FLOOR).read_bytes())
+    except FileNotFoundError:
+        return -1
+
+
+def _versions(folder: Path) -> dict[str, int]:
+    try:
+        return dict(json.loads((folder / _POLICIES).read_bytes()))
+    except FileNotFoundError:
+        return {}
 
 
 @contextmanager

@@ -1,6 +1,10 @@
 """The raw frames of a flight, as every MAVLink tool reads them."""
 
+import errno
+import os
+import shutil
 from collections import deque
+from contextlib import suppress
 from hashlib import file_digest
 from io import BufferedWriter, FileIO
 from pathlib import Path
@@ -11,7 +15,14 @@ from rtshcua.mavlink import tlog
 
 #: frames kept for a disk that does not keep up
 MOST_WAITING = 100_000
+#: Bytes on the disk that frames leave free, for the log and the summary: a flight's log is a few hundred KB.
+LEFT_TO_THE_LOG = 4 << 20
 _EVERY_S = 0.1
+
+
+def free_bytes(folder: Path) -> int:
+    """How much room the disk of `folder` has for us."""
+    return shutil.disk_usage(folder).free
 
 
 class TelemetryFile:
@@ -24,7 +35,8 @@ class TelemetryFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.error: OSError | None = None
-        self.lost = 0  # frames that came while too many waited
+        self.lost = 0  # frames that are not in the file; after an error, of all once it is finished
+        self._given = 0
         self._file = BufferedWriter(FileIO(open_new(path, mode=PUBLIC_FILE), "wb"), 1 << 16)
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._over = Event()
@@ -33,21 +45,35 @@ class TelemetryFile:
 
     def write(self, utc_us: int, frame: bytes) -> None:
         """Keeps a frame that arrived at `utc_us`; after the first error, which stays in `error`, nothing more."""
+        self._given += 1
         if self.error is None and len(self._waiting) < MOST_WAITING:
             self._waiting.append((utc_us, frame))
         else:
             self.lost += 1
 
     def finish(self) -> bytes:
-        """Closes the file and gives the SHA-256 of what is on the disk, which the log's close then signs."""
+        """Closes the file and gives the SHA-256 of what is on the disk; `lost` then says how much that is not."""
         self._over.set()
         self._thread.join()
         try:
             self._file.close()
         except OSError as error:
             self.error = self.error or error
+        if self.error is not None:
+            self.lost = self._given - self._whole()
         with self.path.open("rb") as file:
             return file_digest(file, "sha256").digest()
+
+    def _whole(self) -> int:
+        """How many whole frames the file holds; what a full disk took of one more is cut off."""
+        count = 0
+        try:
+            for _ in tlog.read(self.path.read_bytes()):
+                count += 1
+        except tlog.DamagedTlog as damaged:
+            with suppress(OSError):
+                os.truncate(self.path, damaged.offset)
+        return count
 
     def _run(self) -> None:
         over = False
@@ -57,7 +83,16 @@ class TelemetryFile:
             if not batch or self.error is not None:
                 continue
             try:
+                self._look_for_room()
                 self._file.write(b"".join(tlog.encode(utc_us, frame) for utc_us, frame in batch))
                 self._file.flush()
             except OSError as error:
                 self.error = error
+
+    def _look_for_room(self) -> None:
+        try:
+            free = free_bytes(self.path.parent)
+        except OSError:
+            return  # then writing tells
+        if free < LEFT_TO_THE_LOG:
+            raise OSError(errno.ENOSPC, "the last room on the disk is left to the log")

@@ -80,8 +80,10 @@ class EvidenceWriter:
         self._queue.put(None)
         self._thread.join()
         self._thread = None
-        self._file.close()
-        self._count()
+        try:
+            self._file.close()
+        finally:
+            self._count()
 
     # -------------------------------------------------------- in the thread
 

@@ -21,7 +21,9 @@ def messages() -> Iterator[Message]:
 
 
 def main() -> int:
-    """Draw until the input ends; 1 when nobody reads any more."""
+    """Draw until the input ends; 1 when nobody reads any more, or nobody ever did."""
+    if sys.stdout is None:
+        return EXIT_GONE
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with the flight, not before
     try:
         if sys.argv[1] == "screen":

@@ -36,10 +36,11 @@ def sentence(what: Happening) -> str:
 def ending(summary: Summary) -> Iterable[str]:
     """The last lines: what flew, what was decided, where the log is, what to do next."""
     counts = ", ".join(f"{count} {name}" for name, count in summary.outcomes.items() if count) or "nothing decided"
-    whole = "whole" if summary.whole else "NOT whole: the disk refused some"
+    whole = "whole" if summary.whole else "evidence NOT whole"
     yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
     yield f"  decided  {counts}"
     yield f"  log      {summary.log} ({summary.records} records, {whole})"
+    yield from (f"  missing  {printable(what)}" for what in summary.missing)
     yield f"  next     {summary.next}"
 
 

@@ -69,7 +69,10 @@ class Note(msgspec.Struct, frozen=True, tag="note", tag_field="event"):
 
 
 class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
-    """How the run ended; also `summary.json` of the run folder. The log proves it, this only says it."""
+    """How the run ended; also `summary.json` of the run folder. The log proves it, this only says it.
+
+    `whole`: all evidence is on the disk; else `missing` says what is not.
+    """
 
     mission: str
     policy: str
@@ -87,6 +90,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     folder: str
     log: str
     next: str
+    missing: tuple[str, ...] = ()
 
 
 Message = Plan | Snapshot | Happened | Note | Summary

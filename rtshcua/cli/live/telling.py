@@ -3,6 +3,7 @@
 import msgspec
 
 from rtshcua.cli.live.story import Happening, Plan, Signal, Step
+from rtshcua.cli.showing.log import detail_of
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -11,8 +12,8 @@ from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 
 #: the effect that puts another mission into force
 REPLACED = "replacement"
-#: effects whose detail is a signed document, and nothing to show
-_SIGNED = ("approval", "recall")
+#: what flies instead of a step that is not admitted before anything flew
+NOTHING_FLIES = "nothing: it has not left the ground, and nothing is sent"
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
@@ -54,12 +55,16 @@ def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Pla
 
 
 class Teller:
-    """Reads each evidence line once, counts, and says what happened."""
+    """Reads each evidence line once, counts, and says what happened.
+
+    `outcomes` counts every decision of the log, on steps and on links alike: as `rtshcua verify-log` does.
+    """
 
     def __init__(self, policy: Policy, mission: Mission, start_us: int) -> None:
         self._policy = policy
         self._mission = mission
         self._start_us = start_us
+        self._flown = False  # something was sent that may have lifted it off
         self.outcomes = dict.fromkeys(_OUTCOMES, 0)
         self.done: set[int] = set()
 
@@ -73,19 +78,22 @@ class Teller:
         t_us = record.at_us - self._start_us
         subject = self._subject(record)
         if record.type == "decision":
-            if record.kind == STEP and record.outcome in self.outcomes:
+            if record.outcome in self.outcomes:
                 self.outcomes[record.outcome] += 1
             clause, target = record.clause or "", record.target or ""
+            if target and not self._flown:
+                target = NOTHING_FLIES
             return Happening(
                 "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail
             )
         if record.type != "effect":
             return None
+        self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
         if record.event == "succeeded" and record.kind == STEP:
             self.done.add(record.step)
         if record.event == REPLACED:
             return Happening(record.event, t_us, record.step, detail=f"from step {record.step} on")
-        detail = "" if record.event in _SIGNED else record.detail
+        detail = detail_of(record.event, record.detail)
         return Happening(record.event, t_us, record.step, subject, detail=detail)
 
     def _subject(self, record: _Line) -> str:

@@ -7,29 +7,30 @@ from contextlib import suppress
 import msgspec
 
 from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
+from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
-from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
 #: effects whose detail is a signed document
 DOCUMENTS = ("approval", "recall", "replacement")
 
-_KINDS = {STEP: "step", FALLBACK_LINK: "fallback", CONTINGENCY_LINK: "contingency"}
+_KINDS = {STEP: "step", FALLBACK_LINK: "fallback of step", CONTINGENCY_LINK: "contingency"}
 
 
 def show_log(page: Page, lines: Iterable[bytes]) -> dict[str, object]:
     """Adds a log to the page, and gives it for a program."""
-    start_us, names, entries, stopped = 0, _Names(None), [], None
+    start_us, names, entries, stopped = 0, Names(None), [], None
     for number, record in enumerate(_records(lines)):
         if isinstance(record, Flaw):
             stopped = f"line {number + 1} is no record: {record.text}"
             break
         if isinstance(record, Genesis):
-            start_us, names = record.at_us, _Names(_bundle(record))
+            start_us, names = record.at_us, Names.of(record)
             _head(page, record)
             page.head("Timeline (not verified: `rtshcua verify-log` does that)")
         names.follow(record)
@@ -40,6 +41,13 @@ def show_log(page: Page, lines: Iterable[bytes]) -> dict[str, object]:
         page.head("The rest is not shown")
         page.row("because", stopped)
     return {"kind": "log", "verified": False, "records": entries, "stopped": stopped}
+
+
+def detail_of(event: str, detail: str) -> str:
+    """An effect's detail for a person: a document by what it says, a number by what it counts."""
+    if event in DOCUMENTS:
+        return recorded(detail)
+    return f"the same answer again, {detail} times" if event == "repeated" else detail
 
 
 def _records(lines: Iterable[bytes]) -> Iterator[AnyRecord | Flaw]:
@@ -69,11 +77,16 @@ def _bundle(genesis: Genesis) -> Claimed | None:
         return None
 
 
-class _Names:
+class Names:
     """The words of a bundle for steps and links; numbers where it has none."""
 
     def __init__(self, bundle: Claimed | None) -> None:
         self._bundle = bundle
+
+    @classmethod
+    def of(cls, genesis: Genesis) -> "Names":
+        """The words of the bundle that a log began with."""
+        return cls(_bundle(genesis))
 
     def follow(self, record: AnyRecord) -> None:
         """After a replacement the steps have other words."""
@@ -90,7 +103,7 @@ class _Names:
             return f"{record.outcome:<9} {subject}: {record.reason}{clause}{target}"
         if isinstance(record, Effect):
             subject = self._subject(record.kind, record.step, record.link)
-            detail = f"{len(record.detail)} letters, signed" if record.event in DOCUMENTS else record.detail
+            detail = detail_of(record.event, record.detail)
             return "  ".join(word for word in (f"· {record.event:<15}", subject, detail) if word).rstrip()
         if isinstance(record, Close):
             return f"closed after {record.count} records: {record.ending}"
@@ -99,6 +112,8 @@ class _Names:
     def _subject(self, kind: int, step: int, link: int) -> str:
         if kind not in _KINDS:
             return ""
+        if kind == FALLBACK_LINK and link == DEGRADE:
+            return f"target of the degrade rule, at step {step}"
         text = self._text(kind, step, link)
         number = link if kind == CONTINGENCY_LINK else step
         return f"{_KINDS[kind]} {number}{f' `{text}`' if text else ''}"

@@ -13,9 +13,10 @@ from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
 from rtshcua.decision.verdict import Decisive
 from rtshcua.ground.why.reads import Read, reads
 from rtshcua.ground.why.trace import Check, Trace, Traced
+from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
-from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome
 
 _TRUTHS: Mapping[int, str] = {TRUE: "true", FALSE: "false", UNKNOWN: "unknown"}
@@ -32,6 +33,7 @@ class Case(NamedTuple):
     context: Context
     now: Now
     phases: tuple[str, ...]
+    aloft: bool | None = None  # whether something had been sent that may have lifted it off; None: not known
 
 
 def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
@@ -44,7 +46,7 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
         page.row("because", f"`{_text(decision.clause)}`")
         page.row("written", f"{_place(policy, decision.clause)}")
     if decision.outcome is Outcome.FALLBACK:
-        page.row("flies", decision.target.text if decision.target is not None else "nothing: no link may fly now")
+        page.row("flies", _flies(decision.target, case.aloft))
     for nearest in trace.nearest:
         page.row("would pass", would_pass(nearest))
     page.head("Step by step")
@@ -62,6 +64,7 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
         "clause": None if decision.clause is None else _text(decision.clause),
         "written": None if decision.clause is None else _place(policy, decision.clause),
         "target": None if decision.target is None else decision.target.text,
+        "aloft": case.aloft,
         "would_pass": [
             {"subject": each.subject, "value": each.value, "words": _words(each), "choices": list(each.choices)}
             for each in trace.nearest
@@ -69,6 +72,14 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
         "steps": steps,
         "chain": [link._asdict() for link in trace.chain],
     }
+
+
+def _flies(target: Link | None, aloft: bool | None) -> str:
+    if aloft is False:
+        return "nothing: it had not left the ground, and nothing was sent"
+    if target is None:
+        return "nothing: no link may fly now"
+    return target.text if aloft else f"{target.text}, in the air; on the ground nothing is sent"
 
 
 def _subject(policy: Policy, invocation: PreparedInvocation) -> str:
@@ -95,9 +106,9 @@ def _step(page: Page, step: Traced, case: Case, decisive: Decisive) -> dict[str,
         mark = ">" if check.clause is decisive and decisive is not None else " "
         text = "the charge to finish and to come home" if check.clause is None else _text(check.clause)
         values = ", ".join(_read(invocation, each) for each in read)
-        words_of = f"{_truth(check)}: `{text}`" + (f"   with {values}" if values else "")
+        words_of = f"{truth_of(check)}: `{text}`" + (f"   with {values}" if values else "")
         page.row(f"{mark} {check.role}", words_of, indent=5, width=10)
-        checks.append({"role": check.role, "clause": text, "truth": _truth(check), "reads": _for_program(read)})
+        checks.append({"role": check.role, "clause": text, "truth": truth_of(check), "reads": _for_program(read)})
     return {"number": step.number, "name": step.name, "verdict": verdict, "fact": fact, "checks": checks}
 
 
@@ -114,21 +125,37 @@ def _fact(number: str, case: Case) -> str:
             return f"issued {utc(flat.issued_at_us)}, valid until {end}, now {utc(now.utc_us)}; {used}"
         case "3":
             return f"role {policy.roles[flat.role]} through {words.source(flat.source)}"
+        case "3b":
+            return "; ".join(dict.fromkeys(_answer(policy, each, now) for each in context.approvals))
         case "4":
             during = ", ".join(name for at, name in enumerate(case.phases) if flat.phases >> at & 1)
             current = case.phases[context.phase] if 0 <= context.phase < len(case.phases) else "none yet"
             return f"in phase {current}, means something during {during}"
         case "5":
-            waited = words.duration(max(now.monotonic_us - context.released_us, 0))
+            waited = _milliseconds(max(now.monotonic_us - context.released_us, 0))
             return (
                 f"released {waited} ago, deadline {words.duration(contract.deadline_us)}, "
-                f"{words.duration(context.remaining_us)} still needed"
+                f"at most {_milliseconds(context.remaining_us)} still needed until it is sent"
             )
         case _:
             return ""
 
 
-def _truth(check: Check) -> str:
+def _milliseconds(us: int) -> str:
+    """A measured time, rounded up to what a person can use."""
+    return words.duration(-(-us // 1_000) * 1_000) if us else "0 ms"
+
+
+def _answer(policy: Policy, given: Approval, now: Now) -> str:
+    """Who answered, what, and when."""
+    role = policy.roles[given.role] if 0 <= given.role < len(policy.roles) else f"role {given.role}"
+    ago_us = max(now.monotonic_us - given.monotonic_us, 0)
+    said = "granted" if given.granted else "refused"
+    return f"{said} as {role}, {utc(now.utc_us - ago_us)}, {ago_us / 1_000_000:.1f} s before"
+
+
+def truth_of(check: Check) -> str:
+    """A check's truth in a word: rules that count against a step match, or do not."""
     word = _TRUTHS.get(check.truth, "unknown")
     if check.role in _AGAINST:
         return {"true": "matches", "false": "does not match"}.get(word, word)

@@ -110,6 +110,24 @@ def test_what_is_no_such_line_is_answered_and_changes_nothing(agents: AgentSocke
         assert agents.readers == 1
 
 
+@pytest.mark.parametrize(
+    ("line", "number"),
+    [
+        (b'{"id":7,"document":"!!"}\n', 7),
+        (b'{"id":7,"document":7}\n', 7),
+        (b'{"id":7,"document":"aGk=","x":1}\n', 7),
+        (b'{"id":7}\n', 7),
+        (b'{"id":"7","document":"aGk="}\n', 0),
+        (b'{"id":7,\n', 0),
+    ],
+)
+def test_what_is_no_such_line_is_answered_by_its_own_number(agents: AgentSocket, line: bytes, number: int) -> None:
+    with reader(agents) as link:
+        link.sendall(line)
+        assert agents.poll(0) is None
+        assert json.loads(heard(link)[-1])["id"] == number
+
+
 def test_a_line_without_an_end_is_not_kept_for_ever(agents: AgentSocket) -> None:
     with reader(agents) as link:
         link.setblocking(False)
@@ -229,3 +247,9 @@ def test_a_client_of_a_flight_that_ends(agents: AgentSocket) -> None:
     agents.close()
     thread.join(10)
     assert isinstance(said[0], ConnectionError)
+
+
+def test_a_socket_in_no_folder_is_named(folder: Path) -> None:
+    with pytest.raises(FileNotFoundError) as refused:
+        AgentSocket(folder / "none" / "x", lambda: HELLO)
+    assert refused.value.filename == str(folder / "none" / "x")

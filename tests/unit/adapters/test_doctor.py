@@ -1,6 +1,7 @@
 """The doctor, beside the simulated vehicle in explicit time: what is well, and each thing that would stop a mission."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -10,13 +11,17 @@ from rtshcua.adapters.doctor.diagnosis import diagnose
 from rtshcua.adapters.doctor.examination import Examination
 from rtshcua.adapters.doctor.finding import Finding, Verdict
 from rtshcua.mavlink.frames import Codec
+from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.unheard import unheard
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.faults import GpsLoss, LinkLoss
 from rtshcua.simulation.place import Home
 from virtual import case
 from virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 
+KEY = bytes(range(32))
 MISSION = case.mission(case.short_steps())
 FLAVOURS = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 Prepare = Callable[[VirtualVehicle], None]
@@ -127,3 +132,84 @@ def test_another_one_that_mediates_and_a_ground_station() -> None:
     found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
     assert "link/component" in stops(found)
     assert found["link/ground-station"].found == "1 ground station(s) heard"
+
+
+def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, Finding]:
+    """The same on a link with a key."""
+    now = VirtualClock().now()
+    link = SignedLink(KEY, State(0, {}), now.utc_us, now.monotonic_us)
+    frames = FrameSession()
+    frames.sign_with(link)
+    policy, clock = case.policy(), VirtualClock()
+    vehicle = VirtualVehicle(policy, case.simulated(flavour, signing_key=KEY, utc_us=now.utc_us), clock, frames)
+    vehicle.driver = Examination(policy, clock, frames, link)
+    while clock.elapsed_us < seconds * SECOND:
+        vehicle.poll(clock.now().monotonic_us, SECOND)
+    findings = diagnose(vehicle.driver, policy, MISSION, keyed=True, utc_error_us=1_000, **words)
+    return {each.slug: each for each in findings}
+
+
+def test_a_signal_that_nobody_signs_stops_a_mission_that_needs_it() -> None:
+    policy = case.policy()
+    found = signed("ardupilot", unheard=unheard(policy, {"RADIO_STATUS"}))
+    assert stops(found) == {"signal/link.quality"}
+    assert "--unsigned-radio" in found["signal/link.quality"].advice
+
+
+def test_what_is_not_believed_is_no_value() -> None:
+    found = signed("ardupilot")
+    assert found["signal/link.quality"].verdict is Verdict.STOP, "the radio's frames are heard, and not taken in"
+
+
+def test_what_was_never_learned_is_not_well() -> None:
+    policy = case.policy()
+    policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=47_000))
+    codec = Codec(0, 0)
+    mute = {"EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "PARAM_VALUE"}
+
+    def silent(vehicle: VirtualVehicle) -> None:
+        vehicle.hurt = lambda frame: [] if any(each.name in mute for each in codec.parse(frame)) else [frame]
+
+    found = examine(case.simulated("ardupilot"), policy, prepare=silent)
+    assert found["vehicle/down"].verdict is Verdict.UNKNOWN
+    assert found["mission/place"].verdict is Verdict.UNKNOWN
+    mute.remove("GLOBAL_POSITION_INT")
+    found = examine(case.simulated("ardupilot"), policy, prepare=silent)
+    assert found["mission/place"].verdict is Verdict.UNKNOWN
+    assert "RTL_ALT" in found["mission/place"].found
+
+
+BEAT = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
+
+
+@pytest.mark.parametrize("elsewhere", [False, True], ids=["same sender", "another sender"])
+def test_another_vehicle_at_the_port(elsewhere: bool) -> None:
+    other = Codec(2, 1)
+
+    def crowded(vehicle: VirtualVehicle) -> None:
+        def also(frame: bytes) -> list[bytes]:
+            if elsewhere and vehicle.driver.flavour is not None:
+                vehicle.driver.overhear(other.pack(BEAT), vehicle.clock.now().monotonic_us)
+            return [frame] if elsewhere else [frame, other.pack(BEAT)]
+
+        vehicle.hurt = also
+
+    found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
+    assert found["link/other-vehicle"].verdict is Verdict.STOP
+    assert "system 2" in found["link/other-vehicle"].found
+
+
+def test_two_vehicles_of_one_id() -> None:
+    twin = Codec(1, 1)
+
+    def crowded(vehicle: VirtualVehicle) -> None:
+        def also(frame: bytes) -> list[bytes]:
+            if vehicle.driver.flavour is not None:
+                vehicle.driver.overhear(twin.pack(BEAT), vehicle.clock.now().monotonic_us)
+            return [frame]
+
+        vehicle.hurt = also
+
+    found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
+    assert "an id of its own" in found["link/other-vehicle"].found
+    assert found["link/loss"].verdict is Verdict.OK, "the other one's frames are not counted as this one's"

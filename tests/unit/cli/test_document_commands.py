@@ -121,8 +121,32 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     damaged[len(damaged) // 2] ^= 1
     (here / "damaged.bundle").write_bytes(damaged)
     says(ExitCode.UNTRUSTED, "key", "approve", "damaged.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "has 4 steps", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "99")
     assert not (here / "x").exists()
     assert not (here / "other.replacement").exists()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "show cut.bundle",
+        "why cut.bundle --step 0",
+        "run cut.bundle --runs r",
+        "doctor --connect udpin:127.0.0.1:14999 cut.bundle",
+        "approve cut.bundle --step 2 -o x",
+        "recall cut.bundle -o x",
+        "compile shorter.rts --replaces cut.bundle --from 1",
+    ],
+)
+def test_a_bundle_that_was_cut_is_malformed_for_everybody(
+    words: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "cut.bundle").write_bytes((here / "low.bundle").read_bytes()[:-100])
+    assert main(words.split()) == ExitCode.INPUT
+    assert "error: " in capsys.readouterr().err
+    assert main([*words.split(), "--json"]) == ExitCode.INPUT
+    found = json.loads(capsys.readouterr().out)
+    assert "malformed" in (found.get("slug"), found.get("error", {}).get("slug"))
 
 
 @pytest.fixture

@@ -1,15 +1,24 @@
 """`show`, `why` and `verify-log` on a log with documents: the steps are those in force, and no signature is printed."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from reference.documents import approval, hand, low, recall, replacement
-from reference.flat_case import S
-from reference.world import ROOT_KEY, TICK, Run
+from reference.flat_case import BATTERY, WIND, S
+from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
 from rtshcua.cli.app import main
+from rtshcua.cli.live.telling import NOTHING_FLIES, Teller
+from rtshcua.cli.showing.log import Names
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Interrupted
+from rtshcua.wire.keys import SigningKey
+from rtshcua.wire.request import STEP
 
 
 @pytest.fixture
@@ -32,8 +41,11 @@ def log(tmp_path: Path) -> Path:
 def test_a_timeline_names_the_steps_that_are_in_force(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", str(log)]) == ExitCode.OK
     out = capsys.readouterr().out
-    assert "letters, signed" in out
-    assert max(map(len, out.splitlines())) < 200
+    assert "granted as supervisor, good until" in out
+    assert f"key {APPROVAL_KEY.kid.hex()}" in out
+    assert "calls home the mission" in out
+    assert "steps, new from step 2" in out
+    assert max(map(len, out.splitlines())) < 240
     assert "step 2 `step 3`" in out, "the last step, which is the third one now"
 
 
@@ -62,3 +74,134 @@ def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture
     assert main(["verify-log", str(log), "--root", ROOT_KEY.public.hex(), "--json"]) == ExitCode.OK
     proven = {claim["slug"]: claim["text"] for claim in json.loads(capsys.readouterr().out)["proven"]}
     assert proven["documents"].startswith("1 approval, 1 recall, 1 replacement, ")
+
+
+@pytest.mark.parametrize(
+    ("make", "key", "words"),
+    [
+        (approval, APPROVAL_KEY, "granted as supervisor, good until"),
+        (lambda of: approval(of, granted=0), APPROVAL_KEY, "refused as supervisor"),
+        (recall, APPROVAL_KEY, "calls home the mission"),
+        (replacement, MISSION_KEY, "new from step 2"),
+    ],
+)
+def test_a_document_is_shown_and_a_run_says_where_it_goes(
+    make: Callable[[Loaded], bytes], key: SigningKey, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.document"
+    path.write_bytes(make(low()))
+    assert main(["show", str(path)]) == ExitCode.OK
+    out = " ".join(capsys.readouterr().out.split())
+    assert words in out
+    assert f"key {key.kid.hex()}" in out
+    assert main(["show", str(path), "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["key"] == key.kid.hex()
+    assert main(["run", str(path), "--runs", str(tmp_path / "runs")]) == ExitCode.INPUT
+    assert "hand" in capsys.readouterr().err
+
+
+def test_the_summary_counts_every_decision_as_the_log_does() -> None:
+    run = Run(low()).until_flies("goto")
+    assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
+    run.tick(Interrupted(run.clock.now().monotonic_us))
+    run.until_over()
+    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
+    counts = dict.fromkeys(teller.outcomes, 0)
+    for line in run.lines:
+        what, record = teller.tell(line), json.loads(line)
+        if record["type"] == "decision":
+            counts[record["outcome"]] += 1
+        if record.get("event") == "approval":
+            assert what is not None
+            assert what.detail.startswith("granted as supervisor")
+    assert teller.outcomes == counts
+    assert counts["allow"] > 2, "both steps, and the links of what flew then"
+
+
+@pytest.fixture
+def broken_off(tmp_path: Path) -> Path:
+    """Approved in the air, then stopped by Ctrl-C: the contingency brings it down."""
+    run = Run(low()).until_flies("goto")
+    assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
+    run.until_flies("inspect_area")
+    run.tick(Interrupted(run.clock.now().monotonic_us))
+    run.until_over()
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(b"".join([*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]))
+    return path
+
+
+def test_why_tells_what_ended_a_flight_and_who_answered(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(broken_off)]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "granted as supervisor, 2" in out, "in the step that asks for it, with the time"
+    assert "What was answered about this step" in out
+    assert "How it ended" in out
+    assert "· interrupted" in out
+    assert "interrupted" in out.splitlines()[-1]
+
+
+def test_why_explains_every_record(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kinds: dict[int, int] = {}
+    for line in broken_off.read_bytes().splitlines():
+        record = json.loads(line)
+        if record["type"] == "genesis":
+            continue
+        assert main(["why", str(broken_off), "--record", str(record["seq"]), "--json"]) == ExitCode.OK
+        shown = json.loads(capsys.readouterr().out)
+        assert shown["record"] == record["seq"]
+        if record["type"] == "decision":
+            kinds[record["kind"]] = record["seq"]
+            assert shown["outcome"] == record["outcome"]
+            if record["kind"] != STEP:
+                assert shown["admissible"] is (record["outcome"] == "allow")
+                assert set(shown["state"]) == {signal.name for signal in low().bundle.policy.signals}
+        elif record["type"] == "effect":
+            assert shown["event"] == record["event"]
+    assert set(kinds) > {STEP}
+    link = next(seq for kind, seq in kinds.items() if kind != STEP)
+    assert main(["why", str(broken_off), "--record", str(link)]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "The state, as recorded" in out
+    assert "The chain, in order" in out
+
+
+def test_a_step_refused_on_the_ground_flies_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vehicle = FakeVehicle()
+    vehicle.values[BATTERY] = 2_000
+    run = Run(vehicle=vehicle).until_over()
+    assert run.flown == []
+    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
+    told = [what for what in map(teller.tell, run.lines) if what is not None and what.outcome == "fallback"]
+    assert told
+    assert all(what.target in ("", NOTHING_FLIES) for what in told)
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(b"".join(run.lines))
+    assert main(["why", str(path)]) == ExitCode.OK
+    assert "flies         nothing: it had not left the ground" in capsys.readouterr().out
+
+
+def test_a_number_in_a_log_says_what_it_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vehicle = FakeVehicle()
+    vehicle.values[WIND] = None
+    run = Run(vehicle=vehicle)
+    for _ in range(40):
+        run.tick()
+    run.tick(Interrupted(run.clock.now().monotonic_us))
+    run.until_over()
+    (count,) = [str(record["detail"]) for record in run.records if record.get("event") == "repeated"]
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(b"".join(run.lines))
+    assert main(["show", str(path)]) == ExitCode.OK
+    assert f"the same answer again, {count} times" in capsys.readouterr().out
+    assert main(["why", str(path)]) == ExitCode.OK
+    assert " us " not in capsys.readouterr().out
+
+
+def test_the_target_of_a_degrade_rule_is_named_as_such() -> None:
+    run = Run(low()).until_flies("goto")
+    run.vehicle.values[BATTERY] = 2_400
+    run.until_over()
+    names = Names(None)
+    told = [names.tell(record) for record in map(read, run.lines) if not isinstance(record, Flaw)]
+    assert any("target of the degrade rule, at step 1" in line for line in told)

@@ -29,7 +29,7 @@ def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
 def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
     (first, *others) = POLICY.signals
     signals = (replace(first, sources=(SignalSource("BATTERY_STATUS", ("nope",), 1, 1, ()),)), *others)
-    order: Any = SimpleNamespace(fence=True, dry_run=False)
+    order: Any = SimpleNamespace(fence=True, dry_run=False, system=None)
     signing: Any = SimpleNamespace(verifier=None)
     with pytest.raises(launch.Refused, match=r"`BATTERY_STATUS\.nope`") as refused:
         launch._driver(order, loaded(replace(POLICY, signals=signals), MISSION), 1, signing)

@@ -14,14 +14,16 @@ from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.signing import LinkStore, read_link_key, write_link_key
 from rtshcua.adapters.vehicle import address
 from rtshcua.cli import app, launch
+from rtshcua.cli.meeting import unmet
 from rtshcua.cli.signing import Signing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.frames import Codec
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.radio import UnsignedRadio
-from rtshcua.mavlink.signing import SignedLink
+from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
+from virtual import case
 from virtual.policy import POLICY
 
 KEY = bytes(range(32))
@@ -109,7 +111,8 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
     asked: Any = order
     with pytest.raises(launch.Refused) as refused:
         launch._sign(asked, of, SystemClock())
-    assert (refused.value.code, refused.value.slug) == (ExitCode.UNTRUSTED, f"link-key-{what}")
+    code = ExitCode.INPUT if what == "malformed" else ExitCode.UNTRUSTED
+    assert (refused.value.code, refused.value.slug) == (code, f"link-key-{what}")
     if what == "in-use":
         store.close()
     if what == "damaged":
@@ -128,3 +131,41 @@ def test_a_link_without_a_key_that_others_may_reach_is_told_of(tmp_path: Path, l
 def test_letting_the_radio_in_goes_with_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["run", str(tmp_path / "b"), "--unsigned-radio"]) == ExitCode.USAGE
     assert "--signing-key" in capsys.readouterr().err
+
+
+def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Path) -> None:
+    clock = SystemClock()
+    signing = Signing(key_file, POLICY, FrameSession(), tmp_path, clock, unsigned_radio=False)
+    now = clock.now()
+    link, other = signing.verifier, SignedLink(bytes(range(1, 33)), State(0, {}), now.utc_us, now.monotonic_us)
+    assert isinstance(link, SignedLink)
+    assert signing.rejected is None, "nothing came"
+    link.accept(HEARTBEAT, now.monotonic_us)
+    assert signing.rejected == "frames come, and none is believed: 1 not signed"
+    link.accept(other.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)
+    assert "1 signed with another key, 1 not signed" in (signing.rejected or "")
+    text, help = unmet("a vehicle", 10, None, signing.rejected)
+    assert text.startswith("no heartbeat of a vehicle within 10 s: frames come")
+    assert "--signing-key" in help
+    right = SignedLink(KEY, State(0, {}), now.utc_us, now.monotonic_us, link=1)
+    assert link.accept(right.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)
+    assert signing.rejected is None
+    signing.close()
+
+
+@pytest.mark.parametrize(("let_in", "dry", "flies"), [(False, False, False), (False, True, True), (True, False, True)])
+def test_a_mission_that_would_wait_for_the_radio_in_vain_does_not_begin(
+    tmp_path: Path, key_file: Path, let_in: bool, dry: bool, flies: bool
+) -> None:
+    of = loaded(case.policy(), case.mission(case.short_steps()))
+    frames = of.executor.frames
+    signing = Signing(key_file, of.bundle.policy, frames, tmp_path, SystemClock(), unsigned_radio=let_in)
+    order: Any = SimpleNamespace(dry_run=dry)
+    if flies:
+        launch._hear(order, of, signing)
+    else:
+        with pytest.raises(launch.Refused, match="RADIO_STATUS") as refused:
+            launch._hear(order, of, signing)
+        assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "signal-unsigned")
+        assert "--unsigned-radio" in (refused.value.help or "")
+    signing.close()

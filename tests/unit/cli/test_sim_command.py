@@ -78,13 +78,15 @@ def test_a_key_reaches_the_vehicle_and_never_the_command_line(
     assert config_of(parser().parse_args(FakeSimulator.words)).signing_key == KEY
 
 
-@pytest.mark.parametrize(("content", "mode"), [(KEY, 0o644), (b"short", 0o600)])
+@pytest.mark.parametrize(
+    ("content", "mode", "code"), [(KEY, 0o644, ExitCode.UNTRUSTED), (b"short", 0o600, ExitCode.INPUT)]
+)
 def test_a_key_that_does_not_serve(
-    tmp_path: Path, content: bytes, mode: int, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, content: bytes, mode: int, code: ExitCode, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = key_file(tmp_path, mode)
     path.write_bytes(content)
-    assert command.sim(signing_key=path) == ExitCode.INPUT
+    assert command.sim(signing_key=path) == code, "as `run` and `doctor` say it"
     assert str(path) in capsys.readouterr().err
     assert command.sim(signing_key=tmp_path / "none") == ExitCode.INPUT
 

@@ -96,6 +96,21 @@ def test_another_root(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "FAILED  at record 0, line 1: trust/root-unknown-key" in capsys.readouterr().out
 
 
+def test_a_log_under_another_root_is_told_whole_and_how_to_trust_it(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert verify(run) == ExitCode.OK
+    duration = re.search(r", (\d+\.\d) s, mode", capsys.readouterr().out)
+    assert duration is not None
+    assert app.main(["verify-log", str(run), "--root", "00" * 32]) == ExitCode.UNTRUSTED
+    out = capsys.readouterr().out
+    assert duration.group() in out
+    assert "Not trusted here" in out
+    assert "`--root` takes that trust root" in out
+    assert app.main(["verify-log", str(run), "--json", "--root", "00" * 32]) == ExitCode.UNTRUSTED
+    assert "`--root`" in json.loads(capsys.readouterr().out)["failure"]["help"]
+
+
 def test_a_changed_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = list(flight())
     lines[4] = edit(lines[4], event="failed")
@@ -165,6 +180,20 @@ def test_the_telemetry_beside_the_log(run: Path, capsys: pytest.CaptureFixture[s
     (run / "telemetry.tlog").unlink()
     assert verify(run) == ExitCode.OK
     assert "`telemetry.tlog` does not lie beside the log" in capsys.readouterr().out.replace("\n    ", " ")
+
+
+def test_telemetry_that_was_not_whole_is_not_vouched_for(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (run / "telemetry.tlog").write_bytes(b"some frames")
+    assert verify(run) == ExitCode.OK
+    assert "the log does not vouch for `telemetry.tlog`" in capsys.readouterr().out
+
+
+def test_nothing_vouches_for_the_summary(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert verify(run) == ExitCode.OK
+    assert "summary.json" not in capsys.readouterr().out
+    (run / "summary.json").write_text("{}")
+    assert verify(run) == ExitCode.OK
+    assert "- `summary.json`: nothing signs it" in capsys.readouterr().out
 
 
 def test_as_json(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,9 +2,11 @@
 
 import errno
 import hashlib
+import io
 import json
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import pytest
 
@@ -67,6 +69,58 @@ def test_a_full_disk_ends_the_telemetry_and_not_the_flight(size: int, tmp_path: 
     assert file.finish() == hashlib.sha256(b"").digest()
     assert file.error is not None
     assert file.error.errno == errno.ENOSPC
+    assert file.lost == 3
+
+
+@pytest.mark.parametrize("size", [1, 10 * (8 + len(FRAME)) + 5, 1 << 17])
+def test_what_a_full_disk_took_ends_at_a_whole_frame_and_the_rest_is_counted(size: int, tmp_path: Path) -> None:
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
+    raw = file._file.detach()
+
+    class Disk(io.RawIOBase):
+        left = size
+
+        def writable(self) -> bool:
+            return True
+
+        def write(self, data: Any) -> int:
+            if not self.left:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            taken = raw.write(bytes(data[: self.left]))
+            self.left -= taken
+            return int(taken)
+
+        def close(self) -> None:
+            raw.close()
+
+    file._file = io.BufferedWriter(Disk(), 1 << 16)
+    for number in range(6_000):
+        file.write(UTC_US + number, FRAME)
+    digest = file.finish()
+    data = (tmp_path / "telemetry.tlog").read_bytes()
+    kept = size // (8 + len(FRAME))
+    assert [entry.at_us for entry in tlog.read(data)] == [UTC_US + number for number in range(kept)]
+    assert (file.lost, digest) == (6_000 - kept, hashlib.sha256(data).digest())
+
+
+def test_the_last_room_on_the_disk_is_left_to_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
+    monkeypatch.setattr(telemetry, "free_bytes", lambda folder: telemetry.LEFT_TO_THE_LOG - 1)
+    file.write(UTC_US, FRAME)
+    assert file.finish() == hashlib.sha256(b"").digest()
+    assert file.error is not None
+    assert (file.error.errno, file.lost) == (errno.ENOSPC, 1)
+
+
+def test_a_disk_that_does_not_say_how_much_room_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(folder: Path) -> int:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
+    monkeypatch.setattr(telemetry, "free_bytes", refuse)
+    file.write(UTC_US, FRAME)
+    file.finish()
+    assert (file.error, file.lost) == (None, 0)
 
 
 def test_nobody_waits_for_a_disk_that_stands_still(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

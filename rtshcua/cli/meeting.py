@@ -1,0 +1,58 @@
+"""The vehicle is met: its first heartbeat, that it is the only one, and what is said when it is not heard."""
+
+import time
+from typing import Final
+
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.vehicle.address import Address
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.refused import Refused
+from rtshcua.cli.signing import Signing
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.onboard.ports import Event
+
+#: How long a heartbeat is waited for, in seconds,
+HEARTBEAT_S = 10.0
+#: and another vehicle's, which comes each second; from then on it only keeps this one from being ready
+ANOTHER_S = 1.5
+
+PORT_HELP: Final = "another program may listen there; a vehicle can be told to send to another port"
+
+_POLL_S = 0.05
+_HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"
+_KEY_HELP: Final = "has the vehicle the key of `--signing-key`, and are both clocks right?"
+_SYSTEM_HELP: Final = "`--system` names another id, or leave it out"
+
+
+def unmet(where: str, seconds: float, system: int | None, rejected: str | None) -> tuple[str, str]:
+    """That no heartbeat came within so many seconds, and what to do. `rejected` is what came and was not believed."""
+    of = where if system is None else f"system {system} of {where}"
+    text = f"no heartbeat of {of} within {seconds:.0f} s"
+    if rejected is not None:
+        return f"{text}: {rejected}", _KEY_HELP
+    return text, _HELP if system is None else _SYSTEM_HELP
+
+
+def meet(
+    link: Address | None, system: int | None, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts,
+    signing: Signing,
+) -> list[Event]:  # fmt: skip
+    """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
+    nothing begins; what happened meanwhile. `link` None: our own simulated vehicle. Raises `Refused`.
+    """
+    events: list[Event] = []
+    until_s = time.monotonic() + HEARTBEAT_S
+    while vehicle.driver.flavour is None:
+        if interrupts.wish() is not None:
+            raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
+        if time.monotonic() > until_s:
+            where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
+            raise Refused(ExitCode.LINK, "no-vehicle", *unmet(where, HEARTBEAT_S, system, signing.rejected))
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    until_s = time.monotonic() + (0 if link is None else ANOTHER_S)
+    while time.monotonic() < until_s and vehicle.driver.link.crowd is None:
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    if vehicle.driver.link.crowd is not None:
+        raise Refused(ExitCode.REFUSED, "two-vehicles", vehicle.driver.link.crowd, "one vehicle to a port is safest")
+    return events

@@ -1,0 +1,102 @@
+"""A signed document for a flight under way, in words: who says what about which step. Nothing is verified here."""
+
+from base64 import b64decode
+from typing import NamedTuple
+
+from rtshcua.cli.showing.named import named
+from rtshcua.cli.showing.page import Page
+from rtshcua.cli.shown import utc
+from rtshcua.model.flat.struct import Flat
+from rtshcua.wire import cose, names
+from rtshcua.wire.approval import ApprovalDocument
+from rtshcua.wire.bundle import parse
+from rtshcua.wire.document import kind_of
+from rtshcua.wire.names import Artefact
+from rtshcua.wire.recall import RecallDocument
+from rtshcua.wire.replacement import ReplacementDocument
+from rtshcua.wire.untrusted import Untrusted
+
+#: how each kind is handed to a flight
+HANDED_IN = {
+    names.APPROVAL: "`rtshcua approve --to` hands one to a flight",
+    names.RECALL: "`rtshcua recall --to` hands one to a flight",
+    names.REPLACEMENT: "`rtshcua replace` hands it to a flight under way",
+}
+_NAMES = {names.APPROVAL: "approval", names.RECALL: "recall", names.REPLACEMENT: "replacement"}
+_SHAPES: dict[Artefact, type[Flat]] = {
+    names.APPROVAL: ApprovalDocument,
+    names.RECALL: RecallDocument,
+    names.REPLACEMENT: ReplacementDocument,
+}
+
+
+class Said(NamedTuple):
+    """What a document says, and the key that it says signed it."""
+
+    kind: Artefact
+    kid: bytes
+    body: Flat
+
+    @property
+    def text(self) -> str:
+        """One line: the answer, who gives it, and until when it is good."""
+        return f"{_body(self.body)}; key {self.kid.hex()}"
+
+
+def said(document: bytes) -> Said:
+    """Takes a document apart without trusting it. Raises `Untrusted`."""
+    kind = kind_of(document)
+    envelope = cose.unverified(document)
+    return Said(kind, envelope.kid, parse(kind, envelope.payload, _SHAPES[kind]))
+
+
+def recorded(detail: str) -> str:
+    """What a document in a log says, in one line; what is wrong with it where it makes no sense."""
+    try:
+        return said(b64decode(detail, validate=True)).text
+    except (ValueError, Untrusted):
+        return "what it holds is no document"
+
+
+def kind_of_document(data: bytes) -> Artefact | None:
+    """Which kind of document these bytes are, if they are one."""
+    try:
+        return kind_of(data)
+    except Untrusted:
+        return None
+
+
+def show_document(page: Page, data: bytes) -> dict[str, object]:
+    """Adds a document to the page, and gives it for a program. Raises `Untrusted`."""
+    what = said(data)
+    kind = _NAMES[what.kind]
+    page.head(f"{kind.capitalize()} of {len(data)} bytes (not verified: the flight does that)")
+    page.row("says", _body(what.body))
+    page.row("signed by", f"key {what.kid.hex()}")
+    match what.body:
+        case ApprovalDocument() as answer:
+            page.row("vehicle", answer.vehicle)
+            page.row("step's id", answer.invocation_id.hex())
+            page.row("issued", utc(answer.issued_at_us))
+        case RecallDocument() as recall:
+            page.row("vehicle", recall.vehicle)
+            page.row("issued", utc(recall.issued_at_us))
+        case ReplacementDocument() as newer:
+            page.row("supersedes", newer.supersedes.hex())
+            for step in newer.mission.invocations:
+                page.row("stays" if step.step < newer.kept else "new", f"step {step.step} {step.text}")
+    page.row("use", HANDED_IN[what.kind])
+    return {"kind": kind, "verified": False, "key": what.kid.hex(), "text": what.text, "said": named(what.body)}
+
+
+def _body(body: Flat) -> str:
+    match body:
+        case ApprovalDocument(granted=granted, role=role, expires_at_us=until):
+            return f"{'granted' if granted else 'refused'} as {role}, good until {utc(until)}"
+        case RecallDocument(mission=mission, policy=policy, expires_at_us=until):
+            whom = f"the mission {mission.hex()}" if mission else f"all under the policy {policy.hex()}"
+            return f"calls home {whom}, good until {utc(until)}"
+        case ReplacementDocument(mission=mission, kept=kept):
+            return f"`{mission.name}`, {len(mission.invocations)} steps, new from step {kept}"
+        case _:
+            return ""

@@ -1,0 +1,59 @@
+"""A mission under its policy, ready to be decided on, and how it is had from a bundle that nobody verifies here."""
+
+from typing import NamedTuple
+
+from rtshcua.cli.faults import code_of, fail
+from rtshcua.cli.showing.bundle import claimed, replaced
+from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.untrusted import Untrusted
+
+
+class Subject(NamedTuple):
+    """A mission under its policy, ready to be decided on."""
+
+    policy: PreparedPolicy
+    mission: Mission
+    invocations: tuple[PreparedInvocation, ...]
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """The names of the mission's phases."""
+        return self.mission.phases
+
+
+def unpacked(data: bytes, name: str) -> Subject | ExitCode:
+    """What a bundle is about; an exit code where it is none, which was told."""
+    try:
+        bundle = claimed(data)
+    except Untrusted as error:
+        code = code_of(error.slug)
+        return fail(
+            code,
+            f"{name}: {error}",
+            "accepted: a source (.rts, .json), a bundle, a log or a run's folder",
+            slug=error.slug,
+        )
+    return prepared(bundle.policy, bundle.mission)
+
+
+def prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
+    """Both made ready, as on board."""
+    ready = prepare(policy)
+    invocations = ready if isinstance(ready, Malformed) else prepare_mission(mission, ready)
+    if isinstance(ready, Malformed) or isinstance(invocations, Malformed):
+        what = ready.what if isinstance(ready, Malformed) else ""
+        return fail(ExitCode.INPUT, f"this would be refused on board: {what}")
+    return Subject(ready, mission, invocations)
+
+
+def after(subject: Subject, detail: str) -> Subject | ExitCode:
+    """The mission after a recorded replacement; the steps that stay keep their bindings."""
+    try:
+        mission = replaced(detail, subject.mission)
+    except Untrusted as error:
+        return fail(ExitCode.INPUT, f"a replacement in the log: {error}")
+    return prepared(subject.policy.policy, mission)

@@ -1,0 +1,170 @@
+"""`rtshcua why` on a log: one decision on a step or a link, from the inputs that it records, and what ended the flight.
+
+Without a number it is the last decision on a step that was not `allow`, else the last on a step.
+"""
+
+from base64 import b64decode
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.files.logs import lines
+from rtshcua.cli.faults import fail
+from rtshcua.cli.showing.link import show_link
+from rtshcua.cli.showing.log import Names
+from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.why import Case, show_why
+from rtshcua.cli.shown import utc
+from rtshcua.cli.subject import Subject, after, unpacked
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
+from rtshcua.ground.why.link import of_contingency, trace_link
+from rtshcua.ground.why.recorded import context_of, now_of, state_of
+from rtshcua.ground.why.trace import trace
+from rtshcua.wire.request import STEP
+
+#: effects that turn a flight homeward, or end it
+_TURNS = frozenset({
+    "violated", "failed", "taken-over", "interrupted", "recall", "gap", "link-lost", "stranded", "not-landed",
+    "resumed", "already-airborne", "left", "refused", "undecided", "stood-down",
+})  # fmt: skip
+_MOST = 20  # what is told of how it ended, in records
+
+
+class _Told(NamedTuple):
+    """A record in one line."""
+
+    seq: int
+    at_us: int
+    what: str
+
+
+class _Log:
+    """What a log holds that an explanation needs, read once; `number` is the record that is asked for."""
+
+    def __init__(self, path: Path, number: int | None) -> None:
+        self.start_us = 0
+        self.chosen: Decision | Effect | Close | None = None
+        self.subject: Subject | None = None  # the mission in force when the chosen record was written
+        self.aloft = False  # something was sent before the chosen record that may have lifted it off
+        self.ended: list[_Told] = []
+        self.answers: list[tuple[int, _Told]] = []  # approvals, by their step
+        self._path, self._number = path, number
+        self._names = Names(None)
+        self._in_force: Subject | None = None
+        self._flown = False
+
+    def read(self) -> ExitCode | None:
+        """Read all of it; an exit code where it makes no sense, which was told."""
+        with self._path.open("rb") as opened:
+            for line in lines(opened):
+                record = read(line)
+                if isinstance(record, Flaw):
+                    break
+                refused = self._take(record)
+                if refused is not None:
+                    return refused
+        return None
+
+    def _take(self, record: AnyRecord) -> ExitCode | None:
+        if isinstance(record, Genesis):
+            found = unpacked(b64decode(record.bundle), f"the bundle in `{self._path}`")
+            if isinstance(found, ExitCode):
+                return found
+            self.start_us, self._in_force, self._names = record.at_us, found, Names.of(record)
+            return None
+        self._names.follow(record)
+        self._choose(record)
+        if isinstance(record, Effect):
+            self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
+        if isinstance(record, Decision):
+            if record.kind != STEP:
+                self.ended.append(self._tell(record))
+        elif isinstance(record, Close):
+            self.ended.append(self._tell(record))
+        elif record.event == "approval":
+            self.answers.append((record.step, self._tell(record)))
+        elif record.event in _TURNS:
+            self.ended.append(self._tell(record))
+        elif record.event == "replacement" and self._in_force is not None:
+            newer = after(self._in_force, record.detail)
+            if isinstance(newer, ExitCode):
+                return newer
+            self._in_force = newer
+        return None
+
+    def _tell(self, record: Decision | Effect | Close) -> _Told:
+        return _Told(record.seq, record.at_us, self._names.tell(record))
+
+    def _choose(self, record: Decision | Effect | Close) -> None:
+        if self._number is not None:
+            if record.seq == self._number:
+                self._hold(record)
+            return
+        if not isinstance(record, Decision) or record.kind != STEP:
+            return
+        held = self.chosen
+        if not isinstance(held, Decision) or held.outcome == "allow" or record.outcome != "allow":
+            self._hold(record)
+
+    def _hold(self, record: Decision | Effect | Close) -> None:
+        self.chosen, self.subject, self.aloft = record, self._in_force, self._flown
+
+
+def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | ExitCode:
+    """Adds the record asked for to the page, and what ended the flight."""
+    log = _Log(path, number)
+    refused = log.read()
+    if refused is not None:
+        return refused
+    chosen, subject = log.chosen, log.subject
+    if chosen is None or subject is None:
+        what = "no decision on a step" if number is None else f"no decision or effect with the number {number}"
+        return fail(ExitCode.INPUT, f"`{path}` has {what}", "`rtshcua show` lists the records with their numbers")
+    page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
+    shown = _decision(page, chosen, subject, log.aloft) if isinstance(chosen, Decision) else _effect(page, chosen, log)
+    if isinstance(shown, ExitCode):
+        return shown
+    answers = [told for step, told in log.answers if isinstance(chosen, Decision) and step == chosen.step]
+    _list(page, "What was answered about this step", answers, log.start_us)
+    _list(page, "How it ended: what turned it homeward, and what was then decided", log.ended[-_MOST:], log.start_us)
+    return shown | {
+        "record": chosen.seq,
+        "answers": [told._asdict() for told in answers],
+        "ended": [told._asdict() for told in log.ended],
+    }
+
+
+def _decision(page: Page, chosen: Decision, subject: Subject, aloft: bool) -> dict[str, object] | ExitCode:
+    state = state_of(chosen)
+    if len(state.values) != subject.policy.policy.slots or len(state.ages) != len(state.values):
+        return fail(ExitCode.INPUT, f"record {chosen.seq} has a state of another policy")
+    there = 0 <= chosen.step < len(subject.invocations)
+    if chosen.kind == STEP and there:
+        invocation = subject.invocations[chosen.step]
+        case = Case(invocation, state, context_of(chosen), now_of(chosen), subject.phases, aloft)
+        return show_why(page, trace(invocation, state, subject.policy, case.context, case.now), case)
+    if chosen.kind != STEP and (there or of_contingency(chosen)):
+        of = None if of_contingency(chosen) else subject.invocations[chosen.step]
+        found = trace_link(chosen, of, subject.policy)
+        if found is not None:
+            return show_link(page, chosen, found, of, subject.policy.policy)
+    return fail(ExitCode.INPUT, f"record {chosen.seq} decides on a step or link that the bundle does not have")
+
+
+def _effect(page: Page, chosen: Effect | Close, log: _Log) -> dict[str, object]:
+    told = next((each for each in log.ended if each.seq == chosen.seq), None)
+    event = chosen.event if isinstance(chosen, Effect) else "close"
+    detail = chosen.detail if isinstance(chosen, Effect) else chosen.ending
+    page.head(f"{event}: something that happened, not a decision")
+    page.row("says", told.what if told is not None else detail)
+    return {"kind": "why", "event": event, "detail": detail}
+
+
+def _list(page: Page, title: str, told: list[_Told], start_us: int) -> None:
+    if not told:
+        return
+    page.head(title)
+    for each in told:
+        page.text(f"{each.seq:>5} {(each.at_us - start_us) / 1_000_000:>10.3f} s  {each.what}")

@@ -1,0 +1,63 @@
+"""A decision on a link, of a step's fallback or of the contingency: what it looked at, and what else might have flown.
+
+Links skip most steps of design 4.1 (`decision.links`): their own `require`, and the airspace where they move.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rtshcua.decision.case import environment, situation
+from rtshcua.decision.evaluate import NO_PHASE
+from rtshcua.decision.link import PreparedLink
+from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.truth import EVERYWHERE
+from rtshcua.evidence.records import Decision
+from rtshcua.ground.why.recorded import now_of, state_of
+from rtshcua.ground.why.trace import Check, Tried
+from rtshcua.model.flat.policy import Rule
+from rtshcua.wire.request import CONTINGENCY_LINK
+
+
+class LinkTrace(NamedTuple):
+    """The link asked for, the `degrade` rule that it is the target of (None: of a chain), its conditions with their
+    truths, whether it may fly, and every link of its chain.
+    """
+
+    link: PreparedLink
+    rule: Rule | None
+    checks: tuple[Check, ...]
+    admissible: bool
+    chain: tuple[Tried, ...]
+
+
+def trace_link(record: Decision, invocation: PreparedInvocation | None, policy: PreparedPolicy) -> LinkTrace | None:
+    """The decision once more, from what its record holds; None for a link that the bundle does not have.
+
+    `invocation` is the step whose fallback it is, None for a link of the contingency.
+    """
+    state, now = state_of(record), now_of(record)
+    chain: Sequence[PreparedLink] = policy.contingency if invocation is None else invocation.chain
+    phase = NO_PHASE if invocation is None else invocation.phase
+    rule: Rule | None = None
+    if invocation is not None and record.link == DEGRADE:
+        choice = choose_fallback(invocation, state, policy, now)
+        rules = [
+            each for each in invocation.candidates.degrades if choice is not None and each.target.link is choice.link
+        ]
+        if choice is None or choice.index != DEGRADE or not rules:
+            return None
+        link, rule = rules[0].target, rules[0].rule
+    elif 0 <= record.link < len(chain):
+        link = chain[record.link]
+    else:
+        return None
+    at = environment(situation(state, policy, now), policy, link.arguments, phase)
+    checks = tuple(Check("require", clause, EVERYWHERE[condition(at)]) for clause, condition in link.require)
+    tried = tuple(Tried(each.link.text, link_admissible(each, state, policy, now, phase)) for each in chain)
+    return LinkTrace(link, rule, checks, link_admissible(link, state, policy, now, phase), tried)
+
+
+def of_contingency(record: Decision) -> bool:
+    """Whether a decision is about a link of the contingency, and so about no step."""
+    return record.kind == CONTINGENCY_LINK

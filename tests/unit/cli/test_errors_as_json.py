@@ -1,0 +1,85 @@
+"""`--json`: whatever goes wrong, a program finds one JSON object on the standard output that says what."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.cli import app, faults
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.untrusted import Untrusted
+
+
+@pytest.fixture(autouse=True)
+def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(tmp_path / "data"))
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "slug"),
+    [
+        ("run missing.bundle", ExitCode.INPUT, "input"),
+        ("doctor --connect nowhere", ExitCode.USAGE, "usage"),
+        ("doctor --connect udpin:127.0.0.1:1 missing.bundle", ExitCode.INPUT, "input"),
+        ("approve missing.bundle --step 0 --to x", ExitCode.UNTRUSTED, "no-keys"),
+        ("verify-log missing", ExitCode.UNTRUSTED, "no-keys"),
+        ("show missing", ExitCode.INPUT, "input"),
+        ("explain E9999", ExitCode.USAGE, "usage"),
+        ("show", ExitCode.USAGE, "usage"),
+        ("fly", ExitCode.USAGE, "usage"),
+    ],
+)
+def test_every_error_is_one_object(words: str, code: ExitCode, slug: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main([*words.split(), "--json"]) == code
+    said = capsys.readouterr()
+    found: dict[str, Any] = json.loads(said.out)
+    assert set(found) == {"error", "exit_code"}
+    assert set(found["error"]) == {"slug", "text", "help"}
+    assert (found["exit_code"], found["error"]["slug"]) == (code, slug)
+    assert said.err.splitlines()[0] == f"error: {found['error']['text']}", "a person still reads it"
+
+
+def test_without_json_the_output_stays_empty(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["show", "missing", "--json"]) == app.main(["show", "missing"]) == ExitCode.INPUT
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
+def test_a_word_after_the_options_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["show", "--", "--json"]) == ExitCode.INPUT
+    assert capsys.readouterr().out == ""
+
+
+def raising(error: BaseException) -> Callable[[], int]:
+    def command() -> int:
+        raise error
+
+    return command
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "slug"),
+    [
+        (KeyboardInterrupt(), ExitCode.INTERRUPTED, "interrupted"),
+        (Untrusted("expired", "it has expired"), ExitCode.UNTRUSTED, "expired"),
+        (Untrusted("malformed", "it is not CBOR"), ExitCode.INPUT, "malformed"),
+        (RuntimeError("odd"), ExitCode.FAULT, "fault"),
+    ],
+)
+def test_what_rises_to_the_barrier(
+    error: BaseException, code: ExitCode, slug: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with faults.as_json(wanted=True):
+        assert faults.barrier(raising(error)) == code
+    assert json.loads(capsys.readouterr().out)["error"]["slug"] == slug
+
+
+def test_an_output_that_refuses_the_error_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*words: object, **options: object) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr("builtins.print", refuse)
+    with faults.as_json(wanted=True):
+        assert faults.fail(ExitCode.INPUT, "nothing there") == ExitCode.INPUT

@@ -24,6 +24,7 @@ def test_nothing_that_strangers_send_changes_anything(flavour: str, keyed: bool)
     assert target.known() == before
     assert target.sent == []
     assert target.events == []
+    assert (target.driver.link.crowd is None) == keyed, "without a key, another vehicle is heard, and nothing begins"
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

@@ -19,6 +19,8 @@ AUTOPILOT = {"px4": 12, "ardupilot": 3}
 NEW = State(0, {})
 PLAIN = (int, float, str, bytes, type(None))
 COUNTED = ("counts", "damaged", "refused", "unknown", "foreign", "_policy")
+#: that another vehicle is heard, before a flight, is for people to know, and believed of nobody: see `Link.crowd`
+TOLD = ("found",)
 
 
 class Target:
@@ -77,7 +79,8 @@ def remembered(thing: object) -> object:
         return repr(thing) if isinstance(thing, PLAIN) else type(thing).__name__
     names = [*vars(thing)] if hasattr(thing, "__dict__") else []
     names += [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
-    return {name: remembered(getattr(thing, name)) for name in names if name not in COUNTED and hasattr(thing, name)}
+    kept = [name for name in names if name not in (*COUNTED, *TOLD) and hasattr(thing, name)]
+    return {name: remembered(getattr(thing, name)) for name in kept}
 
 
 def greeting(flavour: str) -> list[Any]:

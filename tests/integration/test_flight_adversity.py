@@ -181,11 +181,11 @@ def test_a_run_that_was_killed_in_the_air_comes_down_and_does_not_resume(ground:
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_sim_serves_a_run_and_ends_cleanly(ground: Any, port: int, flavour: str) -> None:
     vehicle = ground.start(
-        "sim", "--connect", f"udpout:127.0.0.1:{port}", "--flavour", flavour, "--speed", "50", "--json"
+        "sim", "--connect", f"udpout:127.0.0.1:{port}", "--flavour", flavour, "--speed", "20", "--json"
     )
     ready = vehicle.until("ready")
     assert (ready["flavour"], ready["peer"]) == (flavour, port)
-    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY, speed=50).end()
+    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY).end()
     assert run.code == 0, run.stderr
     vehicle.signal(signal.SIGINT)
     assert vehicle.end().code == 0

@@ -220,6 +220,10 @@ INSUFFICIENT_EVIDENCE = _code(
     "E1202", "insufficient-evidence", "what is recorded does not suffice to derive a decision again"
 )
 UNWATCHED = _code("E1203", "unwatched", "what must stay true reads nothing that can change in flight", Severity.WARNING)
+FLEETING_EVIDENCE = _code(
+    "E1204", "fleeting-evidence", "a record that a crash may take along is kept of what is no reflex"
+)
+TWO_DURABILITIES = _code("E1205", "two-durabilities", "a contract asks for records of more than one durability")
 
 # E13: habits
 UNUSED = _code("E1301", "unused", "something is declared and never used", Severity.WARNING)

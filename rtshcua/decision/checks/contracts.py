@@ -8,6 +8,7 @@ from rtshcua.decision.parameters import cells, first_cell, misfit
 from rtshcua.decision.reads import slots_read
 from rtshcua.decision.scope import Scope
 from rtshcua.decision.tree import parse
+from rtshcua.model.durability import BUFFERED, WORDS
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import (
     CHOICE,
@@ -53,6 +54,7 @@ def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
     ):
         yield from within(name, duration, 0, MAX_DURATION)
     yield from within("energy", contract.energy, 0, FULL)
+    yield from _record(contract)
     about = scope.about(contract)
     for name, clauses in (
         ("require", contract.require),
@@ -65,6 +67,15 @@ def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
     clauses = (*contract.require, *contract.assume, *contract.maintain)
     if contract.reads != slots_read(clauses, policy.vehicle, policy.monitors):
         yield "`reads` is not what the clauses read"
+
+
+def _record(contract: Contract) -> Iterator[str]:
+    """A record may be lost with the process only of what has no time to wait for it."""
+    written = [word for word in contract.record if word in WORDS]
+    if len(written) > 1:
+        yield f"recorded as `{written[0]}` and as `{written[1]}`"
+    if WORDS[BUFFERED] in written and contract.timing_class != TimingClass.REFLEX:
+        yield f"recorded as `{WORDS[BUFFERED]}`, which is for reflexes alone"
 
 
 def _parameters(contract: Contract, policy: Policy) -> Iterator[str]:

@@ -10,7 +10,7 @@ from rtshcua.decision.checks.vehicle import signals, vehicle
 from rtshcua.decision.checks.zones import zones
 from rtshcua.decision.scope import scope_of
 from rtshcua.model.flat.limits import MAX_CONTRACTS, MAX_MEMBERS, MAX_ROLES, MAX_SETS
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, WithoutEvidence
 
 
 def problems(policy: Policy) -> Iterator[str]:
@@ -33,3 +33,4 @@ def problems(policy: Policy) -> Iterator[str]:
     yield from at("contingency", chain(policy.contingency, policy))
     yield from rules(policy, scope)
     yield from at("airspace", airspace(policy.airspace, policy))
+    yield from within("without evidence", policy.without_evidence, WithoutEvidence.LAND, WithoutEvidence.REFUSE)

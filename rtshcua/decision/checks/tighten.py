@@ -3,6 +3,8 @@
 from collections import Counter
 from collections.abc import Iterator
 
+from rtshcua.decision.durability import recorded_as
+from rtshcua.model.durability import WORDS
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Link
 
@@ -24,7 +26,8 @@ def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
         ("require", _codes(mine.require) >= _codes(policys.require)),
         ("assume", _codes(mine.assume) >= _codes(policys.assume)),
         ("maintain", _codes(mine.maintain) >= _codes(policys.maintain)),
-        ("record", set(mine.record) >= set(policys.record)),
+        ("record", {*mine.record, *WORDS} >= set(policys.record)),
+        ("durability", recorded_as(mine.record) >= recorded_as(policys.record)),
     ):
         if not same:
             yield f"`{name}` is looser than in the policy"

@@ -2,6 +2,7 @@
 
 from rtshcua.ground.checker.checks import (
     contracts,
+    durability,
     fallbacks,
     missions,
     names,
@@ -15,7 +16,20 @@ from rtshcua.ground.checker.checks import (
 )
 from rtshcua.ground.checker.context import Context
 
-CHECKS = (names, signals, zones, vehicles, parameters, contracts, fallbacks, policies, missions, times, records)
+CHECKS = (
+    names,
+    signals,
+    zones,
+    vehicles,
+    parameters,
+    contracts,
+    fallbacks,
+    policies,
+    missions,
+    times,
+    records,
+    durability,
+)
 
 
 def check_declarations(context: Context) -> None:

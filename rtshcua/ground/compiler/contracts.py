@@ -1,6 +1,6 @@
 """Skill contracts and the links of chains, from the IR to the flat form. Everything here was checked before."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rtshcua.decision.reads import slots_read
 from rtshcua.ground.checker.context import Bound, Context
@@ -9,6 +9,7 @@ from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.files import Files
 from rtshcua.ground.compiler.zones import ZoneTable
+from rtshcua.model.durability import WORDS
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import (
     CHOICE,
@@ -33,6 +34,14 @@ from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 DEFAULT_GRACE_US = 500_000
 #: what is recorded where a skill does not say
 DEFAULT_RECORD = ("intent", "decision", "state", "authorization", "effect")
+
+
+def recorded(names: Iterable[str]) -> tuple[str, ...]:
+    """What a `record` clause means: kinds of evidence, all if it names none, and the word for how durable, if any."""
+    named = tuple(dict.fromkeys(names))
+    kinds = tuple(name for name in named if name not in WORDS) or DEFAULT_RECORD
+    words = [word for word in WORDS if word in named]
+    return (*kinds, *words[-1:])
 
 
 def cells_of(skill: SkillDecl) -> dict[str, int]:
@@ -99,7 +108,7 @@ class Contracts:
             maintain=maintain,
             fallback=self.chain(skill.fallback),
             energy=skill.energy.value,
-            record=tuple(name.text for name in skill.record) or DEFAULT_RECORD,
+            record=recorded(name.text for name in skill.record),
             reads=slots_read((*require, *assume, *maintain), self._vehicle, tuple(self._conditions.monitors.all)),
         )
 

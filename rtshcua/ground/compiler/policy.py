@@ -23,7 +23,7 @@ from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.ground.compiler.rules import Rules
 from rtshcua.ground.compiler.slots import Slots
 from rtshcua.ground.compiler.zones import ZoneTable
-from rtshcua.model.flat.policy import Airspace, Policy, Rule, Vehicle
+from rtshcua.model.flat.policy import Airspace, Policy, Rule, Vehicle, WithoutEvidence
 from rtshcua.model.ir.places import GeoJson, VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.policies import Rule as RuleDecl
@@ -113,6 +113,7 @@ def lower_policy(
         source_digests=table.digests,
         monitors=tuple(conditions.monitors.all),
         phases=tuple(conditions.sets.phases),
+        without_evidence=int(WithoutEvidence[policy.without_evidence.upper()]),
     )
     if not fits(context, policy, flat):
         return None

@@ -18,7 +18,7 @@ from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import ENTRY
 from rtshcua.ground.compiler.conditions import Conditions, Place
-from rtshcua.ground.compiler.contracts import cells_of
+from rtshcua.ground.compiler.contracts import cells_of, recorded
 from rtshcua.ground.compiler.files import Files
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.ground.compiler.slots import Slots
@@ -150,7 +150,7 @@ def _timed(skills: Contract, own: Overrides) -> Contract:
         grace_us=skills.grace_us if own.grace is None else own.grace.value,
         energy=skills.energy if own.energy is None else own.energy.value,
         phases=tuple(name.text for name in own.phases) or skills.phases,
-        record=tuple(dict.fromkeys((*skills.record, *(name.text for name in own.record)))),
+        record=recorded((*skills.record, *(name.text for name in own.record))),
     )
 
 

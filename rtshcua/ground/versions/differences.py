@@ -23,6 +23,8 @@ def _differences(old: Meaning, new: Meaning) -> Iterator[str]:
         yield "the airspace"
     if old.contingency() != new.contingency():
         yield "the contingency"
+    if old.without_evidence() != new.without_evidence():
+        yield "what is done without evidence"
     vehicle = _fields(old.vehicle(), new.vehicle())
     if vehicle:
         yield f"the vehicle ({vehicle})"

@@ -96,6 +96,10 @@ class Meaning:
         """The links that fly when a step is denied in the air."""
         return self._chain(self._policy.contingency)
 
+    def without_evidence(self) -> Part:
+        """What a flight does while its records are not kept."""
+        return self._policy.without_evidence
+
     def _contract(self, contract: Contract) -> Fields:
         own = contract.parameters
         return {

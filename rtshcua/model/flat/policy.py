@@ -39,6 +39,13 @@ class Rule(Flat, frozen=True):
     end: int
 
 
+class WithoutEvidence(IntEnum):
+    """What a flight does while its records are not kept."""
+
+    LAND = 0  # the mission is given up: what runs falls back, in the air the contingency flies
+    REFUSE = 1  # what runs may finish, and no further step begins
+
+
 class MonitorKind(IntEnum):
     """What a temporal monitor remembers of its condition."""
 
@@ -106,7 +113,7 @@ class Policy(Flat, frozen=True):
     `sets` are membership sets of enumeration values or zone indexes. `tables` map each declared zone's index to a
     derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
     mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
-    SHA-256 of each.
+    SHA-256 of each. `without_evidence` is a `WithoutEvidence`.
     """
 
     name: str
@@ -128,3 +135,4 @@ class Policy(Flat, frozen=True):
     source_digests: tuple[bytes, ...]
     monitors: tuple[Monitor, ...] = ()
     phases: tuple[str, ...] = ()
+    without_evidence: int = 0

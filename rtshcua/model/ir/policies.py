@@ -64,7 +64,9 @@ class Airspace(Node):
 
 
 class PolicyDecl(Node):
-    """`policy name version 7 { ... }`. `contingency` flies when a step is denied in the air."""
+    """`policy name version 7 { ... }`. `contingency` flies when a step is denied in the air, and `without_evidence`
+    says what becomes of a flight while its records are not kept.
+    """
 
     name: Name
     version: int
@@ -73,3 +75,4 @@ class PolicyDecl(Node):
     contingency: tuple[LinkDecl, ...]
     uses: tuple[Use, ...] = ()
     delegations: tuple[Delegation, ...] = ()
+    without_evidence: Literal["land", "refuse"] = "land"

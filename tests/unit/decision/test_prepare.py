@@ -184,6 +184,10 @@ POLICIES: list[tuple[Policy, str]] = [
     (rule(kind=RuleKind.DEGRADE, target=flat.link(9)), "rule 0: target: there is no skill 9"),
     (replace(P, airspace=Airspace((6,), (), "", 0, 0, 1)), "airspace: there is no zone 6"),
     (replace(P, airspace=Airspace((), (-1,), "", 0, 0, 1)), "airspace: there is no zone -1"),
+    (contract(HOVER, record=("written", "synced")), "skill `hover`: recorded as `written` and as `synced`"),
+    (contract(HOVER, record=("buffered",)), "skill `hover`: recorded as `buffered`, which is for reflexes alone"),
+    (replace(P, without_evidence=2), "without evidence 2 is not in 0..1"),
+    (replace(P, without_evidence=-1), "without evidence -1 is not in 0..1"),
 ]
 
 
@@ -255,6 +259,8 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (mine(maintain=S.contract.maintain[1:]), "`maintain` is looser than in the policy"),
     (mine(maintain=(BAD, *S.contract.maintain[1:])), "`maintain` is looser than in the policy"),
     (mine(record=()), "`record` is looser than in the policy"),
+    (mine(record=(*S.contract.record, "written")), "`durability` is looser than in the policy"),
+    (mine(record=(*S.contract.record, "written", "synced")), "recorded as `written` and as `synced`"),
     (mine(assume=(*S.contract.assume, BAD)), f"assume 3: {DEEP}"),
     (plan(kind=2), "plan: kind 2 is not the skill's, 3"),
     (plan(speed=3 * M), "plan: speed 3000 is not the argument, 4000"),
@@ -299,6 +305,8 @@ def test_a_malformed_invocation(invocation: Invocation, what: str) -> None:
             require=(*S.contract.require, S.contract.assume[0]),
             record=("intent", *S.contract.record),
         ),
+        replace(S.contract, record=(*S.contract.record, "synced")),
+        replace(S.contract, record=(*S.contract.record, "synced_first")),
         replace(S.contract, parameters=(*S.contract.parameters[:3], replace(S.contract.parameters[3], high=5 * M))),
     ],
 )

@@ -6,6 +6,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import DURATION, HEIGHT, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.contract import TimingClass
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.expression import Quantity
@@ -15,7 +16,9 @@ from rtshcua.model.quantity import Dimension
 
 CLASSES = tuple(each.name.lower() for each in TimingClass)
 #: kinds of evidence (paper symbol `ev`)
-RECORDS = ("intent", "decision", "state", "authorization", "effect")
+KINDS = ("intent", "decision", "state", "authorization", "effect")
+#: what a `record` clause may name: what is recorded, and how durably
+RECORDS = (*KINDS, *DURABILITIES)
 #: survey patterns that a `cover` motion knows
 PATTERNS = ("grid", "perimeter", "orbit")
 

@@ -1,13 +1,17 @@
 """E0617: what a step says of its own only makes its skill's contract tighter.
 
-Shorter times, more energy kept ready, fewer phases; clauses and kinds of evidence are added to the skill's.
+Shorter times, more energy kept ready, fewer phases, records no less durable; clauses and kinds of evidence are added to
+the skill's.
 """
 
+from rtshcua.decision.durability import recorded_as
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.contracts import RECORDS, more_than_full
+from rtshcua.ground.checker.checks.durability import durability
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of, quantity
+from rtshcua.model.durability import WORDS
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Overrides
 from rtshcua.model.ir.skills import SkillDecl
@@ -28,6 +32,7 @@ def check_overrides(context: Context, skill: SkillDecl, overrides: Overrides) ->
     _phases(context, skill, overrides)
     for name in overrides.record:
         one_of(context, codes.UNKNOWN_RECORD, name, RECORDS, "kind of evidence")
+    _durable(context, skill, overrides)
     scope = context.scope_of(skill)
     for clause in (*overrides.require, *overrides.assume, *overrides.maintain):
         check_condition(scope, clause.condition)
@@ -62,6 +67,24 @@ def _looser(
         help=f"a step may only be held to more than its skill: write {side} `{limit}`, or leave it out",
         labels=[at if skills is None else (skills.span, "the skill's own")],
         fix=(mine.span, limit, f"write `{limit}`"),
+    )
+
+
+def _durable(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
+    """The records of a step are no less durable than its skill's."""
+    mine = durability(context, overrides.record)
+    least = recorded_as(tuple(name.text for name in skill.record))
+    if mine is None or WORDS.index(mine.text) >= least:
+        return
+    skills = next((name for name in skill.record if name.text == WORDS[least]), skill.name)
+    said = "the skill's own" if skills is not skill.name else f"declared here; without a word it is `{WORDS[least]}`"
+    context.report.add(
+        codes.NOT_TIGHTER,
+        mine.span,
+        f"`{mine.text}` is less durable than the records of `{skill.name.text}`, which are `{WORDS[least]}`",
+        help=f"a step may only be held to more than its skill: write `{WORDS[least]}` or more, or leave it out",
+        labels=[(skills.span, said)],
+        fix=(mine.span, WORDS[least], f"write `{WORDS[least]}`"),
     )
 
 

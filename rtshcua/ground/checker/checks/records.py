@@ -9,11 +9,11 @@ beforehand, by the step that it belongs to. What was decided of it shows in what
 | `semantic`, `tactical` | decision, state, authorization |
 | `reflex` | decision, state, effect |
 
-A skill that says nothing records all of it.
+A skill that names no kind records all of it.
 """
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.checks.contracts import RECORDS
+from rtshcua.ground.checker.checks.contracts import KINDS, RECORDS
 from rtshcua.ground.checker.context import Context
 
 _ASKED = ("decision", "state", "authorization")
@@ -23,9 +23,9 @@ NEEDED = {"semantic": _ASKED, "tactical": _ASKED, "reflex": ("decision", "state"
 def check(context: Context) -> None:
     """Report every skill that leaves out what an auditor needs."""
     for skill in context.symbols.skills.values():
-        if not skill.record or skill.timing_class is None:
-            continue
         written = {name.text for name in skill.record}
+        if written.isdisjoint(KINDS) or skill.timing_class is None:
+            continue
         if not written.issubset(RECORDS):
             continue  # what is misspelt may be what is missing
         missing = [f"`{name}`" for name in NEEDED.get(skill.timing_class.text, ()) if name not in written]

@@ -1,5 +1,7 @@
 """Authority policies."""
 
+from typing import Any
+
 from rtshcua.diagnostics.codes import NOT_WRITTEN
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
@@ -60,6 +62,10 @@ class Policies(Skills):
         """`contingency hover for 10 s, return_home, emergency_land`."""
         return Part("contingency", span, links)
 
+    def without(self, span: Span, otherwise: Any) -> Part:
+        """`without evidence refuse`."""
+        return Part("without", span, otherwise)
+
     def use(self, span: Span, template: Name, arguments: tuple[ArgumentValue, ...] | None) -> Use:
         """`use low_flight(bridge_a, top = 30 m)`."""
         return Use(span=span, template=template, arguments=arguments or ())
@@ -89,6 +95,7 @@ class Policies(Skills):
                 contingency=found["contingency"].value if "contingency" in found else (),
                 uses=tuple(use for use in given if isinstance(use, Use)),
                 delegations=tuple(each for each in given if isinstance(each, Delegation)),
+                without_evidence=found["without"].value if "without" in found else "land",
             ),
             name,
         )

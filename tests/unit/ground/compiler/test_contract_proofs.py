@@ -280,6 +280,14 @@ def test_what_is_maintained_can_change(clause: str, expected: list[str]) -> None
         ("reflex", "decision, state, authorization", ["E1202"]),
         ("tactical", "", []),
         ("tactical", "decisions", ["E0610"]),
+        ("tactical", "synced_first", []),
+        ("tactical", "written, decision", ["E1202"]),
+        ("tactical", "written, synced, written", ["E1205"]),
+        ("tactical", "synced, synced", []),
+        ("tactical", "buffered", ["E1204"]),
+        ("semantic", "buffered", ["E1204"]),
+        ("reflex", "buffered", []),
+        ("reflex", "buffered, written", ["E1205"]),
     ],
 )
 def test_what_is_recorded_suffices_to_derive_a_decision_again(timing: str, record: str, expected: list[str]) -> None:

@@ -21,10 +21,10 @@ def test_policy(plain: Plain, unit: Read) -> None:
       airspace inside city, field outside school
       contingency hover for 10 s, land
     }
-    policy q version 1 { airspace outside z }
+    policy q version 1 { airspace outside z  without evidence refuse }
     """
     first, second = plain(unit(text).policies)
-    assert second == {"name": "q", "version": 1, "airspace": {"outside": ["z"]}}
+    assert second == {"name": "q", "version": 1, "airspace": {"outside": ["z"]}, "without_evidence": "refuse"}
     less = {"kind": "comparison", "operator": "<", "left": "&x"}
     assert first == {
         "name": "p",
@@ -56,6 +56,7 @@ def test_policy(plain: Plain, unit: Read) -> None:
         ],
         "airspace": {"inside": ["city", "field"], "outside": ["school"]},
         "contingency": [{"skill": "hover", "limit": (10_000_000, "duration")}, {"skill": "land"}],
+        "without_evidence": "land",
     }
 
 

@@ -143,6 +143,7 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
          "the rule `degrade any when position inside grow(school, 21 m) to down`"),
         ("inside field outside school", "inside field", "the airspace"),
         ("contingency home, down", "contingency home for 2 min, down", "the contingency"),
+        ("contingency home, down", "contingency home, down without evidence refuse", "what is done without evidence"),
         ("reserve 15 %", "reserve 16 %", "the vehicle (reserve)"),
         ("position error 3 m energy 100 % = 18 min", "position error 4 m energy 100 % = 19 min",
          "the vehicle (position error, energy)"),

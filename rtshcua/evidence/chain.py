@@ -1,13 +1,15 @@
-"""The writer's side of a log: turns what happened into lines, chained and counted in the tree. Does no I/O."""
+"""The writer's side of a log: turns what happened into lines, chained, counted in the tree, sealed. Does no I/O.
+
+The format is specified in docs/log-format.md.
+"""
 
 from base64 import b64encode
 from collections.abc import Callable
 from urllib.parse import quote
 
-from msgspec.structs import replace
-
-from rtshcua.evidence.merkle import Tree, leaf_hash
-from rtshcua.evidence.note import Checkpoint, sign
+from rtshcua.evidence.durability import SYNC_US, SYNCED, WRITTEN
+from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, EpochKey
+from rtshcua.evidence.heads import Head
 from rtshcua.evidence.records import (
     FORMAT,
     VERSION,
@@ -15,16 +17,17 @@ from rtshcua.evidence.records import (
     Decision,
     Effect,
     Genesis,
-    Record,
     RecordedContext,
     RecordedState,
-    encode,
+    Recover,
+    Seal,
 )
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, key_id
 
-START = "0" * 64  # the genesis has no line before it
+#: How much later than `EPOCH_US` and `EPOCH_RECORDS` an epoch is sealed before anything else is recorded; a fifth.
+_LATE = 5
 
 _OUTCOMES = tuple(outcome.name.lower() for outcome in Outcome)  # by number
 
@@ -34,50 +37,53 @@ def origin_of(vehicle: str, boot: str) -> str:
     return f"rtshcua/log/{quote(vehicle, safe='')}/{boot}"
 
 
-class Chain:
-    """Where a log stands: the number of the next record, the hash of the last line, the tree over all lines."""
-
-    __slots__ = ("prev", "seq", "tree")
-
-    def __init__(self) -> None:
-        self.seq = 0
-        self.prev = START
-        self.tree = Tree()
-
-    def add(self, record: Record) -> bytes:
-        """The line of a record that was made with this chain's `prev` and `seq`; the chain then stands after it."""
-        line = encode(record)
-        leaf = leaf_hash(line)
-        self.tree.push(leaf)
-        self.prev = leaf.hex()
-        self.seq += 1
-        return line
-
-
 class Recorder:
     """Makes the lines of one log, in order; each method returns one whole line.
 
-    `sign` signs bytes with the Ed25519 key of duty `log` whose public half is `public` (32 bytes); it is called
-    once, by `close`. The caller's clock never goes back from call to call, and its integers stay within 2**53 - 1: a
-    verifier refuses a log where they do not.
+    `certify` signs bytes with the Ed25519 key of duty `log` whose public half is `public` (32 bytes). It is called
+    once, by `genesis` or `recover`, and then let go: the rest is signed by epoch keys, for each of which `draw` gives
+    32 secret random bytes. The caller's clock never goes back from call to call, its UTC and monotonic time go on
+    alike, and its integers stay within 2**53 - 1: a verifier refuses a log where they do not.
     """
 
-    __slots__ = ("_chain", "_mode", "_origin", "_public", "_sign")
+    __slots__ = ("_certify", "_draw", "_head", "_key", "_mode", "_origin", "_public", "_signed_us")
 
-    def __init__(self, sign: Callable[[bytes], bytes], public: bytes) -> None:
-        self._sign, self._public = sign, public
-        self._chain = Chain()
+    def __init__(self, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]) -> None:
+        self._certify: Callable[[bytes], bytes] | None = certify
+        self._public = public
+        self._draw = draw
+        self._head = Head()
+        self._key: EpochKey | None = None
         self._origin = self._mode = ""
+        self._signed_us = 0  # monotonic time of the last signed record
+
+    @classmethod
+    def resumed(
+        cls, head: Head, origin: str, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]
+    ) -> "Recorder":
+        """A recorder that goes on after the records in `head`; the first that it makes must be a `recover`."""
+        recorder = cls(certify, public, draw)
+        recorder._head, recorder._origin = head, origin
+        return recorder
 
     @property
     def final_hash(self) -> str:
         """The hash of the last line, hexadecimal: `before` in the genesis of the next log."""
-        return self._chain.prev
+        return self._head.prev
 
     @property
     def count(self) -> int:
         """The number of records so far."""
-        return self._chain.seq
+        return self._head.seq
+
+    def due(self, now: Now) -> bool:
+        """Whether the epoch is over: `seal` it when nothing else is to be done."""
+        return self._head.records >= EPOCH_RECORDS or now.monotonic_us - self._signed_us >= EPOCH_US
+
+    def overdue(self, now: Now) -> bool:
+        """Whether the epoch must be sealed before anything else is recorded."""
+        late = now.monotonic_us - self._signed_us >= EPOCH_US + EPOCH_US // _LATE
+        return late or self._head.records >= EPOCH_RECORDS + EPOCH_RECORDS // _LATE
 
     def genesis(
         self,
@@ -90,31 +96,35 @@ class Recorder:
         mission: str,
         mode: str,
         before: str | None = None,
+        sync_us: int = SYNC_US,
     ) -> bytes:
         """The first line. `boot` is 16 random bytes; `mode`, the enforcement mode, stands in each decision too."""
         self._mode = mode
         self._origin = origin_of(vehicle, boot.hex())
-        return self._chain.add(
-            Genesis(
-                prev=self._chain.prev,
-                at_us=now.monotonic_us,
-                before=before,
-                boot=boot.hex(),
-                bundle=b64encode(bundle).decode(),
-                format=FORMAT,
-                log_key=self._public.hex(),
-                log_kid=key_id(Duty.LOG, self._public).hex(),
-                mission=mission,
-                mode=mode,
-                root=b64encode(root).decode(),
-                seq=self._chain.seq,
-                type="genesis",
-                utc_error_us=now.utc_error_us,
-                utc_us=now.utc_us,
-                vehicle=vehicle,
-                version=VERSION,
-            )
+        key = EpochKey(self._draw())
+        genesis = Genesis(
+            prev=self._head.prev,
+            at_us=now.monotonic_us,
+            before=before,
+            boot=boot.hex(),
+            bundle=b64encode(bundle).decode(),
+            checkpoint=None,
+            format=FORMAT,
+            log_key=self._public.hex(),
+            log_kid=key_id(Duty.LOG, self._public).hex(),
+            mission=mission,
+            mode=mode,
+            next_key=key.public.hex(),
+            root=b64encode(root).decode(),
+            seq=self._head.seq,
+            sync_us=sync_us,
+            type="genesis",
+            utc_error_us=now.utc_error_us,
+            utc_us=now.utc_us,
+            vehicle=vehicle,
+            version=VERSION,
         )
+        return self._certified(genesis, key)
 
     def decision(
         self,
@@ -134,18 +144,19 @@ class Recorder:
         target: str | None,
         target_link: int,
         valid_until_us: int,
+        durability: int = SYNCED,
     ) -> bytes:
         """The line of one decision, its inputs included; the fields are those of `Decision`."""
-        chain = self._chain
-        return chain.add(
+        head = self._head
+        return head.add(
             Decision(  # by position, in the order of definition: a third faster than by name
-                chain.prev,
+                head.prev,
                 now.monotonic_us,
                 context.binding.hex(),
                 clause,
                 clause_at,
                 RecordedContext(
-                    tuple([(a.rule, a.role, a.granted, a.monotonic_us) for a in context.approvals]),
+                    _approvals(context) if context.approvals else (),
                     context.consumed,
                     context.phase,
                     context.policy_version,
@@ -153,14 +164,15 @@ class Recorder:
                     context.remaining_us,
                     context.vehicle,
                 ),
+                durability,
                 invocation.hex(),
                 kind,
                 link,
                 self._mode,
                 _OUTCOMES[outcome],
-                reason.value,
+                reason._value_,  # `value` is a property in Python, and slow
                 rule_step,
-                chain.seq,
+                head.seq,
                 RecordedState(ages=state.ages, monitors=state.monitors, values=state.values),
                 step,
                 target,
@@ -173,19 +185,21 @@ class Recorder:
         )
 
     def effect(
-        self, now: Now, event: str, *, kind: int = -1, step: int = -1, link: int = -1, token: int = -1, detail: str = ""
-    ) -> bytes:
+        self, now: Now, event: str, *, kind: int = -1, step: int = -1, link: int = -1, token: int = -1,
+        detail: str = "", durability: int = WRITTEN,
+    ) -> bytes:  # fmt: skip
         """The line of something that happened; `detail` is the world's own text, kept as it came."""
-        chain = self._chain
-        return chain.add(
+        head = self._head
+        return head.add(
             Effect(  # by position, as above
-                chain.prev,
+                head.prev,
                 now.monotonic_us,
                 _storable(detail),
+                durability,
                 event,
                 kind,
                 link,
-                chain.seq,
+                head.seq,
                 step,
                 token,
                 "effect",
@@ -194,27 +208,83 @@ class Recorder:
             )
         )
 
-    def close(self, now: Now, *, ending: str, tlog: bytes | None) -> bytes:
-        """The last line, signed. `tlog` is the SHA-256 of the telemetry log."""
-        chain = self._chain
-        close = Close(
-            prev=chain.prev,
+    def seal(self, now: Now) -> bytes:
+        """The end of an epoch: signed by its key, which is then dropped; it names the next one."""
+        head, key, last = self._head, EpochKey(self._draw()), self._epoch_key()
+        seal = Seal(
+            prev=head.prev,
             at_us=now.monotonic_us,
+            bytes=head.octets,
             checkpoint=None,
-            count=chain.seq,
+            digest=head.digest(),
+            epoch=head.epoch,
+            next_key=key.public.hex(),
+            records=head.records,
+            seq=head.seq,
+            type="seal",
+            utc_error_us=now.utc_error_us,
+            utc_us=now.utc_us,
+        )
+        self._key, self._signed_us = key, now.monotonic_us
+        return head.seal(seal, self._origin, last.public, last.sign)
+
+    def recover(self, now: Now, *, discarded_bytes: int, discarded_digest: bytes) -> bytes:
+        """The first line after a crash, signed by the log key; monotonic time begins anew."""
+        head, key = self._head, EpochKey(self._draw())
+        recover = Recover(
+            prev=head.prev,
+            at_us=now.monotonic_us,
+            bytes=head.octets,
+            checkpoint=None,
+            digest=head.digest(),
+            discarded_bytes=discarded_bytes,
+            discarded_digest=discarded_digest.hex(),
+            epoch=head.epoch,
+            next_key=key.public.hex(),
+            records=head.records,
+            seq=head.seq,
+            type="recover",
+            utc_error_us=now.utc_error_us,
+            utc_us=now.utc_us,
+        )
+        return self._certified(recover, key)
+
+    def close(self, now: Now, *, ending: str, tlog: bytes | None, disclosure: bytes | None = None) -> bytes:
+        """The last line. `tlog` is the SHA-256 of the telemetry log, `disclosure` the root of the disclosure tree."""
+        head, last = self._head, self._epoch_key()
+        close = Close(
+            prev=head.prev,
+            at_us=now.monotonic_us,
+            bytes=head.octets,
+            checkpoint=None,
+            digest=head.digest(),
+            disclosure=None if disclosure is None else disclosure.hex(),
             ending=ending,
-            seq=chain.seq,
+            epoch=head.epoch,
+            records=head.records,
+            seq=head.seq,
             tlog=None if tlog is None else tlog.hex(),
             type="close",
             utc_error_us=now.utc_error_us,
             utc_us=now.utc_us,
         )
-        chain.tree.push(leaf_hash(encode(close)))
-        checkpoint = Checkpoint(self._origin, chain.tree.size, chain.tree.root())
-        line = encode(replace(close, checkpoint=sign(checkpoint, self._public, self._sign)))
-        chain.prev = leaf_hash(line).hex()
-        chain.seq += 1
-        return line
+        self._key = None
+        return head.seal(close, self._origin, last.public, last.sign)
+
+    def _epoch_key(self) -> EpochKey:
+        assert self._key is not None, "no epoch has begun, or the log is closed"
+        return self._key
+
+    def _certified(self, record: Genesis | Recover, key: EpochKey) -> bytes:
+        """A record signed by the log key, which is then let go."""
+        assert self._certify is not None, "the log key signs once"
+        certify, self._certify = self._certify, None
+        self._key, self._signed_us = key, record.at_us
+        return self._head.seal(record, self._origin, self._public, certify)
+
+
+def _approvals(context: Context) -> tuple[tuple[int, int, int, int], ...]:
+    return tuple([(a.rule, a.role, a.granted, a.monotonic_us) for a in context.approvals])
 
 
 def _storable(text: str) -> str:

@@ -11,19 +11,23 @@ class Flaw(NamedTuple):
     found: str = ""
     expected: str = ""
 
-    def at(self, record: int) -> "Finding":
-        """This flaw, found in record number `record`."""
-        return Finding(self.slug, record, self.text, self.found, self.expected)
+    def at(self, record: int, offset: int = -1) -> "Finding":
+        """This flaw, found in record number `record`, whose line begins at octet `offset`."""
+        return Finding(self.slug, record, self.text, self.found, self.expected, offset)
 
 
 class Finding(NamedTuple):
-    """The flaw that ended a verification; `record` counts from 0 (its line is one more)."""
+    """The flaw that ended a verification; `record` counts from 0 (its line is one more).
+
+    `offset` is where that line begins, in octets from the beginning of the log; -1 where it is not known.
+    """
 
     slug: str
     record: int
     text: str
     found: str = ""
     expected: str = ""
+    offset: int = -1
 
 
 class Claim(NamedTuple):

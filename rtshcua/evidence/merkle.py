@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from hashlib import sha256
+from typing import ClassVar
 
 _LEAF = sha256(b"\x00")
 _NODE = sha256(b"\x01")
@@ -23,25 +24,43 @@ def node_hash(left: bytes, right: bytes) -> bytes:
 
 
 class Tree:
-    """The tree of the leaves pushed so far; it holds one hash for each set bit of `size`."""
+    """The tree of the leaves pushed so far; it holds one hash for each set bit of `size`.
 
-    __slots__ = ("_perfect", "size")
+    Leaves are folded in when the root is asked for, and `TILE` together at the latest: who pushes one, and waits, then
+    mostly waits for no hash at all.
+    """
+
+    TILE: ClassVar = 256
+
+    __slots__ = ("_leaves", "_perfect", "size")
 
     def __init__(self) -> None:
         self.size = 0
-        self._perfect: list[bytes] = []  # roots of perfect subtrees, the largest first
+        self._perfect: list[bytes] = []  # roots of perfect subtrees, the largest first,
+        self._leaves: list[bytes] = []  # and what comes after them
 
     def push(self, leaf: bytes) -> None:
         """Adds a leaf by its hash."""
-        perfect, bits = self._perfect, self.size
-        while bits & 1:
-            leaf = node_hash(perfect.pop(), leaf)
-            bits >>= 1
-        perfect.append(leaf)
+        leaves = self._leaves
+        leaves.append(leaf)
         self.size += 1
+        if len(leaves) == self.TILE:
+            self._fold()
+
+    def _fold(self) -> None:
+        perfect, number = self._perfect, self.size - len(self._leaves)
+        for node in self._leaves:
+            bits = number
+            while bits & 1:
+                node = node_hash(perfect.pop(), node)
+                bits >>= 1
+            perfect.append(node)
+            number += 1
+        self._leaves.clear()
 
     def root(self) -> bytes:
         """The root hash MTH(D[n]) of the leaves so far."""
+        self._fold()
         if not self._perfect:
             return EMPTY
         *rest, node = self._perfect

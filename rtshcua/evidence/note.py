@@ -1,76 +1,138 @@
-"""C2SP signed notes (c2sp.org/signed-note), Ed25519, that carry checkpoints (c2sp.org/tlog-checkpoint)."""
+"""C2SP signed notes (c2sp.org/signed-note), Ed25519, that carry checkpoints (c2sp.org/tlog-checkpoint).
+
+The checkpoint of a log has up to three extension lines: the record that carries it, the key that signs the next one,
+and the checkpoint before it (docs/log-format.md, section 2).
+"""
 
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from hashlib import sha256
-from typing import NamedTuple
+from typing import Final, NamedTuple
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 from rtshcua.evidence.finding import Flaw
-from rtshcua.wire.keys import VerificationKey
 
-ED25519 = b"\x01"
-MARK = "\u2014 "  # an em dash opens a signature line
-_KEY_ID, _SIGNATURE = 4, 64  # bytes
+ED25519: Final = b"\x01"
+MARK: Final = "\u2014 "  # an em dash opens a signature line
+ID_BYTES: Final = 4
+_SIGNATURE_BYTES: Final = 64
+_HASH_BYTES: Final = 32
+_RECORD, _KEY, _AFTER = "record ", "key ", "after "
+_LONGEST_SIZE: Final = 16  # digits
 
 
 class Checkpoint(NamedTuple):
-    """The head of a tree: whose it is, how many leaves it has, and its root hash."""
+    """The head of a tree: whose it is, how many leaves it has, and its root hash.
+
+    `record` is the leaf hash of the record that carries it, as it is without it; `key` the Ed25519 public key of the
+    next epoch, None at the end of a log; `after` the `digest` of the checkpoint before it in the log, None at its
+    beginning. So whoever believes a checkpoint has all that came before it, and the records that carry them.
+    """
 
     origin: str
     size: int
     root: bytes
+    record: bytes
+    key: bytes | None
+    after: bytes | None = None
 
     def text(self) -> str:
         """The text that is signed."""
-        return f"{self.origin}\n{self.size}\n{b64encode(self.root).decode()}\n"
+        key = "" if self.key is None else f"{_KEY}{_base64(self.key)}\n"
+        after = "" if self.after is None else f"{_AFTER}{_base64(self.after)}\n"
+        return f"{self.origin}\n{self.size}\n{_base64(self.root)}\n{_RECORD}{_base64(self.record)}\n{key}{after}"
+
+    def digest(self) -> bytes:
+        """SHA-256 of the text: what the next checkpoint names."""
+        return sha256(self.text().encode()).digest()
 
 
-def key_id(name: str, public: bytes) -> bytes:
-    """The first four bytes of SHA-256(name || 0x0A || 0x01 || public key)."""
-    return sha256(name.encode() + b"\n" + ED25519 + public).digest()[:_KEY_ID]
+def key_id(name: str, public: bytes, kind: bytes = ED25519) -> bytes:
+    """The first four bytes of SHA-256(name || 0x0A || kind || public key)."""
+    return sha256(name.encode() + b"\n" + kind + public).digest()[:ID_BYTES]
+
+
+def signature_line(name: str, signature: bytes) -> str:
+    """The line of a signature, its key id in front."""
+    return f"{MARK}{name} {_base64(signature)}\n"
 
 
 def sign(checkpoint: Checkpoint, public: bytes, signer: Callable[[bytes], bytes]) -> str:
     """The note of a checkpoint, signed in the name of its origin by `signer`, which holds the key of `public`."""
-    text = checkpoint.text()
-    signature = key_id(checkpoint.origin, public) + signer(text.encode())
-    return f"{text}\n{MARK}{checkpoint.origin} {b64encode(signature).decode()}\n"
+    text, name = checkpoint.text(), checkpoint.origin
+    return f"{text}\n{signature_line(name, key_id(name, public) + signer(text.encode()))}"
 
 
-def open_note(note: str, origin: str, key: VerificationKey) -> Checkpoint | Flaw:
-    """The checkpoint of a note that bears one signature, valid, by `key` in the name of `origin`; or what is wrong.
+def split(note: str) -> tuple[str, list[str]]:
+    """The signed text of a note and its signature lines, each with its newline; no lines when it is not a note."""
+    body, blank, rest = note.rpartition("\n\n")
+    if not blank or not rest.endswith("\n"):
+        return note, []
+    return body + "\n", rest.splitlines(keepends=True)
 
-    One signature exactly: the format allows others, which a reader ignores, but nothing writes them here, and what is
+
+def read_signature(line: str) -> tuple[str, bytes]:
+    """Name and signature (key id in front) of a signature line; empty when it is none, or not in canonical form."""
+    name, _, encoded = line.removeprefix(MARK).removesuffix("\n").rpartition(" ")
+    signature = strict_base64(encoded)
+    return (name, signature) if line == signature_line(name, signature) and name and " " not in name else ("", b"")
+
+
+def open_note(note: str, origin: str, public: bytes) -> Checkpoint | Flaw:
+    """The checkpoint of a note that bears one signature, valid, by `public` in the name of `origin`; or what is wrong.
+
+    One signature exactly: the format allows others, which a reader ignores, but none belongs into a record, and what is
     ignored could be changed unseen.
     """
-    body, blank, last = note.rpartition("\n\n")
-    if not blank or not last:
-        return Flaw("close/unsigned", "the checkpoint bears no signature")
-    name, _, encoded = last.removeprefix(MARK).removesuffix("\n").partition(" ")
-    signature = _strict_base64(encoded)
-    if last != f"{MARK}{name} {encoded}\n" or len(signature) != _KEY_ID + _SIGNATURE:
-        return Flaw("close/note", "the checkpoint does not end with one Ed25519 signature line")
-    if name != origin or signature[:_KEY_ID] != key_id(origin, key.public):
-        return Flaw("close/key", "the checkpoint is signed by another key, or in another name", name, origin)
-    text = body + "\n"
-    if not key.verify(signature[_KEY_ID:], text.encode()):
-        return Flaw("close/signature", "the log key did not sign this checkpoint")
-    return _parse(text)
+    text, signatures = split(note)
+    if not signatures:
+        return Flaw("note/unsigned", "the checkpoint bears no signature")
+    name, signature = read_signature(signatures[0])
+    if len(signatures) != 1 or len(signature) != ID_BYTES + _SIGNATURE_BYTES:
+        return Flaw("note/malformed", "the checkpoint does not end with one Ed25519 signature line")
+    if name != origin or signature[:ID_BYTES] != key_id(origin, public):
+        return Flaw("note/key", "the checkpoint is signed by another key, or in another name", name, origin)
+    if not valid(public, signature[ID_BYTES:], text.encode()):
+        return Flaw("note/signature", "the key that should have did not sign this checkpoint")
+    return parse(text)
 
 
-def _parse(text: str) -> Checkpoint | Flaw:
+def valid(public: bytes, signature: bytes, data: bytes) -> bool:
+    """Whether the key of `public` (32 bytes) signed `data`; one with s >= L is refused (RFC 8032, section 5.1.7)."""
+    try:
+        Ed25519PublicKey.from_public_bytes(public).verify(signature, data)
+    except InvalidSignature:
+        return False
+    return True
+
+
+def parse(text: str) -> Checkpoint | Flaw:
+    """The checkpoint of a signed text."""
     lines = text.split("\n")
-    if len(lines) == 4 and lines[1].isascii() and lines[1].isdigit() and len(lines[1]) < 16:
-        checkpoint = Checkpoint(lines[0], int(lines[1]), _strict_base64(lines[2]))
-        if checkpoint.text() == text:
+    if len(lines) in (5, 6, 7) and lines[1].isascii() and lines[1].isdigit() and len(lines[1]) <= _LONGEST_SIZE:
+        root, record = strict_base64(lines[2]), strict_base64(lines[3].removeprefix(_RECORD))
+        key, after = (_extension(lines[4:-1], name) for name in (_KEY, _AFTER))
+        checkpoint = Checkpoint(lines[0], int(lines[1]), root, record, key, after)
+        lengths = {len(each) for each in (root, record, key, after) if each is not None}
+        if checkpoint.text() == text and lengths == {_HASH_BYTES}:
             return checkpoint
-    return Flaw("close/note", "the signed text is not a checkpoint of origin, size and root")
+    return Flaw("note/malformed", "the signed text is not a checkpoint of origin, size, root, record, key and after")
 
 
-def _strict_base64(text: str) -> bytes:
+def _extension(lines: list[str], name: str) -> bytes | None:
+    return next((strict_base64(line.removeprefix(name)) for line in lines if line.startswith(name)), None)
+
+
+def strict_base64(text: str) -> bytes:
     """The bytes of canonical base64, none for what is not: unused bits could be changed unseen."""
     try:
         data = b64decode(text, validate=True)
     except ValueError:
         return b""
-    return data if b64encode(data).decode() == text else b""
+    return data if _base64(data) == text else b""
+
+
+def _base64(data: bytes) -> str:
+    return b64encode(data).decode()

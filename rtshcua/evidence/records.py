@@ -7,7 +7,8 @@ bytes 10 to 73 of each line.
 
 Every record has `_prev` (SHA-256 of 0x00 and the line before, newline included: chain link and RFC 9162 leaf at once),
 `seq` (counts from 0), `type`, and the moment it was written: `at_us` (monotonic), `utc_us` (since the Unix epoch) and
-`utc_error_us` (bound on the error of `utc_us`). Digests, keys and ids are lower-case hexadecimal.
+`utc_error_us` (bound on the error of `utc_us`). Digests, keys and ids are lower-case hexadecimal. The format is
+specified in docs/log-format.md.
 """
 
 from typing import Annotated, Literal
@@ -23,10 +24,11 @@ LARGEST = (1 << 53) - 1
 
 Integer = Annotated[int, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
+Durability = Annotated[int, msgspec.Meta(ge=0, le=3)]
 # Looked at by a regular expression, and so only in the first and the last record; the verifier compares the others with
 # what they must be.
-Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
-Name = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{32}$")]
+Hash = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z")]
+Name = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{32}\Z")]
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"prev": "_prev"}, gc=False):
@@ -37,8 +39,9 @@ class Genesis(Record, frozen=True):
     """The first record: who flies what, under which trust, and what the log is checked with.
 
     `bundle` and `root` are base64 of the bundle and of the trust root; `log_key` is the Ed25519 public key, called
-    `log_kid` in the root, that signs the close. `boot` is 16 random bytes; `before` the last line's hash of the log
-    that this device wrote before, or null. `mode` is the enforcement mode.
+    `log_kid` in the root, that signs this record. `boot` is 16 random bytes; `before` the last line's hash of the log
+    that this vehicle wrote before, or null. `mode` is the enforcement mode. A record of durability class 2 is on the
+    disk within `sync_us`.
     """
 
     prev: Hash
@@ -46,13 +49,16 @@ class Genesis(Record, frozen=True):
     before: Hash | None
     boot: Name
     bundle: str
+    checkpoint: str | None
     format: str
     log_key: Hash
     log_kid: Name
     mission: str
     mode: str
+    next_key: Hash
     root: str
     seq: Count
+    sync_us: Count
     type: Literal["genesis"]
     utc_error_us: Count
     utc_us: Count
@@ -100,6 +106,7 @@ class Decision(Record, frozen=True):
     clause: str | None
     clause_at: tuple[Integer, Integer, Integer] | None
     context: RecordedContext
+    durability: Durability
     invocation: str
     kind: Integer
     link: Integer
@@ -128,6 +135,7 @@ class Effect(Record, frozen=True):
     prev: str
     at_us: Count
     detail: str
+    durability: Durability
     event: str
     kind: Integer
     link: Integer
@@ -139,18 +147,60 @@ class Effect(Record, frozen=True):
     utc_us: Count
 
 
-class Close(Record, frozen=True):
-    """The last record. `count` is the number of records before it, `tlog` the SHA-256 of the telemetry log, or null.
-
-    `checkpoint` is a C2SP signed note over the tree of all records, this one included: its own leaf is its line with
-    `checkpoint` null, so that the signature covers the ending and every other field too.
+class Seal(Record, frozen=True):
+    """The end of an epoch. `bytes` and `records` say how long its segment is, `digest` is the SHA-256 of its bytes:
+    those from the beginning of the signed record before this one up to this one. `next_key` signs what follows.
     """
 
     prev: Hash
     at_us: Count
+    bytes: Count
     checkpoint: str | None
-    count: Count
+    digest: Hash
+    epoch: Count
+    next_key: Hash
+    records: Count
+    seq: Count
+    type: Literal["seal"]
+    utc_error_us: Count
+    utc_us: Count
+
+
+class Recover(Record, frozen=True):
+    """A seal after a crash, signed by the log key: what stood after the last whole record was cut off, so many bytes
+    of that digest. Monotonic time begins anew here.
+    """
+
+    prev: Hash
+    at_us: Count
+    bytes: Count
+    checkpoint: str | None
+    digest: Hash
+    discarded_bytes: Count
+    discarded_digest: Hash
+    epoch: Count
+    next_key: Hash
+    records: Count
+    seq: Count
+    type: Literal["recover"]
+    utc_error_us: Count
+    utc_us: Count
+
+
+class Close(Record, frozen=True):
+    """The last record: a seal after which nothing follows. `tlog` is the SHA-256 of the telemetry log, `disclosure` the
+    root of the tree from which records are shown in part (docs/log-format.md, section 6); null where there is none.
+    """
+
+    prev: Hash
+    at_us: Count
+    bytes: Count
+    checkpoint: str | None
+    digest: Hash
+    disclosure: Hash | None
     ending: str
+    epoch: Count
+    records: Count
     seq: Count
     tlog: Hash | None
     type: Literal["close"]
@@ -158,16 +208,26 @@ class Close(Record, frozen=True):
     utc_us: Count
 
 
-AnyRecord = Genesis | Decision | Effect | Close
+AnyRecord = Genesis | Decision | Effect | Seal | Recover | Close
+#: Records with a `checkpoint`: a C2SP signed note over the tree of all lines before, and over the record itself.
+Signed = Genesis | Seal | Recover | Close
+#: those that end an epoch
+Sealing = Seal | Recover | Close
 
-_encode = msgspec.json.Encoder().encode
+_encode = msgspec.json.Encoder().encode_lines  # cheaper than adding the newline
+_CHECKPOINT = b',"checkpoint":"'  # no text can hold it, for a quote inside a text stands behind a backslash
 
 
 def encode(record: Record) -> bytes:
     """The line of a record, newline included."""
-    return _encode(record) + b"\n"
+    return _encode([record])  # of a tuple msgspec 0.22 never lets go
 
 
-def unsigned(close: Close) -> Close:
-    """A close as its own leaf holds it: without its checkpoint."""
-    return msgspec.structs.replace(close, checkpoint=None)
+def is_signed(line: bytes) -> bool:
+    """Whether this is the line of a signed record, if it is the line of a record."""
+    return _CHECKPOINT in line
+
+
+def unsigned(record: Signed) -> Signed:
+    """A signed record as its checkpoint vouches for it: without that checkpoint."""
+    return msgspec.structs.replace(record, checkpoint=None)

@@ -19,14 +19,15 @@ class Artefact:
 
 
 ROOT: Final = Artefact("rtshcua/root", 1)
-POLICY: Final = Artefact("rtshcua/policy", 2)
+POLICY: Final = Artefact("rtshcua/policy", 3)  # 3: with what to do without evidence
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 1)
 RECALL: Final = Artefact("rtshcua/recall", 1)
 REPLACEMENT: Final = Artefact("rtshcua/replacement", 1)
 RECEIPT: Final = Artefact("rtshcua/receipt", 1)
-LOG: Final = Artefact("rtshcua/log", 1, "")  # JSON lines (RFC 8785), which have no registered suffix
+LOG: Final = Artefact("rtshcua/log", 2, "")  # JSON lines (RFC 8785), which have no registered suffix
+PROOF: Final = Artefact("rtshcua/proof", 1)  # what a proof of a log carries
 REQUEST: Final = Artefact("rtshcua/request", 2)  # 2: with temporal monitors
 RESPONSE: Final = Artefact("rtshcua/response", 1)
 PERMIT: Final = Artefact("rtshcua/permit", 1)
@@ -43,6 +44,7 @@ ALL: Final = (
     REPLACEMENT,
     RECEIPT,
     LOG,
+    PROOF,
     REQUEST,
     RESPONSE,
     PERMIT,

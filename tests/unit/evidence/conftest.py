@@ -25,7 +25,8 @@ def now() -> Callable[[int], Now]:
 
 @pytest.fixture
 def recorder(log_key: SigningKey) -> Recorder:
-    return Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
+    seeds = iter(range(1, 256))
+    return Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, lambda: bytes([next(seeds)]) * 32)
 
 
 @pytest.fixture
@@ -65,7 +66,7 @@ def decide(recorder: Recorder, now: Callable[[int], Now]) -> Callable[..., bytes
 def log(
     recorder: Recorder, begin: Callable[[], bytes], decide: Callable[..., bytes], now: Callable[[int], Now]
 ) -> list[bytes]:
-    """Genesis, two decisions, two effects, close."""
+    """Genesis, two decisions, two effects, a seal, an empty epoch's seal, an effect, close."""
     refused = {
         "step": 1,
         "outcome": Outcome.FALLBACK,
@@ -82,5 +83,8 @@ def log(
         recorder.effect(now(11), "dispatched", kind=0, step=0, token=1),
         decide(12, **refused),
         recorder.effect(now(13), "failed", kind=0, step=0, token=1, detail="PreArm: \ud800 \x1b[31m\n"),
-        recorder.close(now(20), ending="aborted", tlog=bytes(32)),
+        recorder.seal(now(14)),
+        recorder.seal(now(15)),
+        recorder.effect(now(16), "landed", durability=2),
+        recorder.close(now(20), ending="aborted", tlog=bytes(32), disclosure=bytes(range(32))),
     ]

@@ -5,9 +5,15 @@ from base64 import b64encode
 from collections.abc import Callable
 from hashlib import sha256
 
+import pytest
+
 from rtshcua.evidence.chain import Recorder, origin_of
+from rtshcua.evidence.epochs import EpochKey
+from rtshcua.evidence.heads import Head
 from rtshcua.evidence.merkle import leaf_hash, root_of
+from rtshcua.evidence.note import Checkpoint, open_note
 from rtshcua.model.flat.situation import Now
+from rtshcua.wire.keys import Duty, SigningKey
 
 
 def test_every_line_names_the_one_before_and_counts(log: list[bytes], recorder: Recorder) -> None:
@@ -51,15 +57,94 @@ def test_text_of_the_world_is_kept_as_far_as_utf8_can(log: list[bytes]) -> None:
     assert json.loads(log[4])["detail"] == "PreArm: ? \x1b[31m\n"
 
 
-def test_the_close_signs_its_own_fields_too(log: list[bytes]) -> None:
-    record = json.loads(log[-1])
-    origin, size, root = record["checkpoint"].split("\n")[:3]
-    assert origin == origin_of("quad 07+é", bytes(range(16)).hex())
-    assert int(size) == len(log) == record["count"] + 1
-    blank = log[-1].replace(json.dumps(record["checkpoint"], ensure_ascii=False).encode(), b"null")
-    assert b"null" in blank
-    leaves = [leaf_hash(line) for line in [*log[:-1], blank]]
-    assert root == b64encode(root_of(leaves)).decode()
+def signed(log: list[bytes]) -> list[int]:
+    return [number for number, line in enumerate(log) if "checkpoint" in json.loads(line)]
+
+
+def test_a_signed_record_vouches_for_all_lines_before_and_for_itself(log: list[bytes]) -> None:
+    assert signed(log) == [0, 5, 6, 8]
+    before = ""
+    for number in signed(log):
+        record = json.loads(log[number])
+        origin, size, root, own, *more = (text := record["checkpoint"].split("\n\n")[0]).split("\n")
+        assert origin == origin_of("quad 07+é", bytes(range(16)).hex())
+        assert int(size) == number
+        assert root == b64encode(root_of([leaf_hash(line) for line in log[:number]])).decode()
+        blank = log[number].replace(json.dumps(record["checkpoint"], ensure_ascii=False).encode(), b"null")
+        assert own == "record " + b64encode(leaf_hash(blank)).decode()
+        key = "" if record["type"] == "close" else "key " + b64encode(bytes.fromhex(record["next_key"])).decode()
+        after = before and "after " + b64encode(sha256(before.encode() + b"\n").digest()).decode()
+        assert more == [line for line in (key, after) if line]
+        before = text
+
+
+def test_each_is_signed_by_the_key_that_the_one_before_names(log: list[bytes], log_key: SigningKey) -> None:
+    key = log_key.public
+    for number in signed(log):
+        record = json.loads(log[number])
+        checkpoint = open_note(record["checkpoint"], origin_of("quad 07+é", bytes(range(16)).hex()), key)
+        assert isinstance(checkpoint, Checkpoint)
+        key = checkpoint.key or b""
+        assert key.hex() == record.get("next_key", "")
+
+
+def test_segments_cover_every_byte_but_the_close(log: list[bytes]) -> None:
+    first = 0
+    for epoch, number in enumerate(signed(log)[1:]):
+        record, segment = json.loads(log[number]), b"".join(log[first:number])
+        assert (record["epoch"], record["records"], record["bytes"]) == (epoch, number - first, len(segment))
+        assert record["digest"] == sha256(segment).hexdigest()
+        first = number
+
+
+def test_an_epoch_is_over_after_a_while_or_after_many_records(
+    recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
+) -> None:
+    begin()
+    assert not recorder.due(now(9_999))
+    assert recorder.due(now(10_000))
+    assert not recorder.overdue(now(11_999))
+    assert recorder.overdue(now(12_000))
+    recorder.seal(now(10_000))
+    assert not recorder.due(now(19_999))
+    for _ in range(1_023):
+        assert not recorder.due(now(10_001))
+        recorder.effect(now(10_001), "said")
+    assert recorder.due(now(10_001))
+    assert not recorder.overdue(now(10_001))
+    for _ in range(204):
+        recorder.effect(now(10_001), "said")
+    assert recorder.overdue(now(10_001))
+
+
+def test_a_recorder_goes_on_after_a_crash_with_a_key_of_its_own(log: list[bytes], log_key: SigningKey) -> None:
+    head, later = Head(), Now(40, 1_750_000_000_900_000, 9_000)
+    for number, line in enumerate(log[:5]):
+        head.take(line) if number else head.begin(line, b"its digest" * 3 + b"..")
+    origin = origin_of("quad 07+é", bytes(range(16)).hex())
+    recorder = Recorder.resumed(
+        head, origin, lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, lambda: b"r" * 32
+    )
+    line = recorder.recover(later, discarded_bytes=7, discarded_digest=sha256(b"garbage").digest())
+    record = json.loads(line)
+    assert (record["_prev"], record["seq"], record["epoch"], record["records"]) == (leaf_hash(log[4]).hex(), 5, 0, 5)
+    assert (record["discarded_bytes"], record["discarded_digest"]) == (7, sha256(b"garbage").hexdigest())
+    checkpoint = open_note(record["checkpoint"], origin, log_key.public)
+    assert isinstance(checkpoint, Checkpoint)
+    assert checkpoint.key == EpochKey(b"r" * 32).public
+    assert checkpoint.after == b"its digest" * 3 + b".."
+    close = json.loads(recorder.close(later, ending="recovered", tlog=None))
+    assert isinstance(open_note(close["checkpoint"], origin, EpochKey(b"r" * 32).public), Checkpoint)
+
+
+def test_the_log_key_signs_once_and_is_let_go(recorder: Recorder, begin: Callable[[], bytes]) -> None:
+    begin()
+    with pytest.raises(AssertionError, match="once"):
+        begin()
+
+
+def test_an_epoch_key_does_not_show_its_secret() -> None:
+    assert repr(EpochKey(bytes(32))) == f"<epoch key {EpochKey(bytes(32)).public.hex()}>"
 
 
 def test_origin_has_neither_space_nor_plus() -> None:

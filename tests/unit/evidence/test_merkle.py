@@ -58,3 +58,15 @@ def test_prefixes_keep_leaves_and_nodes_apart() -> None:
     left, right = leaf_hash(b"a"), leaf_hash(b"b")
     assert leaf_hash(left + right) != node_hash(left, right)
     assert sha256(b"").digest() == EMPTY
+
+
+@pytest.mark.parametrize("count", [Tree.TILE - 1, Tree.TILE, Tree.TILE + 1, 2 * Tree.TILE + 5])
+def test_leaves_are_folded_in_together_wherever_the_root_was_asked_for_before(count: int) -> None:
+    entries = [number.to_bytes(2) for number in range(count)]
+    for asked in (None, 1, Tree.TILE - 1, Tree.TILE, count // 2):
+        tree = Tree()
+        for number, entry in enumerate(entries):
+            if number == asked:
+                assert tree.root() == definition(entries[:number])
+            tree.push(leaf_hash(entry))
+        assert (tree.size, tree.root()) == (count, definition(entries))

@@ -17,6 +17,9 @@ from rtshcua.evidence.records import (
     Effect,
     RecordedContext,
     RecordedState,
+    Recover,
+    Seal,
+    Signed,
     encode,
     unsigned,
 )
@@ -50,6 +53,7 @@ effects = st.builds(
     hashes,
     counts,
     texts,
+    st.integers(0, 3),
     texts,
     integers,
     integers,
@@ -84,11 +88,12 @@ decisions = st.builds(
     clause=st.none() | texts,
     clause_at=st.none() | st.tuples(integers, integers, integers),
     context=contexts,
+    durability=st.integers(0, 3),
     invocation=hashes,
     kind=integers,
     link=integers,
     mode=texts,
-    outcome=texts,
+    outcome=st.sampled_from(["allow", "deny", "defer", "fallback"]),
     reason=texts,
     rule_step=integers,
     seq=counts,
@@ -103,20 +108,31 @@ decisions = st.builds(
 )
 closes = st.builds(
     Close,
-    hashes,
-    counts,
-    st.none() | texts,
-    counts,
-    texts,
-    counts,
-    st.none() | hashes,
-    st.just("close"),
-    counts,
-    counts,
+    prev=hashes,
+    at_us=counts,
+    bytes=counts,
+    checkpoint=st.none() | texts,
+    digest=hashes,
+    disclosure=st.none() | hashes,
+    ending=texts,
+    epoch=counts,
+    records=counts,
+    seq=counts,
+    tlog=st.none() | hashes,
+    type=st.just("close"),
+    utc_error_us=counts,
+    utc_us=counts,
 )
+segments = {
+    **dict.fromkeys(("at_us", "bytes", "epoch", "records", "seq", "utc_error_us", "utc_us", "discarded_bytes"), counts),
+    **dict.fromkeys(("prev", "digest", "next_key", "discarded_digest"), hashes),
+}
+recovers = st.builds(Recover, checkpoint=st.none() | texts, type=st.just("recover"), **segments)
+del segments["discarded_bytes"], segments["discarded_digest"]
+seals = st.builds(Seal, checkpoint=st.none() | texts, type=st.just("seal"), **segments)
 
 
-@given(effects | decisions | closes)
+@given(effects | decisions | closes | seals | recovers)
 def test_a_line_is_canonical_and_reads_back(record: AnyRecord) -> None:
     line = encode(record)
     assert line == jcs(msgspec.to_builtins(record)).encode() + b"\n"
@@ -139,13 +155,13 @@ def test_fields_are_sorted_and_begin_with_a_lower_case_letter() -> None:
         assert all(name[0].islower() for name in names if name != "_prev")
 
 
-@given(closes)
-def test_unsigned_is_the_close_without_its_checkpoint(close: Close) -> None:
+@given(closes | seals | recovers)
+def test_unsigned_is_the_record_without_its_checkpoint(close: Signed) -> None:
     signed = b'"checkpoint":' + jcs(close.checkpoint).encode()
     assert encode(unsigned(close)) == encode(close).replace(signed, b'"checkpoint":null')
 
 
-GOOD = encode(Effect("0" * 64, 1, "d", "e", 0, 0, 0, 0, 0, "effect", 3, 2))
+GOOD = encode(Effect("0" * 64, 1, "d", 1, "e", 0, 0, 0, 0, 0, "effect", 3, 2))
 
 
 @pytest.mark.parametrize(
@@ -177,3 +193,47 @@ def test_anything_else_is_refused(line: bytes, slug: str, words: str) -> None:
     assert flaw.slug == slug
     assert words in flaw.text
     assert not any(word in flaw.text for word in ("`int`", "`str`", "`float`", "`bool`", "`array`", "`object`"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "found"),
+    [
+        (b'"outcome":"allow"', b'"outcome":"perhaps"', "perhaps"),
+        (b'"binding":"00"', b'"binding":"0G"', "0G"),
+        (b'"binding":"00"', b'"binding":"000"', "000"),
+        (b'"invocation":""', b'"invocation":"AB"', "AB"),
+    ],
+)
+def test_a_decision_has_one_of_four_outcomes_and_octets_in_hexadecimal(old: bytes, new: bytes, found: str) -> None:
+    context, state = RecordedContext((), 0, 0, 0, 0, 0, "v"), RecordedState(ages=(), values=())
+    line = encode(
+        Decision(
+            "0" * 64,
+            1,
+            "00",
+            None,
+            None,
+            context,
+            1,
+            "",
+            0,
+            -1,
+            "software",
+            "allow",
+            "admitted",
+            8,
+            1,
+            state,
+            0,
+            None,
+            -1,
+            "decision",
+            0,
+            2,
+            3,
+        )
+    )
+    assert not isinstance(read(line), Flaw)
+    flaw = read(line.replace(old, new))
+    assert isinstance(flaw, Flaw)
+    assert (flaw.slug, flaw.found) == ("record/malformed", found)

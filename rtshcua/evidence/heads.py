@@ -1,0 +1,100 @@
+"""Where a log stands: what the next line is linked to, the tree over all lines, and the segment that is under way."""
+
+from collections.abc import Callable
+from hashlib import sha256
+
+from msgspec.structs import replace
+
+from rtshcua.evidence.merkle import Tree, leaf_hash
+from rtshcua.evidence.note import Checkpoint, sign
+from rtshcua.evidence.records import Close, Record, Signed, encode, unsigned
+
+START = "0" * 64  # the genesis has no line before it
+
+_TOGETHER = 256  # lines
+
+
+class Head:
+    """The number of the next record, the hash of the last line, the tree over all lines.
+
+    Of the segment under way: its number `epoch`, its `records` and `octets`, and their digest. Its lines are hashed
+    together, some at a time: that is quicker, and who records something does not wait for it. `after` is the digest of
+    the last checkpoint, which the next one names.
+    """
+
+    __slots__ = ("_first", "_hash", "_lines", "_octets", "_push", "after", "epoch", "prev", "seq", "tree")
+
+    def __init__(self) -> None:
+        self.seq = 0
+        self.prev = START
+        self.tree = Tree()
+        self._push = self.tree.push
+        self.epoch = -1
+        self.after: bytes | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._first = self.seq
+        self._octets = 0  # that are in the hash,
+        self._hash = sha256()
+        self._lines: list[bytes] = []  # and lines that come after them
+
+    @property
+    def records(self) -> int:
+        """How many lines the segment has."""
+        return self.seq - self._first
+
+    @property
+    def octets(self) -> int:
+        """How many bytes it has."""
+        self._settle()
+        return self._octets
+
+    def digest(self) -> str:
+        """SHA-256 of the segment so far, hexadecimal."""
+        self._settle()
+        return self._hash.hexdigest()
+
+    def _settle(self) -> None:
+        if self._lines:
+            data = b"".join(self._lines)
+            self._hash.update(data)
+            self._octets += len(data)
+            self._lines.clear()
+
+    def add(self, record: Record) -> bytes:
+        """The line of a record that was made with this head's `prev` and `seq`; the head then stands after it."""
+        line = encode(record)
+        self.take(line)
+        return line
+
+    def take(self, line: bytes) -> None:
+        """Stand after this line, an ordinary record."""
+        leaf = leaf_hash(line)
+        self._push(leaf)
+        self.prev = leaf.hex()
+        self.seq += 1
+        lines = self._lines
+        lines.append(line)
+        if len(lines) == _TOGETHER:
+            self._settle()
+
+    def begin(self, line: bytes, after: bytes) -> None:
+        """Stand after this line, a signed record with a checkpoint of this digest: a segment begins with it."""
+        self.epoch += 1
+        self.after = after
+        self._begin()
+        self.take(line)
+
+    def seal(self, record: Signed, origin: str, public: bytes, signer: Callable[[bytes], bytes]) -> bytes:
+        """The line of a signed record, made with this head, with its checkpoint over the lines so far."""
+        checkpoint = checkpoint_of(record, origin, self)
+        line = encode(replace(record, checkpoint=sign(checkpoint, public, signer)))
+        self.begin(line, checkpoint.digest())
+        return line
+
+
+def checkpoint_of(record: Signed, origin: str, head: Head) -> Checkpoint:
+    """What the checkpoint of a signed record must say where the log stands at `head`."""
+    key = None if isinstance(record, Close) else bytes.fromhex(record.next_key)
+    return Checkpoint(origin, head.seq, head.tree.root(), leaf_hash(encode(unsigned(record))), key, head.after)

@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.loop import Loop
+from rtshcua.evidence.durability import WRITTEN
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan
 from virtual import case
@@ -33,16 +34,18 @@ _ENDURANCE_US = 10 * HOUR_US
 class Sink(EvidenceFile):
     """The file, written to in virtual time: what was appended is kept."""
 
-    kept = 0
+    kept = synced = 0
 
-    def append(self, line: bytes, durable: bool) -> int:  # type: ignore[override]
+    def append(self, line: bytes, durability: int) -> int:  # type: ignore[override]
         """Write one line, without a sync."""
-        super().append(line, durable=False)
-        self.kept += 1
+        super().append(line, WRITTEN)
+        self.kept = self.synced = self.kept + 1
         return self.kept
 
     def trouble(self) -> None:
         """None."""
+
+    late = trouble
 
 
 def flight() -> Flight:

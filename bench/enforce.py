@@ -20,6 +20,7 @@ from reference import flat_case as flat
 from reference.world import LOG_KEY, START, loaded, renewed
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.durability import WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Append, Dispatch
 from rtshcua.onboard.runtime.admission import Admission
@@ -50,7 +51,7 @@ def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:
     decided = perf_counter_ns()
     for action in journal.take():
         if isinstance(action, Append):
-            file.append(action.line, action.durable)
+            file.append(action.line, min(action.durability, WRITTEN))
     appended = perf_counter_ns()
     assert answer is not None
     dispatch = of.executor.dispatch(answer.permit, START.monotonic_us)
@@ -63,7 +64,8 @@ def main() -> int:
     """Measures, prints, and says whether the limit held."""
     survey = replace(flat.INVOCATIONS[flat.INSPECTION_STEP], step=0)
     of = loaded(mission=replace(flat.MISSION, invocations=(survey,)))
-    recorder = Recorder(lambda text: LOG_KEY.sign(text, duty=Duty.LOG), LOG_KEY.public)
+    recorder = Recorder(lambda text: LOG_KEY.sign(text, duty=Duty.LOG), LOG_KEY.public, lambda: bytes(32))
+    recorder.genesis(START, bundle=b"", root=b"", boot=bytes(16), vehicle="quad-07", mission="m", mode="software")
     with TemporaryDirectory() as folder:
         file = EvidenceFile(Path(folder) / "log")
         [one(of, recorder, file) for _ in range(ROUNDS)]  # warm

@@ -67,10 +67,10 @@ NOT_MOTION = (511, 512)  # SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
 class SlowFile(EvidenceFile):
     """An evidence file on a slow disk."""
 
-    def append(self, line: bytes, durable: bool) -> None:
+    def append(self, line: bytes, durability: int) -> None:
         """Takes its time."""
         time.sleep(WRITE_S)
-        super().append(line, durable)
+        super().append(line, durability)
 
     def sync(self) -> None:
         """Takes much more."""
@@ -84,15 +84,15 @@ class Slowly:
     def __init__(self, file: Any) -> None:
         self._file = file
 
-    def write(self, data: bytes) -> None:
-        """Takes its time."""
-        time.sleep(WRITE_S)
-        self._file.write(data)
+    def write(self, data: bytes) -> int:
+        """Takes its time, as if each batch were synced."""
+        time.sleep(WRITE_S + SYNC_S)
+        return int(self._file.write(data))
 
-    def flush(self) -> None:
+    def sync(self) -> None:
         """Takes much more."""
         time.sleep(SYNC_S)
-        self._file.flush()
+        self._file.sync()
 
 
 class Going:

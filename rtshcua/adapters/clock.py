@@ -5,9 +5,14 @@ from collections.abc import Callable
 from typing import Protocol
 
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.ports import ClockStepped
 
 #: How far UTC may be off where nothing better is known, in us.
 UTC_ERROR_US = 100_000
+
+
+def _machine_us() -> tuple[int, int]:
+    return time.monotonic_ns() // 1_000, time.time_ns() // 1_000
 
 
 class LinkClock(Protocol):
@@ -52,6 +57,33 @@ class SystemClock:
     def us_in(self, seconds: float) -> int:
         """The same in us."""
         return int(seconds * 1_000_000)
+
+
+class StepWatch:
+    """Tells when the machine's time of day was set: it went on otherwise than monotonic time. It looks once a second.
+
+    Records carry on the time of day that they began with; that the machine has another one now is for them to say.
+    """
+
+    def __init__(self, machine_us: Callable[[], tuple[int, int]] = _machine_us, least_us: int = UTC_ERROR_US) -> None:
+        """`machine_us` gives monotonic time and UTC; a difference below `least_us` is no news."""
+        self._machine_us = machine_us
+        self._least_us = least_us
+        monotonic_us, utc_us = machine_us()
+        self._ahead_us = utc_us - monotonic_us
+        self._looked_us = monotonic_us
+
+    def events(self, now: Now) -> list[ClockStepped]:
+        """That it was set since the last call, if it was."""
+        monotonic_us, utc_us = self._machine_us()
+        if monotonic_us - self._looked_us < 1_000_000:
+            return []
+        self._looked_us = monotonic_us
+        by_us = utc_us - monotonic_us - self._ahead_us
+        if abs(by_us) < self._least_us:
+            return []
+        self._ahead_us += by_us
+        return [ClockStepped(now.monotonic_us, by_us)]
 
 
 class PacedClock:

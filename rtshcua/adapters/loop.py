@@ -8,8 +8,10 @@ for nothing.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
+from rtshcua.model.durability import BUFFERED, SYNCED_FIRST
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
+    WITHHELD,
     Action,
     Announce,
     Append,
@@ -19,8 +21,10 @@ from rtshcua.onboard.ports import (
     Ending,
     Event,
     EvidenceFailed,
+    EvidenceKept,
     EvidenceSink,
     Failed,
+    Noted,
     Release,
     Vehicle,
 )
@@ -42,11 +46,18 @@ class Stepped(Protocol):
 Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
 
 
+class _Record(NamedTuple):
+    """How many lines of evidence must be kept before a command is sent, and of which class of durability."""
+
+    lines: int
+    durability: int
+
+
 class _Held(NamedTuple):
-    """A command, and how many lines of evidence must be kept before it is sent."""
+    """A command, and the record that it is held for."""
 
     dispatch: Dispatch
-    lines: int
+    record: _Record
 
 
 class Loop:
@@ -64,7 +75,8 @@ class Loop:
         self._wait_us = wait_us
         self._held_wait_us = min(wait_us, held_wait_us)
         self._held: _Held | None = None
-        self._lines = 0  # that were given to the sink
+        self._lines = sink.kept  # that were given to the sink
+        self._failed: int | None = None  # the sink refused something, when so many lines had been given to it
         self._answers: list[Event] = []
 
     def turn(self, also: Sequence[Event] = ()) -> Ending | None:
@@ -83,28 +95,33 @@ class Loop:
 
     def _tend(self) -> None:
         """See what became of the records; send the command that waits for its own, or withhold it."""
-        reason = self._sink.trouble()
+        reason, late = self._sink.trouble(), self._sink.late()
         if reason is not None:
-            self._answers.append(EvidenceFailed(self._clock.now().monotonic_us, reason))
+            self._fail(reason)
+        elif self._failed is not None and self._sink.kept >= self._lines and self._sink.synced >= self._failed:
+            self._failed = None
+            self._answers.append(EvidenceKept(self._clock.now().monotonic_us))
+        if late is not None:
+            self._answers.append(Noted(self._clock.now().monotonic_us, late))
         held = self._held
         if held is None:
             return
         if reason is not None:
-            self._refuse(held.dispatch, "withheld")
-        elif self._sink.kept >= held.lines:
+            self._refuse(held.dispatch, WITHHELD)
+        elif self._recorded(held.record):
             self._send(held.dispatch)
         elif self._clock.now().monotonic_us > held.dispatch.not_after_us:
             self._refuse(held.dispatch, "late")
 
     def _act(self, actions: Sequence[Action]) -> Ending | None:
         ending: Ending | None = None
-        lines: int | None = self._lines
+        record: _Record | None = _Record(self._lines, BUFFERED)
         for action in actions:
             match action:
                 case Append():
-                    lines = self._append(action, lines)
+                    record = self._append(action, record)
                 case Dispatch():
-                    self._dispatch(action, lines)
+                    self._dispatch(action, record)
                 case Release():
                     self._held = None
                     self._vehicle.release()
@@ -115,27 +132,40 @@ class Loop:
                     ending = how
         return ending
 
-    def _append(self, append: Append, lines: int | None) -> int | None:
-        """How many lines must be kept for this one to be; None if it, or one before it in this step, was refused."""
+    def _append(self, append: Append, record: _Record | None) -> _Record | None:
+        """What a command after it is held for; None if it, or one before it in this step, was refused."""
         try:
-            given = self._sink.append(append.line, append.durable)
+            given = self._sink.append(append.line, append.durability)
         except OSError as error:
-            self._answers.append(EvidenceFailed(self._clock.now().monotonic_us, error.strerror or str(error)))
+            self._lines += 1  # it was taken over all the same
+            self._fail(error.strerror or str(error))
             return None
         self._lines = given
-        return given if lines is not None else None
+        if record is None or not append.awaited:
+            return record
+        return _Record(given, max(record.durability, append.durability))
 
-    def _dispatch(self, dispatch: Dispatch, lines: int | None) -> None:
+    def _dispatch(self, dispatch: Dispatch, record: _Record | None) -> None:
         """Send a command, or hold it until its record is kept. The one that was held is replaced."""
         self._held = None
         if not dispatch.needs_record:
             self._send(dispatch)
-        elif lines is None:
-            self._refuse(dispatch, "withheld")
-        elif self._sink.kept >= lines:
+        elif record is None:
+            self._refuse(dispatch, WITHHELD)
+        elif self._recorded(record):
             self._send(dispatch)
         else:
-            self._held = _Held(dispatch, lines)
+            self._held = _Held(dispatch, record)
+
+    def _recorded(self, record: _Record) -> bool:
+        """Whether a record is as durable as it must be before anything is sent on it."""
+        if record.durability == BUFFERED:
+            return True
+        return (self._sink.synced if record.durability == SYNCED_FIRST else self._sink.kept) >= record.lines
+
+    def _fail(self, reason: str) -> None:
+        self._failed = self._lines
+        self._answers.append(EvidenceFailed(self._clock.now().monotonic_us, reason))
 
     def _send(self, dispatch: Dispatch) -> None:
         """Look at the clock again: what is late is not sent."""

@@ -11,32 +11,45 @@ from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.cli.live.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending
 
 #: the effect that says in the signed log how many frames its telemetry lacks; the close then has no digest of it
 FRAMES_LOST = "frames-lost"
 
+#: of so many records the root from which they are shown in part is worked out in some 15 s: nobody waits for longer
+_MOST_SHOWN = 200_000
+
 
 def close_log(
     recorder: Recorder, sink: EvidenceWriter, frames: TelemetryFile, now: Callable[[], Now], ending: Ending | None,
-    note: Callable[[str], None], heard: Callable[[bytes], None],
+    note: Callable[[str], None], heard: Callable[[bytes], None], disclosure: Callable[[], bytes | None] = lambda: None,
 ) -> tuple[str, ...]:  # fmt: skip
     """Sign and close the log, and give what of the evidence is missing: nothing, if it is whole.
 
-    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the close's line.
+    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the close's line;
+    `disclosure` gives the root from which records are shown in part, once all of them are on the disk.
     """
     missing: list[str] = []
     tlog, lack = _finish(frames)
     if lack is not None:
         note(f"the frame log is not whole: {lack}")
         missing.append(f"{lack} ({TELEMETRY})")
+        at = now()
         with suppress(OSError):
-            sink.append(recorder.effect(now(), FRAMES_LOST, detail=lack), False)
+            if recorder.overdue(at):
+                sink.append(recorder.seal(at), SYNCED_FIRST)
+            sink.append(recorder.effect(at, FRAMES_LOST, detail=lack), WRITTEN)
     if ending is not None:
+        shown = None
+        if recorder.count > _MOST_SHOWN:
+            note("no record of this log can be shown in part: there are too many")
+        else:
+            shown = _settled(sink, disclosure)
         with suppress(OSError):
-            line = recorder.close(now(), ending=ending, tlog=tlog)
-            sink.append(line, True)
+            line = recorder.close(now(), ending=ending, tlog=tlog, disclosure=shown)
+            sink.append(line, SYNCED_FIRST)
             heard(line)
     trouble: OSError | None = None
     try:
@@ -44,10 +57,19 @@ def close_log(
     except OSError as error:
         trouble = error
     if sink.waiting:
-        missing.append(f"{sink.waiting} of {recorder.count} records ({LOG})")
+        hangs = f": {_reason(trouble)}" if isinstance(trouble, TimeoutError) else ""
+        missing.append(f"{sink.waiting} of {recorder.count} records{hangs} ({LOG})")
     elif trouble is not None:
-        missing.append(f"whatever the disk did not sync ({LOG})")
+        missing.append(f"whatever the disk did not sync: {_reason(trouble)} ({LOG})")
     return tuple(missing)
+
+
+def _settled(sink: EvidenceWriter, disclosure: Callable[[], bytes | None]) -> bytes | None:
+    try:
+        sink.settle()
+    except OSError:
+        return None
+    return disclosure()
 
 
 def _finish(frames: TelemetryFile) -> tuple[bytes | None, str | None]:
@@ -59,6 +81,8 @@ def _finish(frames: TelemetryFile) -> tuple[bytes | None, str | None]:
     if frames.error is None and not frames.lost:
         return digest, None
     why = "the disk did not keep up" if frames.error is None else _reason(frames.error)
+    if not frames.lost:
+        return None, f"not all of it is on the disk: {why}"
     return None, f"{frames.lost} frame{'' if frames.lost == 1 else 's'} missing: {why}"
 
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.clock import LinkClock, StepWatch
 from rtshcua.adapters.files.runs import LOG, RunFolder
+from rtshcua.adapters.files.secret import disclosure_of
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, Loop
 from rtshcua.adapters.vehicle.udp import UdpVehicle
@@ -19,15 +20,20 @@ from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
 from rtshcua.cli.live.telling import Teller, plan_of
 from rtshcua.cli.live.watching import Watching
+from rtshcua.cli.past import LOG_BEFORE, Past
+from rtshcua.cli.simulation import SIMULATED
 from rtshcua.cli.tape import Tape
+from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire.keys import Duty, SigningKey
 
 BOOT_BYTES = 16
+_SEED_BYTES = 32
 
 EXIT_CODES = {
     Ending.COMPLETED: ExitCode.OK,
@@ -52,12 +58,17 @@ _KNOWING = (
 
 
 class Flight:
-    """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off."""
+    """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off.
+    `simulated`: what the log says of a flight that was.
+
+    Once it is made, the first record is on the disk. Raises OSError where the disk does not take it.
+    """
 
     def __init__(
         self, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts, tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
-        events: Sequence[Event], agents: Agents | None = None,
+        events: Sequence[Event], past: Past, witnesses: Witnessing, agents: Agents | None = None,
+        simulated: str | None = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
         self._vehicle = vehicle
@@ -69,22 +80,30 @@ class Flight:
         self._speed = speed
         self._early = list(events)
         self._agents = agents
-        self._recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
+        self._witnesses = witnesses
+        self._recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, draw)
         log = run.log()
+        past.begin(log.path)
+        self._past = past
         self._frames = run.telemetry()
         tape.attach(self._frames)
         now = clock.now()
         self._start_us = now.monotonic_us
         policy, mission = loaded.bundle.policy, loaded.bundle.mission
         self._teller = Teller(policy, mission, self._start_us)
-        log.append(
-            self._recorder.genesis(
-                now, bundle=bundle, root=root, boot=secrets.token_bytes(BOOT_BYTES), vehicle=loaded.vehicle,
-                mission=mission.name, mode=loaded.mode,
-            ),
-            True,
-        )  # fmt: skip
+        self._steps = StepWatch()
         self._sink = EvidenceWriter(log)
+        genesis = self._recorder.genesis(
+            now, bundle=bundle, root=root, boot=secrets.token_bytes(BOOT_BYTES), vehicle=loaded.vehicle,
+            mission=mission.name, mode=loaded.mode, before=past.hash, sync_us=clock.us_in(SYNC_US / 1e6),
+        )  # fmt: skip
+        self._sink.append(genesis, SYNCED_FIRST)
+        if simulated is not None:
+            self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
+        if past.note:
+            self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
+        self._sink.settle()
+        witnesses.begin(log.path, lambda: self._sink.synced)
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
         self._feed.post(self._plan())
         self._watch = Watching(
@@ -98,16 +117,24 @@ class Flight:
             ending = self._follow()
         except BaseException:
             self._close(None)
+            self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=False)
             raise
         self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
         if ending is Ending.REFUSED and self._vehicle.driver.unready is not None:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
         missing = self._close(ending)
+        self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=not missing)
+        if not missing:
+            self._past.end(self._recorder.final_hash)
         code = EXIT_CODES[ending]
         if missing and code is ExitCode.OK:
             code = ExitCode.FULL
         summary = keep_summary(self._run, self._summary(ending, code, missing))
         return (code if summary.whole or code is not ExitCode.OK else ExitCode.FULL), summary
+
+    def refuse(self) -> None:
+        """Close the log of a flight that is not to be."""
+        self._close(Ending.REFUSED)
 
     def _plan(self) -> Plan:
         bundle = self._loaded.bundle
@@ -137,6 +164,8 @@ class Flight:
                     pass
             if self._agents is not None:
                 also += self._agents.events(self._clock.now())
+            also += self._witnesses.events(self._clock.now().monotonic_us)
+            also += self._steps.events(self._clock.now())
             ending = loop.turn(also)
             if ending is not None:
                 return ending
@@ -155,9 +184,12 @@ class Flight:
         now = self._clock.now()
         told = "it was told to come down" if self._runtime.homeward else "it could not be told to come down"
         self._vehicle.release()
+        if self._recorder.overdue(now):
+            with suppress(OSError):
+                self._sink.append(self._recorder.seal(now), SYNCED_FIRST)
         line = self._recorder.effect(now, "left", detail=f"the operator stopped watching; {told}; nothing more is sent")
         with suppress(OSError):
-            self._sink.append(line, True)
+            self._sink.append(line, SYNCED)
         self._feed.post(Note(f"left: {told}; nothing more is sent"))
         return Ending.INTERRUPTED
 
@@ -167,6 +199,7 @@ class Flight:
             self._recorder, self._sink, self._frames, self._clock.now, ending,
             lambda text: self._feed.post(Note(text)),
             self._agents.tell if self._agents is not None else lambda line: None,
+            lambda: disclosure_of(self._run.path / LOG, self._recorder.count),
         )  # fmt: skip
 
     def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...]) -> Summary:
@@ -192,6 +225,11 @@ class Flight:
             log=log,
             next=f"rtshcua verify-log {shlex.quote(log)}",
         )
+
+
+def draw() -> bytes:
+    """The secret of an epoch's key."""
+    return secrets.token_bytes(_SEED_BYTES)
 
 
 def _short(path: Path) -> str:

@@ -2,7 +2,6 @@
 
 import gc
 import secrets
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -10,8 +9,8 @@ from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore, read_root
-from rtshcua.adapters.files.replay import FileReplayStore, looked_up
 from rtshcua.adapters.files.runs import RunFolder
+from rtshcua.adapters.files.secret import write_secret
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
@@ -19,7 +18,7 @@ from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
-from rtshcua.cli import simulated
+from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.faults import code_of
 from rtshcua.cli.flight import Flight
@@ -27,14 +26,17 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import PORT_HELP, meet
+from rtshcua.cli.opening import broke_off, flown_before, mark_opened
+from rtshcua.cli.past import Past
 from rtshcua.cli.refused import Refused as Refused
 from rtshcua.cli.showing.document import HANDED_IN, kind_of_document
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.tape import Tape
 from rtshcua.cli.unlock import unlock
+from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
-from rtshcua.onboard.ports import Event, Opening
 from rtshcua.onboard.unheard import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
@@ -42,14 +44,10 @@ from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-#: How long word of whether the vehicle is in the air is waited for, in seconds.
-AIR_S = 5.0
-
 #: up to this many times as fast as life, a real vehicle's time limits leave the machine enough
 _UNHURRIED = 5
 
 _LOOPBACK = "127.0.0.1"
-_POLL_S = 0.05
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
 
 
@@ -79,6 +77,7 @@ class Launch:
     agent_socket: Path | None = None
     dry_run: bool = False
     system: int | None = None
+    witnesses: tuple[Address, ...] = ()
 
 
 def launch(order: Launch) -> ExitCode:
@@ -91,6 +90,8 @@ def launch(order: Launch) -> ExitCode:
     except Untrusted as error:
         help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
         raise Refused(code_of(error.slug), error.slug, str(error), help) from None
+    witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
+    past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
@@ -109,17 +110,23 @@ def launch(order: Launch) -> ExitCode:
 
                 return dry_run(
                     loaded, vehicle, clock, interrupts, events, as_json=order.style == "json", notes=signing.notes,
-                    refusal=_flown_before(order, loaded), unheard=signing.unheard,
+                    refusal=flown_before(order.state, loaded), unheard=signing.unheard,
                 )  # fmt: skip
-            resumed = _opened_before(order, loaded, vehicle, clock, events)
+            assert past is not None
+            resumed = broke_off(order.state, loaded, vehicle, clock, events)
             run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
+            write_secret(run.path, secrets.token_bytes(SECRET_BYTES))
             feed = view.enter_context(Feed(order.style))
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
-                agents=agents,
+                past=past, witnesses=witnesses, agents=agents,
+                simulated=simulation.told(order.speed, own=order.link is None),
             )  # fmt: skip
-            for note in signing.notes:
+            del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
+            if not resumed:
+                mark_opened(order.state, loaded, clock, flight)
+            for note in (*signing.notes, *filter(None, [past.note])):
                 feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
@@ -236,43 +243,3 @@ def _simulate(order: Launch, loaded: Loaded, port: int) -> Simulator:
         return Simulator(["--port", str(port), "--speed", f"{order.speed:g}", *words])
     except SimulatorError as error:
         raise Refused(ExitCode.LINK, "simulator", str(error)) from None
-
-
-def _flown_before(order: Launch, loaded: Loaded) -> str | None:
-    """Why the bundle would not be opened, in words; nothing of it is used up."""
-    policy = loaded.bundle.policy
-    digest = loaded.bundle.mission_digest
-    opening = looked_up(order.state, loaded.vehicle, digest, loaded.expires_us, policy.name, policy.version)
-    return None if opening is Opening.OPENED else _not_opened(loaded, opening)
-
-
-def _not_opened(loaded: Loaded, opening: Opening) -> str:
-    policy = loaded.bundle.policy
-    if opening is Opening.OLD_POLICY:
-        return f"a later version of `{policy.name}` than {policy.version} was in force on `{loaded.vehicle}`"
-    return f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
-
-
-def _opened_before(order: Launch, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
-    """Open the bundle, which works once. True for one that was opened before while the vehicle is in the air.
-
-    Then a run of it broke off up there: nothing of the mission is flown again, but the contingency brings it down.
-    """
-    store = FileReplayStore(order.state, loaded.vehicle)
-    policy = loaded.bundle.policy
-    opening = store.open_once(
-        loaded.bundle.mission_digest, loaded.expires_us, clock.now().utc_us, policy.name, policy.version
-    )
-    if opening is Opening.OPENED:
-        return False
-    if opening is Opening.OLD_POLICY:
-        help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
-        raise Refused(ExitCode.REFUSED, opening, _not_opened(loaded, opening), help)
-    seen = vehicle.driver.seen
-    until_s = time.monotonic() + AIR_S
-    while not seen.landed_state and time.monotonic() < until_s:
-        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    if seen.airborne:
-        return True
-    help = "compile the mission again, which issues it anew"
-    raise Refused(ExitCode.REFUSED, opening, _not_opened(loaded, opening), help)

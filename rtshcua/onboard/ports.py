@@ -6,20 +6,15 @@ times are in us; `at_us` is monotonic.
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Protocol, dataclass_transform
-
-import msgspec
+from typing import Final, Protocol
 
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.frozen import Frozen as Frozen
+from rtshcua.onboard.stores import EvidenceFailed as EvidenceFailed
+from rtshcua.onboard.stores import EvidenceKept as EvidenceKept
 from rtshcua.onboard.stores import EvidenceSink as EvidenceSink
 from rtshcua.onboard.stores import Opening as Opening
 from rtshcua.onboard.stores import ReplayStore as ReplayStore
-
-
-@dataclass_transform(frozen_default=True)
-class Frozen(msgspec.Struct, frozen=True):
-    """The base of events, actions and commands."""
-
 
 # ---------------------------------------------------------------- events
 
@@ -59,8 +54,12 @@ class Succeeded(Frozen, frozen=True):
     token: int
 
 
+#: the reason of a `Failed` command that was not sent because its record could not be kept
+WITHHELD: Final = "withheld"
+
+
 class Failed(Frozen, frozen=True):
-    """Command `token` was refused by the vehicle, or its effect did not come.
+    """Command `token` was refused by the vehicle, or its effect did not come; or it was not sent (`late`, `withheld`).
 
     `text` is the vehicle's own, untrusted.
     """
@@ -96,11 +95,11 @@ class Interrupted(Frozen, frozen=True):
     at_us: int
 
 
-class EvidenceFailed(Frozen, frozen=True):
-    """The evidence sink cannot take records any more (disk full, I/O error)."""
+class ClockStepped(Frozen, frozen=True):
+    """The machine's time of day was set, `by_us` ahead (or back). Records go on by the time of day they began with."""
 
     at_us: int
-    reason: str
+    by_us: int
 
 
 class Said(Frozen, frozen=True):
@@ -122,6 +121,13 @@ class Presented(Frozen, frozen=True):
     sender: int = 0
 
 
+class Anchored(Frozen, frozen=True):
+    """A witness cosigned a checkpoint of the log; `note` is the checkpoint with its signature, which was verified."""
+
+    at_us: int
+    note: str
+
+
 class Noted(Frozen, frozen=True):
     """The vehicle's adapter found something that an operator should know; it decides nothing."""
 
@@ -141,8 +147,11 @@ Event = (
     | LinkBack
     | Interrupted
     | EvidenceFailed
+    | EvidenceKept
+    | ClockStepped
     | Said
     | Presented
+    | Anchored
     | Noted
 )
 
@@ -200,10 +209,14 @@ class Release(Frozen, frozen=True):
 
 
 class Append(Frozen, frozen=True):
-    """Append one evidence line (with its newline). Stands before every action that depends on it."""
+    """Append one evidence line (with its newline), of a class of `evidence.durability`. Stands before every action that
+    depends on it. A `Dispatch` is held for those before it in its step that are `awaited`: for buffered ones not at
+    all, for written and synced ones until they are written, for those that are synced first until they are on the disk.
+    """
 
     line: bytes
-    durable: bool
+    durability: int
+    awaited: bool = True
 
 
 class Show(Frozen, frozen=True):

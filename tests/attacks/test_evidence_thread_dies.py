@@ -4,21 +4,22 @@ from pathlib import Path
 
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.writer import EvidenceWriter
+from rtshcua.evidence.durability import WRITTEN
 
 
 class Breaking(EvidenceFile):
     """Fails as no file should."""
 
-    def append(self, line: bytes, durable: bool) -> None:
+    def append(self, line: bytes, durability: int) -> None:
         if line == b"bad\n":
             raise ValueError("as no file should")
-        super().append(line, durable)
+        super().append(line, durability)
 
 
 def test_it_is_told_and_no_line_after_it_counts_as_kept(tmp_path: Path) -> None:
     writer = EvidenceWriter(Breaking(tmp_path / "log"))
     for line in (b"good\n", b"bad\n", b"lost\n"):
-        writer.append(line, False)
+        writer.append(line, WRITTEN)
     writer.close()
     assert writer.trouble() == "as no file should"
     assert writer.kept < 2

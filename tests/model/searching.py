@@ -17,6 +17,7 @@ from model.snapshot import BEGIN_US, Snapshots
 from model.watching import Ear, Gate, Watch
 from reference import documents, world
 from reference.flat_case import ISSUED
+from reference.seeds import epoch_seeds
 from reference.world import SESSION_KEY
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.mission import Mission
@@ -138,7 +139,8 @@ class Search:
     def __init__(self, of: Small) -> None:
         self._of = of
         self._snapshots = Snapshots(SESSION_KEY, START.utc_us, OLD_US, (Ear,))
-        self._ear = Ear(Recorder(lambda data: world.LOG_KEY.sign(data, duty=Duty.LOG), world.LOG_KEY.public))
+        key = world.LOG_KEY
+        self._ear = Ear(Recorder(lambda data: key.sign(data, duty=Duty.LOG), key.public, epoch_seeds()))
         template = world.loaded(of.policy, of.mission)
         self._template = self._snapshots.take(template)
         self._documents = {name: DOCUMENTS[name](template) for name in of.documents}

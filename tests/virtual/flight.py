@@ -1,13 +1,17 @@
 """A whole flight in one process and in virtual time: simulation, driver, loop, runtime, evidence."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
 
+from reference.seeds import epoch_seeds
+from reference.verifiers import agree
 from rtshcua.adapters.loop import Loop
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.durability import SYNCED_FIRST
 from rtshcua.ground.auditor.audit import Audit, Auditor
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
@@ -34,7 +38,9 @@ class MemorySink:
     def kept(self) -> int:
         return len(self.lines)
 
-    def append(self, line: bytes, durable: bool) -> int:
+    synced = kept
+
+    def append(self, line: bytes, durability: int) -> int:
         self._waiting.append(line)
         if self.full:
             raise OSError(28, "no space left on device")
@@ -43,6 +49,9 @@ class MemorySink:
         return len(self.lines)
 
     def trouble(self) -> str | None:
+        return None
+
+    def late(self) -> str | None:
         return None
 
     def close(self) -> None:
@@ -64,11 +73,13 @@ class Flown:
         self.records = [msgspec.json.decode(line) for line in self.lines]
 
     def audit(self) -> Audit:
-        """What `verify-log` makes of the log."""
+        """What `verify-log` makes of the log; the independent verifier must agree."""
         auditor = Auditor(case.KEYS[Duty.ROOT].kid)
         for line in self.lines:
             auditor.take(line)
-        return auditor.audit()
+        found = auditor.audit()
+        agree(b"".join(self.lines), found)
+        return found
 
     def dispatched(self) -> list[str]:
         return [record["detail"] for record in self.effects("dispatched")]
@@ -91,7 +102,7 @@ class Flight:
     def __init__(
         self, bundle: bytes, config: SimulationConfig, *, trust: tuple[TrustRoot, bytes] | None = None,
         mode: Mode = Mode.SOFTWARE, utc_us: int = case.flat.ISSUED + 60 * case.S, wait_us: int = 100_000,
-        resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
+        resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True, sink: Any = None,
     ) -> None:  # fmt: skip
         root, signed_root = trust or case.root()
         self.clock = vehicle.clock if vehicle else VirtualClock(Now(MONOTONIC_US, utc_us, 1_000))
@@ -105,15 +116,15 @@ class Flight:
         self.vehicle = vehicle or VirtualVehicle(loaded.bundle.policy, config, self.clock, frames, fence=fence)
         loaded.executor.frames = self.vehicle.frames
         log_key = case.KEYS[Duty.LOG]
-        self.recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public)
+        self.recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, epoch_seeds())
         self.runtime = Runtime(loaded, self.recorder, resumed=resumed)
-        self.sink = MemorySink()
+        self.sink = MemorySink() if sink is None else sink(self.clock)
         mission = loaded.bundle.mission.name
         self.sink.append(
             self.recorder.genesis(
                 now, bundle=bundle, root=signed_root, boot=bytes(16), vehicle="quad-07", mission=mission, mode=mode
             ),
-            True,
+            SYNCED_FIRST,
         )
         self.events: list[Event] = []
         self.steps = 0
@@ -125,7 +136,9 @@ class Flight:
         while ending is None:
             assert self.clock.elapsed_us < most_s * case.S, self.runtime.view(self.clock.now())
             ending = self.loop.turn(each(self))
-        self.sink.append(self.recorder.close(self.clock.now(), ending=ending, tlog=None), True)
+        with suppress(OSError):
+            self.sink.append(self.recorder.close(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
+            self.sink.close()
         return Flown(ending, self.sink.lines, self.vehicle, self.steps, self.loaded)
 
     def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:

@@ -1,6 +1,8 @@
 """Writing so that a crash leaves either the old state or the new one, never half of one."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 PRIVATE_FILE, PRIVATE_FOLDER = 0o600, 0o700
@@ -10,6 +12,25 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0) | geta
 
 #: syncs a file's bytes, and of its metadata only what reading them back needs
 sync_data = getattr(os, "fdatasync", os.fsync)
+
+
+class NotWritten(PermissionError):
+    """A file that may not be written where it was asked for."""
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """An error of writing names the file that was asked for, whatever the system was doing."""
+    try:
+        yield
+    except FileExistsError:
+        raise
+    except PermissionError as error:
+        raise NotWritten(error.errno, error.strerror, str(path)) from None
+    except OSError as error:
+        if error.errno is not None:
+            error.filename = str(path)
+        raise
 
 
 def sync_folder(folder: Path) -> None:
@@ -43,29 +64,32 @@ def write_all(handle: int, data: bytes) -> None:
 
 def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
     """Creates a file with its content, synced. Raises FileExistsError; leaves nothing behind when it fails."""
-    handle = open_new(path, mode=mode)
-    try:
-        write_all(handle, data)
-        os.fsync(handle)
-    except OSError:
+    with naming(path):
+        handle = open_new(path, mode=mode)
+        try:
+            write_all(handle, data)
+            os.fsync(handle)
+        except OSError:
+            os.close(handle)
+            path.unlink()
+            raise
         os.close(handle)
-        path.unlink()
-        raise
-    os.close(handle)
 
 
 def replace(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
     """Puts a file with this content in place of whatever was there, in one step. One writer at a time."""
     fresh = path.with_name(path.name + ".new")
-    fresh.unlink(missing_ok=True)
-    write_new(fresh, data, mode=mode)
-    fresh.replace(path)
-    sync_folder(path.parent)
+    with naming(path):
+        fresh.unlink(missing_ok=True)
+        write_new(fresh, data, mode=mode)
+        fresh.replace(path)
+        sync_folder(path.parent)
 
 
 def make_folder(path: Path, *, mode: int = PUBLIC_FOLDER) -> None:
     """Makes a folder and those above it that are missing, each synced; one that is there stays as it is."""
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
-    for folder in reversed(missing):
-        folder.mkdir(mode=mode, exist_ok=True)
-        sync_folder(folder.parent)
+    with naming(path):
+        for folder in reversed(missing):
+            folder.mkdir(mode=mode, exist_ok=True)
+            sync_folder(folder.parent)

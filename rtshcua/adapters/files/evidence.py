@@ -1,10 +1,14 @@
 """The file that evidence lines go to; who must not wait for the disk writes to it through `writer`."""
 
-import os
 from contextlib import suppress
 from pathlib import Path
 
-from rtshcua.adapters.files.durable import PUBLIC_FILE, open_new, sync_data
+from rtshcua.adapters.files.port import SYSTEM, Disk
+from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST
+from rtshcua.evidence.records import is_signed
+
+#: as many buffered lines are written together at the latest
+MOST_BUFFERED = 256
 
 
 class EvidenceFile:
@@ -14,9 +18,13 @@ class EvidenceFile:
     the file is closed. What the disk took of a refused line is cut off again, so the log ends between two records.
     """
 
-    def __init__(self, path: Path) -> None:
+    __slots__ = ("_file", "_length", "_open", "_sync_error", "_taken", "_waiting", "_write", "path")
+
+    def __init__(self, path: Path, disk: Disk = SYSTEM) -> None:
         self.path = path
-        self._handle = open_new(path, mode=PUBLIC_FILE, append=True)
+        self._file = disk.create(path)
+        self._write = self._file.write
+        self._open = True
         self._length = 0  # of the whole lines in the file
         self._taken = 0  # bytes of the first waiting line that stand after them
         self._waiting: list[bytes] = []
@@ -24,40 +32,81 @@ class EvidenceFile:
 
     @property
     def waiting(self) -> int:
-        """How many lines the disk has not taken yet."""
+        """How many lines are not in the file yet: refused by the disk, or buffered."""
         return len(self._waiting)
 
-    def append(self, line: bytes, durable: bool) -> None:
-        """Writes one line; `durable` returns only when it is on the disk.
+    def append(self, line: bytes, durability: int) -> None:
+        """Takes one line over, and returns when it is as durable as this class of `evidence.durability` says: buffered,
+        written, or (synced first) on the disk. To sync what class `SYNCED` promises is the caller's part.
 
-        Raises OSError when this line or one before it could not be written, and, for a durable one, from the first sync
-        that failed on: what the system then reports of the disk cannot be believed any more.
+        Raises OSError when this line or one before it could not be written, and, for one to be synced, from the first
+        sync that failed on: what the system then reports of the disk cannot be believed any more.
         """
-        self._waiting.append(line)
-        self.flush()
-        if durable:
+        if self._waiting or durability == BUFFERED:
+            self._waiting.append(line)
+            if durability == BUFFERED and len(self._waiting) < MOST_BUFFERED:
+                return
+            self.flush()
+        else:
+            try:
+                taken = self._write(line)
+            except OSError:
+                self._waiting.append(line)
+                raise
+            if taken == len(line):
+                self._length += taken
+            else:
+                self._waiting.append(line)
+                self._taken = taken
+                self.flush()
+        if durability == SYNCED_FIRST:
             self.sync()
 
     def flush(self) -> None:
         """Writes what waits. Raises OSError where the disk refuses it still."""
         waiting = self._waiting
         while waiting:
-            line = waiting[0]
+            data = self._together()
             try:
-                while self._taken < len(line):
-                    self._taken += os.write(self._handle, line[self._taken :] if self._taken else line)
+                self._count(self._write(data[self._taken :] if self._taken else data))
             except OSError:
                 self._cut()
                 raise
+
+    def _together(self) -> bytes:
+        """What is written at once of what waits: up to the next signed record."""
+        batch = self._waiting[:MOST_BUFFERED]
+        if is_signed(batch[0]):
+            self.settle()
+            return batch[0]
+        signed = next((number for number, line in enumerate(batch) if is_signed(line)), len(batch))
+        return b"".join(batch[:signed])
+
+    def settle(self) -> None:
+        """Syncs what is in the file, before a signed record is: recovery counts on it that a power cut leaves no damage
+        before one. A disk that refuses does not stop the record; it is told at the next sync.
+        """
+        with suppress(OSError):
+            self.sync()
+
+    def _count(self, taken: int) -> None:
+        """So many more bytes of what waits are in the file."""
+        taken += self._taken
+        whole = 0
+        for line in self._waiting:
+            if taken < len(line):
+                break
+            taken -= len(line)
             self._length += len(line)
-            self._taken = 0
-            del waiting[0]
+            whole += 1
+        self._taken = taken
+        del self._waiting[:whole]
 
     def _cut(self) -> None:
         """Takes the beginning of a refused line off again; where even that is refused, the line goes on from there."""
         if self._taken:
             with suppress(OSError):
-                os.ftruncate(self._handle, self._length)
+                self._file.truncate(self._length)
                 self._taken = 0
 
     def sync(self) -> None:
@@ -65,19 +114,18 @@ class EvidenceFile:
         if self._sync_error is not None:
             raise self._sync_error
         try:
-            sync_data(self._handle)
+            self._file.sync()
         except OSError as error:
             self._sync_error = error
             raise
 
     def close(self) -> None:
         """Writes what waits, syncs, and closes, also when the first two fail. Closing twice does nothing."""
-        if self._handle < 0:
+        if not self._open:
             return
-        handle = self._handle
         try:
             self.flush()
             self.sync()
         finally:
-            self._handle = -1
-            os.close(handle)
+            self._open = False
+            self._file.close()

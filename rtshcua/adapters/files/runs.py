@@ -5,13 +5,22 @@ from pathlib import Path
 
 import msgspec
 
-from rtshcua.adapters.files.durable import make_folder, replace, sync_folder, write_new
+from rtshcua.adapters.files.durable import make_folder, naming, replace, sync_folder, write_new
 from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.files.port import SYSTEM, Disk
 from rtshcua.adapters.files.telemetry import TelemetryFile
 
 BUNDLE, LOG, TELEMETRY, SUMMARY = "mission.bundle", "log.jsonl", "telemetry.tlog", "summary.json"
 
 _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-")
+
+
+def logs_of(given: Path) -> list[Path]:
+    """The logs that are meant: the file itself, that in the folder of a run, or those in all folders below."""
+    if not given.is_dir():
+        return [given]
+    own = given / LOG
+    return [own] if own.is_file() else sorted(given.rglob(LOG))
 
 
 class RunFolder:
@@ -21,13 +30,13 @@ class RunFolder:
         self.path = _new_folder(runs, _folder_name(name, utc_us))
         write_new(self.path / BUNDLE, bundle)
 
-    def log(self) -> EvidenceFile:
+    def log(self, disk: Disk = SYSTEM) -> EvidenceFile:
         """The evidence log, opened for its first line; once."""
-        return EvidenceFile(self.path / LOG)
+        return EvidenceFile(self.path / LOG, disk)
 
-    def telemetry(self) -> TelemetryFile:
+    def telemetry(self, disk: Disk = SYSTEM) -> TelemetryFile:
         """The telemetry log, opened for its first frame; once."""
-        return TelemetryFile(self.path / TELEMETRY)
+        return TelemetryFile(self.path / TELEMETRY, disk)
 
     def write_summary(self, summary: dict[str, object]) -> None:
         """Writes the summary, for a person and for scripts; it proves nothing, the log does."""
@@ -47,7 +56,8 @@ def _new_folder(runs: Path, name: str) -> Path:
     while True:
         path = runs / (name if number == 1 else f"{name}-{number}")
         try:
-            path.mkdir()
+            with naming(path):
+                path.mkdir()
         except FileExistsError:
             number += 1
             continue

@@ -1,16 +1,14 @@
 """The raw frames of a flight, as every MAVLink tool reads them."""
 
 import errno
-import os
 import shutil
 from collections import deque
 from contextlib import suppress
 from hashlib import file_digest
-from io import BufferedWriter, FileIO
 from pathlib import Path
 from threading import Event, Thread
 
-from rtshcua.adapters.files.durable import PUBLIC_FILE, open_new
+from rtshcua.adapters.files.port import SYSTEM, Disk
 from rtshcua.mavlink import tlog
 
 #: frames kept for a disk that does not keep up
@@ -18,6 +16,8 @@ MOST_WAITING = 100_000
 #: Bytes on the disk that frames leave free, for the log and the summary: a flight's log is a few hundred KB.
 LEFT_TO_THE_LOG = 4 << 20
 _EVERY_S = 0.1
+#: a disk that hangs is waited for this long at the end, in seconds
+FINISH_S = 10.0
 
 
 def free_bytes(folder: Path) -> int:
@@ -32,12 +32,12 @@ class TelemetryFile:
     anybody.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, disk: Disk = SYSTEM) -> None:
         self.path = path
         self.error: OSError | None = None
         self.lost = 0  # frames that are not in the file; after an error, of all once it is finished
         self._given = 0
-        self._file = BufferedWriter(FileIO(open_new(path, mode=PUBLIC_FILE), "wb"), 1 << 16)
+        self._file = disk.create(path)
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._over = Event()
         self._thread = Thread(target=self._run, name="telemetry", daemon=True)
@@ -51,16 +51,21 @@ class TelemetryFile:
         else:
             self.lost += 1
 
-    def finish(self) -> bytes:
-        """Closes the file and gives the SHA-256 of what is on the disk; `lost` then says how much that is not."""
+    def finish(self, within_s: float = FINISH_S) -> bytes:
+        """Closes the file and gives the SHA-256 of what is on the disk; `lost` then says how much that is not.
+
+        Raises OSError, also when the disk does not answer in time: what is there then is not known.
+        """
         self._over.set()
-        self._thread.join()
+        self._thread.join(within_s)
+        if self._thread.is_alive():
+            raise OSError(errno.ETIMEDOUT, f"the disk has not answered for {within_s:g} s")
+        if self.error is not None:
+            self.lost = self._given - self._whole()
         try:
             self._file.close()
         except OSError as error:
             self.error = self.error or error
-        if self.error is not None:
-            self.lost = self._given - self._whole()
         with self.path.open("rb") as file:
             return file_digest(file, "sha256").digest()
 
@@ -72,7 +77,7 @@ class TelemetryFile:
                 count += 1
         except tlog.DamagedTlog as damaged:
             with suppress(OSError):
-                os.truncate(self.path, damaged.offset)
+                self._file.truncate(damaged.offset)
         return count
 
     def _run(self) -> None:
@@ -84,10 +89,16 @@ class TelemetryFile:
                 continue
             try:
                 self._look_for_room()
-                self._file.write(b"".join(tlog.encode(utc_us, frame) for utc_us, frame in batch))
-                self._file.flush()
+                data = memoryview(b"".join(tlog.encode(utc_us, frame) for utc_us, frame in batch))
+                while data:
+                    data = data[self._file.write(data) :]
             except OSError as error:
                 self.error = error
+
+        try:
+            self._file.sync()
+        except OSError as error:
+            self.error = self.error or error
 
     def _look_for_room(self) -> None:
         try:

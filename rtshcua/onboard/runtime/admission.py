@@ -2,6 +2,8 @@
 
 from collections import deque
 
+from rtshcua.decision.durability import confirmed, durability_of
+from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Rule
@@ -82,8 +84,12 @@ class Admission:
         clause = self._clause(step, answer)
         target = self._target(step, answer)
         self._show(now, key, answer, "" if clause is None else clause.text)
-        self._journal.line(
-            self._journal.recorder.decision(
+        durability = WRITTEN
+        if kind == STEP:
+            contract = self._in_force.invocations[step].invocation.contract
+            durability = durability_of(contract, answer.outcome, confirmed=confirmed(context), kind=kind)
+        self._journal.decision(
+            self._journal.ready(now).decision(
                 now,
                 kind=kind,
                 step=step,
@@ -99,7 +105,9 @@ class Admission:
                 target=None if target is None else target.text,
                 target_link=max(answer.target, -1),
                 valid_until_us=answer.valid_until_us,
-            )
+                durability=durability,
+            ),
+            durability,
         )
         return answer
 

@@ -6,9 +6,9 @@ counts: `skip` goes on with the next step, `hold` waits like a deferral, `abort`
 that is used up, the contingency. On the ground nothing is sent, and the run ends.
 """
 
-from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
-from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.policy import WithoutEvidence
+from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import End, Ending
@@ -44,6 +44,7 @@ class Conduct:
         self.admission = Admission(loaded, journal, self.queue, remaining)
         self.dispatcher = Dispatcher(loaded.executor, journal, remaining)
         self.fresh = True  # something was received, or began, since the current step was last asked for
+        self.recording = True  # records are kept, or the policy does not ask
         self._journal = journal
         self._limits = limits
         self._resumed = resumed
@@ -96,13 +97,19 @@ class Conduct:
         What already brings the vehicle home or down goes on.
         """
         self._blame(cause)
-        active = self.dispatcher.active
         if not self.aloft:
             self.end(now, cause)
-        elif self.stage is Stage.RUNNING and not (active is not None and active.homeward):
+        elif self.stage is Stage.RUNNING and not self.dispatcher.homeward:
             self.fall_back(FALLBACK_LINK, cause)
         elif self.stage in (Stage.WAITING, Stage.DECIDING):
             self.fall_back(CONTINGENCY_LINK, cause)
+
+    def unrecorded(self, now: Now) -> None:
+        """Records are not kept: as the policy says, the mission is given up, or no further step begins."""
+        if self.loaded.bundle.policy.without_evidence == WithoutEvidence.REFUSE:
+            self.recording = False
+        else:
+            self.break_off(now, Ending.EVIDENCE_LOST)
 
     def recall(self, now: Now) -> None:
         """An operator calls the vehicle back: in the air the contingency flies, on the ground the run ends.
@@ -110,8 +117,7 @@ class Conduct:
         What already brings the vehicle home or down goes on.
         """
         self._blame(Ending.RECALLED)
-        active = self.dispatcher.active
-        homeward = self.stage is Stage.RUNNING and active is not None and active.homeward
+        homeward = self.stage is Stage.RUNNING and self.dispatcher.homeward
         if not self.aloft:
             self.end(now, Ending.RECALLED)
         elif self.stage is not Stage.FALLING and not homeward:
@@ -138,8 +144,7 @@ class Conduct:
 
     def leave(self) -> None:
         """Nobody will watch any more: unless it is on its way home or down already, the last link flies."""
-        active = self.dispatcher.active
-        if self.stage is not Stage.ENDED and self.aloft and not (active is not None and active.homeward):
+        if self.stage is not Stage.ENDED and self.aloft and not self.dispatcher.homeward:
             self._blame(Ending.INTERRUPTED)
             self._fallback.land()
             self.stage = Stage.FALLING
@@ -171,12 +176,23 @@ class Conduct:
         self._supervisor = None
         self._patience.renew()
         self._held = False
-        self.fresh = True
+        # Where no step begins without records, the disk first gets a moment to say what became of those so far.
+        self.fresh = self.loaded.bundle.policy.without_evidence != WithoutEvidence.REFUSE
+        self._asked_us = now.monotonic_us
         self.stage = Stage.DECIDING
 
     def _blame(self, cause: Ending) -> None:
         if self._cause is None or _GRAVITY.index(cause) > _GRAVITY.index(self._cause):
             self._cause = cause
+
+    def come_down(self, now: Now, kind: int = CONTINGENCY_LINK, cause: Ending = Ending.ABORTED) -> bool:
+        """The mission is over: in the air a chain flies, on the ground the run ends."""
+        if cause is not Ending.ABORTED:
+            self._blame(cause)
+        if not self.aloft:
+            return self._give_up(now)
+        self.fall_back(kind)
+        return True
 
     def _give_up(self, now: Now) -> bool:
         """End on the ground; refused if nothing ever flew."""
@@ -190,10 +206,7 @@ class Conduct:
         if not craft.ready or craft.airborne is None:
             if now.monotonic_us - began_us > self._limits.ready_us:
                 self._journal.effect(now, "never-ready")
-                if self.aloft:
-                    self.fall_back(CONTINGENCY_LINK)
-                    return True
-                self._give_up(now)
+                return self.come_down(now)
             return False
         self._journal.effect(now, "ready")
         if self._resumed and craft.airborne:
@@ -219,23 +232,30 @@ class Conduct:
             return False
         self.fresh, self._asked_us = False, now.monotonic_us
         state = self.monitor.state(now.monotonic_us)
+        if not self.recording:
+            if now.monotonic_us < (self.queue.released_us or 0) + invocation.contract.deadline_us:
+                return self._bide(now, invocation, state)
+            return self.come_down(now, cause=Ending.EVIDENCE_LOST)
         answer = self.admission.ask(now, state, (STEP, invocation.step, -1))
         if answer is None or (answer.outcome is Outcome.DENY and not answer.permit):
-            if not self.aloft:
-                return self._give_up(now)
-            self.fall_back(CONTINGENCY_LINK)
-            return True
+            return self.come_down(now)
         if answer.permit:
             return self._start(now, invocation, answer)
         if self._patience.may_wait(invocation, answer, self.queue.released_us or 0, now.monotonic_us):
-            unkept = self._patience.unkept(invocation, state, now) if self.aloft else None
-            if unkept is None:
-                self._hold(now)
-                return False
+            return self._bide(now, invocation, state)
+        return self._inadmissible(now, invocation)
+
+    def _bide(self, now: Now, invocation: Invocation, state: State) -> bool:
+        """The step is not begun yet: in the air it is waited for under a hold, as long as what must hold does."""
+        unkept = self._patience.unkept(invocation, state, now) if self.aloft else None
+        if unkept is not None:
             self.dispatcher.end(now, "violated", unkept)
             self.fall_back(FALLBACK_LINK)
             return True
-        return self._inadmissible(now, invocation)
+        if not self._held and self.aloft and self.dispatcher.active is None:
+            self._held = True  # once, for a hold goes on
+            self._fallback.hold(now, state)
+        return False
 
     def _finish(self, now: Now) -> bool:
         if not self.aloft:
@@ -248,8 +268,8 @@ class Conduct:
     def _start(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
         if not self.dispatcher.fly(now, answer.permit, (STEP, invocation.step, -1), None):
             return self._inadmissible(now, invocation)
-        prepared = self.loaded.invocations[invocation.step]
-        self._supervisor = Supervisor(prepared, self.loaded.policy, now.monotonic_us)
+        loaded = self.loaded
+        self._supervisor = Supervisor(loaded.invocations[invocation.step], loaded.policy, now.monotonic_us)
         self.stage = Stage.RUNNING
         return False
 
@@ -258,29 +278,11 @@ class Conduct:
             self._journal.effect(now, "skipped", kind=STEP, step=invocation.step)
             self.advance(now)
             return True
-        if not self.aloft:
-            return self._give_up(now)
-        self.fall_back(FALLBACK_LINK)
-        return True
-
-    def _hold(self, now: Now) -> None:
-        """In the air, a step that waits does so under the first hold of the contingency; once, for a hold goes on."""
-        if self._held or not self.aloft or self.dispatcher.active is not None:
-            return
-        self._held = True
-        policy = self.loaded.bundle.policy
-        for index, link in enumerate(policy.contingency):
-            if policy.contracts[link.skill].motion.kind == MotionKind.HOLD:
-                key = (CONTINGENCY_LINK, -1, index)
-                answer = self.admission.ask(now, self.monitor.state(now.monotonic_us), key)
-                if answer is not None and answer.permit:
-                    self.dispatcher.fly(now, answer.permit, key, None)
-                return
+        return self.come_down(now, FALLBACK_LINK)
 
     def _supervise(self, now: Now) -> bool:
-        if self._supervisor is None:
-            return False
-        violated = self._supervisor.violated(self.monitor.state(now.monotonic_us), now)
+        watch = self._supervisor
+        violated = None if watch is None else watch.violated(self.monitor.state(now.monotonic_us), now)
         if violated is None:
             return False
         self.dispatcher.end(now, "violated", violated)

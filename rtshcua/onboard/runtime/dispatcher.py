@@ -61,6 +61,11 @@ class Dispatcher:
         """Whether this is the command that flies; a late word about another one means nothing any more."""
         return self.active is not None and self.active.command.token == token
 
+    @property
+    def homeward(self) -> bool:
+        """Whether what flies brings the vehicle home or down."""
+        return self.active is not None and self.active.homeward
+
     def end(self, now: Now, event: str, detail: str = "") -> None:
         """The command that flies ended: record how."""
         active = self.active

@@ -3,7 +3,7 @@
 from enum import Enum, auto
 
 from rtshcua.decision.links import START, Choice, choose_contingency, choose_fallback
-from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.runtime.admission import Admission
@@ -39,6 +39,17 @@ class Fallback:
     def land(self) -> None:
         """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
         self._chain = Chain(CONTINGENCY_LINK, -1, len(self._loaded.bundle.policy.contingency) - 2)
+
+    def hold(self, now: Now, state: State) -> None:
+        """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one."""
+        policy = self._loaded.bundle.policy
+        for index, link in enumerate(policy.contingency):
+            if policy.contracts[link.skill].motion.kind == MotionKind.HOLD:
+                key = (CONTINGENCY_LINK, -1, index)
+                answer = self._admission.ask(now, state, key)
+                if answer is not None and answer.permit:
+                    self._dispatcher.fly(now, answer.permit, key, None)
+                return
 
     def turn(self, now: Now, state: State) -> Progress:
         """Fly the next link, unless one flies whose time is not over."""

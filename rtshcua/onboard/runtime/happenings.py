@@ -2,10 +2,14 @@
 
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
+    WITHHELD,
     AirState,
+    Anchored,
+    ClockStepped,
     Ending,
     Event,
     EvidenceFailed,
+    EvidenceKept,
     Failed,
     Interrupted,
     LinkBack,
@@ -63,14 +67,22 @@ class Happenings:
             case Interrupted():
                 self._journal.effect(now, "interrupted")
                 conduct.break_off(now, Ending.INTERRUPTED)
-            case EvidenceFailed():
-                self._evidence_failed(now, event.reason)
+            case EvidenceFailed() | EvidenceKept():
+                self._evidence(now, event)
+            case ClockStepped():
+                self._journal.effect(now, "clock-stepped", detail=f"{event.by_us:+d} us")
             case Said():
                 self._journal.effect(now, "said", detail=f"{event.severity}: {event.text[:MOST_SAID]}")
-            case Noted():
-                self._journal.effect(now, "noted", detail=event.text)
+            case Noted() | Anchored():
+                self._noted(now, event)
             case Presented():
                 self._inbox.take(now, event)
+
+    def _noted(self, now: Now, event: Noted | Anchored) -> None:
+        if isinstance(event, Anchored):
+            self._journal.anchor(now, event.note)
+        else:
+            self._journal.effect(now, "noted", detail=event.text)
 
     def _air(self, now: Now, event: AirState) -> None:
         conduct, craft = self._conduct, self._conduct.craft
@@ -127,7 +139,9 @@ class Happenings:
         conduct.dispatcher.end(now, "failed", detail)
         if conduct.stage is not Stage.RUNNING:
             return
-        if conduct.aloft:
+        if event.reason == WITHHELD and not conduct.recording:
+            conduct.come_down(now, cause=Ending.EVIDENCE_LOST)
+        elif conduct.aloft:
             conduct.fall_back(FALLBACK_LINK)
         else:
             conduct.end(now, Ending.ABORTED if conduct.craft.flown else Ending.REFUSED)
@@ -140,9 +154,15 @@ class Happenings:
         conduct.fresh = True
         self._journal.effect(now, "link-lost" if lost else "link-back")
 
-    def _evidence_failed(self, now: Now, reason: str) -> None:
-        """Recorded once: the record may fail like the others, and be taken up when the sink can write again."""
-        if not self._gap:
-            self._gap = True
-            self._journal.effect(now, "gap", detail=reason)
-        self._conduct.break_off(now, Ending.EVIDENCE_LOST)
+    def _evidence(self, now: Now, event: EvidenceFailed | EvidenceKept) -> None:
+        """Recorded once a gap: the record may fail like the others, and be taken up when the sink can write again."""
+        if isinstance(event, EvidenceFailed):
+            if not self._gap:
+                self._gap = True
+                self._journal.effect(now, "gap", detail=event.reason)
+            self._conduct.unrecorded(now)
+            return
+        if self._gap:
+            self._gap = False
+            self._journal.effect(now, "gap-over")
+        self._conduct.recording = self._conduct.fresh = True

@@ -53,6 +53,8 @@ class Runtime:
         monitor.observe(now)
         while conduct.turn(now):
             pass
+        if conduct.stage is not _ENDED:  # then the close is the seal
+            self._journal.seal_when_idle(now)
         return self._journal.take()
 
     def leave(self) -> None:

@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from reference.faulty_disk import FaultyDisk, until
 from reference.flat_case import MISSION
-from rtshcua.adapters.files import evidence, runs, telemetry
+from reference.seeds import epoch_seeds
+from rtshcua.adapters.files import runs, telemetry
 from rtshcua.adapters.files.runs import RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.cli.closing import close_log, keep_summary
@@ -17,6 +19,7 @@ from rtshcua.cli.live.lines import ending
 from rtshcua.cli.live.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire.keys import Duty
@@ -36,13 +39,14 @@ class Ended:
     def __init__(self, folder: Path) -> None:
         self.run = RunFolder(folder, name="short", bundle=b"bundle", utc_us=NOW.utc_us)
         key = case.KEYS[Duty.LOG]
-        self.recorder = Recorder(lambda text: key.sign(text, duty=Duty.LOG), key.public)
-        log = self.run.log()
+        self.recorder = Recorder(lambda text: key.sign(text, duty=Duty.LOG), key.public, epoch_seeds())
+        self.disk = FaultyDisk()
+        log = self.run.log(self.disk)
         genesis = self.recorder.genesis(
             NOW, bundle=b"", root=b"", boot=bytes(16), vehicle="quad-07", mission="m", mode="software"
         )
-        log.append(genesis, True)
-        self.sink = EvidenceWriter(log)
+        log.append(genesis, SYNCED_FIRST)
+        self.sink = EvidenceWriter(log, close_s=0.5)
         self.frames = self.run.telemetry()
         self.frames.write(NOW.utc_us, FRAME)
         self.notes: list[str] = []
@@ -93,31 +97,26 @@ def test_a_frame_log_that_is_gone(ended: Ended) -> None:
     assert ended.records()[-1]["tlog"] is None
 
 
-def test_the_records_that_the_disk_refused_are_counted(ended: Ended, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(handle: int, data: bytes) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(evidence.os, "write", refuse)
+def test_the_records_that_the_disk_refused_are_counted(ended: Ended) -> None:
+    ended.disk.room = 0
     for _ in range(4):
-        ended.sink.append(ended.recorder.effect(NOW, "arrived"), False)
+        ended.sink.append(ended.recorder.effect(NOW, "arrived"), WRITTEN)
     assert ended.close() == ("5 of 6 records (log.jsonl)",)
     assert len(ended.records()) == 1
 
 
-def test_what_the_last_try_could_still_write_is_not_missing(ended: Ended, monkeypatch: pytest.MonkeyPatch) -> None:
-    real, left = evidence.os.write, 1
-
-    def refuse_later(handle: int, data: bytes) -> int:
-        nonlocal left
-        if not left:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        left -= 1
-        return real(handle, data)
-
-    monkeypatch.setattr(evidence.os, "write", refuse_later)
-    ended.sink.append(ended.recorder.effect(NOW, "arrived"), False)
+def test_what_the_last_try_could_still_write_is_not_missing(ended: Ended) -> None:
+    ended.sink.append(line := ended.recorder.effect(NOW, "arrived"), WRITTEN)
+    until(lambda: ended.sink.kept == 1)
+    ended.disk.room = len(line)
     assert ended.close() == ("1 of 3 records (log.jsonl)",)
     assert len(ended.records()) == 2
+
+
+def test_a_disk_that_hangs_is_told_and_not_waited_for_for_ever(ended: Ended) -> None:
+    ended.disk.open["sync"].clear()
+    assert ended.close() == ("1 of 2 records: the disk has not answered for 0.5 s (log.jsonl)",)
+    ended.disk.heal()
 
 
 def test_a_fault_leaves_the_log_unsigned(ended: Ended) -> None:

@@ -1,5 +1,7 @@
 """Files that are whole or not there."""
 
+import errno
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -50,3 +52,25 @@ def test_nothing_stays_open_when_the_folder_cannot_be_synced(tmp_path: Path, mon
     with pytest.raises(OSError, match="no sync"):
         durable.open_new(tmp_path / "a", mode=0o644)
     assert len(closed) == 1
+
+
+@pytest.mark.parametrize("write", [durable.write_new, durable.replace])
+def test_an_error_of_writing_names_what_was_asked_for(
+    write: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(handle: int, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def denied(path: Path, *_: int) -> int:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(durable.os, "write", full)
+        with pytest.raises(OSError, match="No space") as caught:
+            write(tmp_path / "a", b"one")
+        assert caught.value.filename == str(tmp_path / "a")
+    with monkeypatch.context() as patched:
+        patched.setattr(durable.os, "open", denied)
+        with pytest.raises(durable.NotWritten) as denial:
+            write(tmp_path / "a", b"one")
+        assert (denial.value.errno, denial.value.filename) == (errno.EACCES, str(tmp_path / "a"))

@@ -1,0 +1,79 @@
+"""That a bundle flies once: looked up before anything is written, and marked before anything is sent."""
+
+import time
+from pathlib import Path
+from typing import Final
+
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.files.replay import FileReplayStore, looked_up
+from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.cli.flight import Flight
+from rtshcua.cli.refused import Refused
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Event, Opening
+
+#: How long word of whether the vehicle is in the air is waited for, in seconds.
+AIR_S: Final = 5.0
+_POLL_S: Final = 0.05
+
+
+def flown_before(state: Path, loaded: Loaded) -> str | None:
+    """Why the bundle would not be opened, in words; nothing of it is used up."""
+    opening = _looked_up(state, loaded)
+    return None if opening is Opening.OPENED else _not_opened(loaded, opening)
+
+
+def _looked_up(state: Path, loaded: Loaded) -> Opening:
+    policy, digest = loaded.bundle.policy, loaded.bundle.mission_digest
+    return looked_up(state, loaded.vehicle, digest, loaded.expires_us, policy.name, policy.version)
+
+
+def _not_opened(loaded: Loaded, opening: Opening) -> str:
+    policy = loaded.bundle.policy
+    if opening is Opening.OLD_POLICY:
+        return f"a later version of `{policy.name}` than {policy.version} was in force on `{loaded.vehicle}`"
+    return f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
+
+
+def broke_off(state: Path, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
+    """True for a bundle that was opened before while the vehicle is in the air; one that can be opened is not yet.
+
+    Then a run of it broke off up there: nothing of the mission is flown again, but the contingency brings it down.
+    """
+    opening = _looked_up(state, loaded)
+    if opening is Opening.OPENED:
+        return False
+    if opening is Opening.OLD_POLICY:
+        raise _not_again(loaded, opening)
+    seen = vehicle.driver.seen
+    until_s = time.monotonic() + AIR_S
+    while not seen.landed_state and time.monotonic() < until_s:
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    if seen.airborne:
+        return True
+    raise _not_again(loaded, opening)
+
+
+def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -> None:
+    """Open the bundle, which works once: after the first record is on the disk, so that a disk that is full uses up no
+    bundle, and before anything is sent. Another run may have been faster; then this one does not fly.
+    """
+    policy = loaded.bundle.policy
+    try:
+        opening = FileReplayStore(state, loaded.vehicle).open_once(
+            loaded.bundle.mission_digest, loaded.expires_us, clock.now().utc_us, policy.name, policy.version
+        )
+    except OSError:
+        flight.refuse()
+        raise
+    if opening is not Opening.OPENED:
+        flight.refuse()
+        raise _not_again(loaded, opening)
+
+
+def _not_again(loaded: Loaded, opening: Opening) -> Refused:
+    help = "compile the mission again, which issues it anew"
+    if opening is Opening.OLD_POLICY:
+        help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
+    return Refused(ExitCode.REFUSED, opening, _not_opened(loaded, opening), help)

@@ -1,0 +1,38 @@
+"""The log key signs the first record of a flight; after that the process holds it no more."""
+
+import gc
+from typing import Any
+
+import pytest
+
+from rtshcua.cli import app
+from rtshcua.cli.flight import Flight
+from rtshcua.cli.refused import Refused
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.keys import Duty, SigningKey
+
+
+def held(public: bytes) -> list[SigningKey]:
+    """All objects of this process that are that key."""
+    gc.unfreeze()
+    gc.collect()
+    return [each for each in gc.get_objects() if isinstance(each, SigningKey) and each.public == public]
+
+
+def test_the_log_key_is_let_go_before_the_flight(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    bundle = ground.bundle()
+    public = ground.store.signing_key(Duty.LOG).public
+    here = ground.store.signing_key(Duty.LOG)
+    assert held(public) == [here], "it would be found"
+    del here
+    found: list[int] = []
+
+    def fly(flight: Flight) -> Any:
+        found.append(len(held(public)))
+        flight.refuse()
+        raise Refused(ExitCode.REFUSED, "enough", "this is all that is asked")
+
+    monkeypatch.setattr(Flight, "fly", fly)
+    monkeypatch.chdir(ground.folder)
+    assert app.main(["run", bundle, "--json", "--speed", "20"]) == ExitCode.REFUSED
+    assert found == [0]

@@ -1,0 +1,116 @@
+"""Which log a vehicle wrote last: the next one names it, and the log of a flight that broke off is given its end.
+
+    <state folder>/logs/vehicle-<identity>     JSON: {"before", "last", "log"}
+
+`log` is where the last log lies, `before` what its genesis names, and `last` the hash of its last line (hexadecimal),
+null until it was closed. It is written when the log was made and is empty yet, and again when it was closed.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
+
+from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace
+from rtshcua.adapters.files.recovery import InUse, Recovered
+from rtshcua.evidence.recovery import State
+
+_HASH = re.compile(r"[0-9a-f]{64}")
+
+
+class Earlier(NamedTuple):
+    """The log before the next one: the hash of its last line, None where there is none or it is not known; and what
+    there is to tell of it, empty where all is as it should be.
+    """
+
+    last: str | None
+    note: str = ""
+
+
+class LastLog:
+    """Remembers the last log of the vehicle called `vehicle` (its identity). One process at a time writes."""
+
+    def __init__(self, state: Path, vehicle: str) -> None:
+        self.path = state / "logs" / f"vehicle-{quote(vehicle, safe='')}"
+
+    def settle(self, recover: Callable[[Path], Recovered]) -> Earlier:
+        """The last log, ended by `recover` where it has no end. Never raises: a flight does not wait for a log."""
+        try:
+            known = _remembered(self.path)
+        except (OSError, ValueError) as error:
+            return Earlier(None, f"it is not known which log came before: `{self.path}`: {_words(error)}")
+        if known is None:
+            return Earlier(None)
+        log, before, last = known
+        if last is not None:
+            return Earlier(last)
+        try:
+            return _told(log, before, recover(log))
+        except (OSError, InUse) as error:
+            return Earlier(None, f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}")
+
+    def begin(self, log: Path, before: str | None) -> None:
+        """A log was made that will name `before`. Raises OSError."""
+        self._write(log, before, None)
+
+    def end(self, log: Path, before: str | None, last: str) -> None:
+        """It was closed; `last` is the hash of its last line. Raises OSError."""
+        self._write(log, before, last)
+
+    def _write(self, log: Path, before: str | None, last: str | None) -> None:
+        make_folder(self.path.parent, mode=PRIVATE_FOLDER)
+        told = {"before": before, "last": last, "log": str(log.resolve())}
+        replace(self.path, json.dumps(told).encode() + b"\n", mode=PRIVATE_FILE)
+
+
+def known_end(state: Path, log: Path) -> str | None:
+    """The hash of the last line of a log that a vehicle here wrote last, if it was closed; None where nobody knows."""
+    where = log.resolve()
+    for path in sorted((state / "logs").glob("vehicle-*")):
+        with suppress(OSError, ValueError):
+            known = _remembered(path)
+            if known is not None and known[0] == where and known[2] is not None:
+                return known[2]
+    return None
+
+
+def _remembered(path: Path) -> tuple[Path, str | None, str | None] | None:
+    """The last log, what it names, and how it ends. Raises OSError, and ValueError for what was not written by this."""
+    try:
+        told = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    if not isinstance(told, dict) or not isinstance(told.get("log"), str):
+        raise ValueError("it is damaged")
+    return Path(told["log"]), _hash(told.get("before")), _hash(told.get("last"))
+
+
+def _told(log: Path, before: str | None, done: Recovered) -> Earlier:
+    found = done.found
+    if done.done:
+        text = f"the log before, `{log}`, was not closed: it is recovered, {found.records} records of it are kept"
+        return Earlier(done.last, text if not found.discarded else f"{text}, {found.discarded} octets discarded")
+    if found.state is State.CLOSED:
+        return Earlier(done.last)
+    if found.state is State.UNBEGUN:
+        return Earlier(before)
+    reason = "" if found.reason is None else f" (record {found.reason.record}: {found.reason.text})"
+    what = "was tampered with" if found.state is State.TAMPERED else "is of another log key"
+    return Earlier(done.last, f"the log before, `{log}`, {what} and is left as it is{reason}")
+
+
+def _hash(value: object) -> str | None:
+    if value is None:
+        return None
+    if not isinstance(value, str) or not _HASH.fullmatch(value):
+        raise ValueError("it is damaged")
+    return value
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, OSError):
+        return (error.strerror or str(error)).lower()
+    return "it is damaged" if isinstance(error, ValueError) else str(error)

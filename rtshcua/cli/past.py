@@ -1,0 +1,46 @@
+"""What was before a flight: the vehicle's last log, ended if it was not, and named by the next one."""
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from rtshcua.adapters.files.last_log import Earlier, LastLog
+from rtshcua.adapters.files.recovery import alone, recover
+from rtshcua.cli.recover import signer_of
+from rtshcua.wire.keys import SigningKey
+
+#: the effect that says, in the signed log, what there was to tell of the one before
+LOG_BEFORE = "log-before"
+
+
+class Past:
+    """Ends the last log of a vehicle, where it must, when it is made. `hash` and `note` are for the next log."""
+
+    def __init__(self, state: Path, vehicle: str, log_key: SigningKey) -> None:
+        self._last = LastLog(state, vehicle)
+        signer = signer_of(log_key)
+        self._earlier: Earlier = self._last.settle(lambda path: recover(path, signer))
+        self._log: Path | None = None
+        self._held = ExitStack()
+
+    @property
+    def hash(self) -> str | None:
+        """The hash of the last line of the log before, None where there is none, or it is not known."""
+        return self._earlier.last
+
+    @property
+    def note(self) -> str:
+        """What there is to tell of it; empty where all is as it should be."""
+        return self._earlier.note
+
+    def begin(self, log: Path) -> None:
+        """The next log was made, and nothing is in it yet; nobody recovers it before `end`. Raises OSError."""
+        self._held.enter_context(alone(log))
+        self._last.begin(log, self.hash)
+        self._log = log
+
+    def end(self, last: str) -> None:
+        """It is closed; `last` is the hash of its last line. Where that cannot be kept, the log is asked again."""
+        assert self._log is not None
+        with suppress(OSError):
+            self._last.end(self._log, self.hash, last)
+        self._held.close()

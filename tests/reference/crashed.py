@@ -1,0 +1,81 @@
+"""Logs of flights that break off, and what must be true of them once they were recovered."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+from rtshcua.adapters.files.recovery import Signer
+from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.verify import verify
+from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.wire.keys import Duty, SigningKey
+
+LOG_KEY = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
+UTC_US = 1_750_000_000_000_000
+_STATE = State(tuple(range(12)), tuple(range(12)))
+
+
+def certify(text: bytes) -> bytes:
+    return LOG_KEY.sign(text, duty=Duty.LOG)
+
+
+def signer(chance: Random, *, utc_us: int = UTC_US + 86_400_000_000) -> Signer:
+    """Recovers a day later, after a restart of the machine."""
+    return Signer(LOG_KEY.public, certify, lambda: chance.randbytes(32), lambda: Now(1_000_000, utc_us, 2_000))
+
+
+def writes(chance: Random, *, seals: int = 40) -> Iterator[tuple[bytes, int]]:
+    """The lines of a log without end, each with its class of durability; one in `seals` is a seal."""
+    recorder = Recorder(certify, LOG_KEY.public, lambda: chance.randbytes(32))
+    at_us = 5_000_000
+
+    def now() -> Now:
+        nonlocal at_us
+        at_us += chance.randint(0, 2_000)
+        return Now(at_us, UTC_US + at_us, 2_000)
+
+    yield (
+        recorder.genesis(
+            now(), bundle=b"bundle" * 40, root=b"root", boot=chance.randbytes(16), vehicle="quad-07", mission="short",
+            mode="software",
+        ),
+        3,
+    )  # fmt: skip
+    while True:
+        durability = chance.choice((1, 1, 1, 2, 2, 3))
+        if chance.random() * seals < 1:
+            yield recorder.seal(now()), 3
+        elif chance.random() < 0.5:
+            yield (
+                recorder.effect(now(), "sent", token=1, detail="é" * chance.randint(0, 60), durability=durability),
+                durability,
+            )
+        else:
+            yield _decision(recorder, now(), durability), durability
+
+
+def _decision(recorder: Recorder, now: Now, durability: int) -> bytes:
+    context = Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),))
+    return recorder.decision(
+        now, kind=0, step=0, link=-1, invocation=bytes(60), state=_STATE, context=context, outcome=Outcome.ALLOW,
+        reason=Reason.ADMITTED, rule_step=8, clause=None, clause_at=None, target=None, target_link=-1,
+        valid_until_us=6_000_000, durability=durability,
+    )  # fmt: skip
+
+
+def unverified(path: Path, lines: list[bytes], acknowledged: int) -> str:
+    """What is wrong with a recovered log of these lines, of which so many were acknowledged; nothing: empty."""
+    data = path.read_bytes()
+    report = verify(data.splitlines(keepends=True))
+    if report.verdict is not Verdict.VERIFIED:
+        return f"it does not verify: {report.failure or report.shortfall}"
+    kept = 0
+    for line, found in zip(lines, data.splitlines(keepends=True), strict=False):
+        if line != found:
+            break
+        kept += 1
+    if kept < acknowledged:
+        return f"{acknowledged} lines were acknowledged, {kept} are kept"
+    return ""

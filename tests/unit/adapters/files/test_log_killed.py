@@ -1,0 +1,27 @@
+"""Writers that are killed at random moments: nothing that was acknowledged is lost, and the log is recovered."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from reference import killed
+
+TESTS = Path(killed.__file__).parents[1]
+
+
+def kill(count: int, seed: int) -> None:
+    """In a process of its own, which has no threads and can fork."""
+    command = [sys.executable, killed.__file__, str(count), str(seed)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env={"PYTHONPATH": str(TESTS)})
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+
+
+def test_what_was_acknowledged_survives_a_kill() -> None:
+    kill(15, 1)
+
+
+@pytest.mark.soak
+def test_what_was_acknowledged_survives_five_hundred_kills() -> None:
+    kill(500, 1_000)

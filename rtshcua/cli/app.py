@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import cast
+from typing import Any, cast
 
 from rtshcua import __version__
 from rtshcua.cli.faults import as_json, barrier, fail, say
@@ -60,6 +60,7 @@ def _call(row: Row, words: list[str]) -> int:
     from typer.main import get_command
 
     command = get_command(import_module(row.module).app)
+    _unguarded(command)
     try:
         with command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context:
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
@@ -69,6 +70,18 @@ def _call(row: Row, words: list[str]) -> int:
         return fail(ExitCode.INTERRUPTED, "stopped at a question that was not answered")
     except typer.TyperException as error:
         return _misused(row, error, words)
+
+
+def _unguarded(command: object) -> None:
+    """Leaves it to the command to open its files: one that cannot be read is bad input, not a wrong command line."""
+    for parameter in getattr(command, "params", ()):
+        described = getattr(parameter, "type_descriptor", None)
+        each: Any
+        for each in (getattr(described, "parameter_info", None), getattr(parameter, "type", None)):
+            if hasattr(each, "readable"):
+                each.readable = False
+    for verb in getattr(command, "commands", {}).values():
+        _unguarded(verb)
 
 
 def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:

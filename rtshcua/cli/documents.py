@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from rtshcua.adapters.agent_client import hand_in
-from rtshcua.adapters.files.durable import PRIVATE_FILE
+from rtshcua.adapters.files.durable import PRIVATE_FILE, naming
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.cli.faults import distrust, fail
@@ -46,9 +46,10 @@ def refuse(error: Untrusted) -> ExitCode:
 def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:
     """Write a document, or hand it to the flight, and say what became of it. Raises OSError."""
     if output is not None:
-        handle = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, PRIVATE_FILE)
-        with os.fdopen(handle, "wb") as file:
-            file.write(document)
+        with naming(output):
+            handle = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, PRIVATE_FILE)
+            with os.fdopen(handle, "wb") as file:
+                file.write(document)
     if to is None:
         return _say(ExitCode.OK, "written", f"{what}, written to {output}", as_json=as_json)
     said = hand_in(to, document)

@@ -8,9 +8,10 @@ RTSHCUA_DEBUG=1 shows the traceback of an internal fault.
 import errno
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.untrusted import Untrusted
@@ -23,7 +24,7 @@ _LINK = {
     errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENETUNREACH, errno.ENOTCONN, errno.ETIMEDOUT,
 }  # fmt: skip
 _INPUT = {
-    errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
+    errno.E2BIG, errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.ENOTEMPTY, errno.ENXIO, errno.EPERM,
 }  # fmt: skip
 
@@ -100,7 +101,7 @@ def barrier(command: Callable[[], int]) -> int:
     except BrokenPipeError:
         return ExitCode.FULL  # quiet, for the reader left on purpose; not 0, for it may have missed the verdict
     except OSError as error:
-        return fail(exit_code_of(error), _words_of(error))
+        return unreadable(error)
     except Untrusted as error:
         return distrust(error)
     except Exception as error:  # noqa: BLE001  the barrier is the one place that may catch everything
@@ -132,7 +133,31 @@ def exit_code_of(error: OSError) -> ExitCode:
     """The exit code for an error of the operating system: the link, the input, or else the output."""
     if error.errno in _LINK or (isinstance(error, (ConnectionError, TimeoutError)) and error.errno not in _FULL):
         return ExitCode.LINK
+    if isinstance(error, PermissionError):
+        from rtshcua.adapters.files.durable import NotWritten
+
+        return ExitCode.FULL if isinstance(error, NotWritten) else ExitCode.INPUT
     return ExitCode.INPUT if error.errno in _INPUT else ExitCode.FULL
+
+
+def unreadable(error: OSError) -> ExitCode:
+    """Fails for what the operating system would not do."""
+    return fail(exit_code_of(error), _words_of(error))
+
+
+def of_each(paths: Iterable[Path], work: Callable[[Path, bool], ExitCode]) -> ExitCode:
+    """The first exit code that is not 0, of `work` on each file; it is also told which is the first. One that cannot be
+    read is told, and the others come all the same.
+    """
+    codes = []
+    for number, path in enumerate(paths):
+        try:
+            codes.append(work(path, number == 0))
+        except OSError as error:
+            if error.filename is None:
+                raise  # what we write on
+            codes.append(unreadable(error))
+    return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
 
 
 def _words_of(error: OSError) -> str:

@@ -3,7 +3,10 @@
 import signal
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import Enum, auto
+from threading import current_thread, main_thread
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -11,6 +14,19 @@ from typing import Self
 LEAVE_S = 3.0
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def terminated_as_interrupted() -> Iterator[None]:
+    """Within this, in the main thread, SIGTERM is what Ctrl-C is."""
+    if current_thread() is not main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 class Wish(Enum):

@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
+from rtshcua.adapters.files.durable import naming
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.documents import subject
 from rtshcua.cli.faults import code_of
@@ -77,12 +78,13 @@ def replace_with(
 
 def write_whole(target: Path, data: bytes) -> None:
     """Write the whole file or nothing: a full disk leaves no half of one under its name."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(name).chmod(0o644)
-        Path(name).replace(target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    with naming(target):
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            Path(name).chmod(0o644)
+            Path(name).replace(target)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise

@@ -12,7 +12,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
-from rtshcua.cli import simulated
+from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.faults import fail, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.diagnostics.exits import ExitCode
@@ -60,6 +60,10 @@ def run(
     agent_socket: Annotated[
         Path | None, typer.Option(metavar="PATH", help="a local socket: records go out, signed documents come in")
     ] = None,
+    witness: Annotated[
+        list[str] | None,
+        typer.Option(metavar="udpout:HOST:PORT", help="a `rtshcua witness` that is shown the log; repeatable"),
+    ] = None,
     rehearsal: Annotated[
         bool, typer.Option("--dry-run", help="decide every step against the present state; send no motion")
     ] = False,
@@ -84,6 +88,7 @@ def run(
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
     try:
         link = None if connect is None else address.parse(connect)
+        witnesses = witnessed.addresses(witness or ())
     except ValueError as error:
         return fail(ExitCode.USAGE, str(error))
     if link is not None and link.way != "udpin":
@@ -114,6 +119,7 @@ def run(
             dry_run=rehearsal,
             fence=not no_fence and not rehearsal,
             system=system,
+            witnesses=witnesses,
         )
         try:
             return launch(order)

@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.cli.faults import distrust, fail
+from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.showing.bundle import show_bundle
 from rtshcua.cli.showing.document import kind_of_document, show_document
 from rtshcua.cli.showing.keys import KEY_FILE, show_key, show_root
@@ -45,6 +47,8 @@ def show(
     if shown is None:
         help = "sources are shown by any editor; `rtshcua check` reports on them"
         return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
+    if shown["kind"] == "log" and not shown["records"]:
+        return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")
     print(json.dumps(shown, ensure_ascii=False) if as_json else page)
     return ExitCode.OK
 
@@ -52,7 +56,7 @@ def show(
 def _show(page: Page, path: Path) -> dict[str, object] | None:
     """Adds what the file holds to the page; None for what nobody here knows. Raises `Untrusted`."""
     now_us = time.time_ns() // 1000
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(_SNIFF)
         file.seek(0)
         if head.startswith(_LOG):

@@ -17,6 +17,11 @@ def plain(text: str) -> str:
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 
+def many(count: int, what: str) -> str:
+    """So many of something."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def shorten(text: str, width: int) -> str:
     """At most `width` characters of a text, with an ellipsis where it was longer."""
     return text if len(text) <= width else text[: width - 1] + "…"

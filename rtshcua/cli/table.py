@@ -38,7 +38,12 @@ COMMANDS = (
     Row("replace", "fly", "hand a flight the mission that takes the place of its own"),
     Row("doctor", "fly", "say what a vehicle supports, and what would stop a mission"),
     Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station"),
+    Row("recover", "fly", "end the log of a flight that broke off, and lose nothing of it"),
+    Row("witness", "fly", "cosign logs from the ground, so that they cannot be rewritten or cut"),
     Row("verify-log", "audit", "prove that a flight's log is whole, signed, and decides the same again"),
+    Row("prove", "audit", "prove one record of a log, or that nothing changed since, in a small file"),
+    Row("verify-proof", "audit", "verify such a file, which needs no log"),
+    Row("archive", "audit", "keep many logs, verified, and ask them questions"),
     Row("why", "audit", "show a decision step by step: what decided, and what would have passed"),
     Row("show", "audit", "print a bundle, a key, a trust root or a log for a person"),
 )

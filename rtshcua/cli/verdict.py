@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import wrap
 
+from rtshcua.cli.flown import lasted_us
 from rtshcua.cli.pin import Pin
 from rtshcua.cli.shown import plain, shorten, utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Claim, Finding
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.ground.auditor.audit import Audit
 
 #: what a kind of failure means to whoever must act on it, by the first part of its slug
@@ -20,19 +21,27 @@ MEANINGS = {
     "record": "A line was damaged or written by something else: it is not what this program writes.",
     "chain": "The log was changed after it was written, or records were taken out, added or moved.",
     "clock": "The recorded times contradict each other: records were put together from elsewhere, or the clock failed.",
-    "close": "The end of the log was forged or damaged: its signature does not cover these records.",
+    "seal": "What stands here is not what was signed: it was changed by someone who did not hold the key of the time.",
+    "close": "The end of the log was forged or damaged: it is not the end of these records.",
     "trust": "Not trusted here: the log may be sound in itself, but it does not rest on the root that you trust.",
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
     "document": "An approval, a recall or a replacement was forged, or taken in where it should have been refused.",
     "dispatch": "The vehicle was commanded without the permission that the log should show first.",
+    "frames": "The raw frames show a command that the log does not: it went out without a record before it.",
+    "anchor": "A witness outside saw another log: this one was rewritten or cut, by someone who held its keys.",
     "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",
     "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",
+}
+#: the same, of what makes a log incomplete
+_SHORT = {
+    "anchor": "The log is whole, and witnesses outside did not see all of it: `rtshcua witness` cosigns it.",
+    "close": "The program stopped before it closed the log, or its end was cut off. What came after is not known.",
+    "tail": MEANINGS["tail"],
 }
 #: what to do about a failure, by its slug
 _HELPS = {
     "trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key",
 }
-_INCOMPLETE = "The program stopped before it closed the log, or its end was cut off. What came after is not known."
 
 _WIDTH = 100
 _SHOWN = 160
@@ -41,6 +50,7 @@ _TITLES = {
     Verdict.INCOMPLETE: ("INCOMPLETE", "bold yellow"),
     Verdict.FAILED: ("FAILED", "bold red"),
 }
+_SIGNED = {"genesis", "seal", "recover", "close"}
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
@@ -54,6 +64,15 @@ def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str
         "exit_code": int(code),
         "pinned": {"key": pinned.key.hex(), "source": pinned.source},
         "records": report.records,
+        "signed": report.sealed,
+        "epochs": report.epochs,
+        "anchored": report.anchored,
+        "unanchored_tail": report.records - report.anchored,
+        "witness_threshold": None if report.outside is None else report.outside.threshold,
+        "witnesses": [
+            {"name": each.name, "records": each.size + 1, "time_s": each.time_s}
+            for each in (() if report.outside is None else report.outside.witnessed)
+        ],
         "counts": dict(report.counts),
         "failure": _finding(report.failure),
         "shortfall": _finding(report.shortfall),
@@ -66,7 +85,7 @@ def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str
             "boot": genesis.boot,
             "log_key": genesis.log_kid,
             "begun_utc_us": genesis.utc_us,
-            "lasted_us": report.last_us - genesis.at_us,
+            "lasted_us": lasted_us(report, path),
             "ending": None if close is None else close.ending,
         },
         "root": report.root.hex(),
@@ -85,11 +104,12 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     """Prints the whole for a person."""
     report = audit.report
     lines: list[tuple[str, str]] = [] if first else [("", "")]
-    lines += [("", f"log     {plain(str(path))}"), *_flight(report), ("", f"pinned  {plain(pinned.source)}"), ("", "")]
+    lines += [("", f"log     {plain(str(path))}"), *_flight(report, path)]
+    lines += [("", f"pinned  {plain(pinned.source)}"), ("", "")]
     title, style = _TITLES[report.verdict]
     finding = report.failure or report.shortfall
     if finding is None:
-        lines.append((style, f"{title}  {_many(report.records, 'record')}, closed and signed; unanchored"))
+        lines.append((style, f"{title}  {_many(report.records, 'record')}, closed and signed; {_anchored(report)}"))
     else:
         lines.append((style, f"{title}  at record {finding.record}, line {finding.record + 1}: {finding.slug}"))
         lines += _why(finding, failed=report.failure is not None)
@@ -98,11 +118,11 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     _print(lines)
 
 
-def _flight(report: Report) -> list[tuple[str, str]]:
+def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
     genesis, close = report.genesis, report.close
     if genesis is None:
         return []
-    seconds = (report.last_us - genesis.at_us) / 1_000_000
+    seconds = lasted_us(report, path) / 1_000_000
     ending = f", {plain(close.ending)}" if close is not None else ""
     what = f"`{plain(genesis.mission)}` on `{plain(genesis.vehicle)}`, {utc(genesis.utc_us)}, {seconds:.1f} s"
     return [("", f"flight  {what}, mode {plain(genesis.mode)}{ending}")]
@@ -111,23 +131,39 @@ def _flight(report: Report) -> list[tuple[str, str]]:
 def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
     kind = finding.slug.partition("/")[0]
     yield from (("", f"  {line}") for line in wrap(plain(finding.text), _WIDTH))
+    if finding.offset >= 0:
+        yield "", f"  begins    at byte {finding.offset} of the log"
     if finding.expected:
         yield "", f"  expected  {shorten(plain(finding.expected), _SHOWN)}"
     if finding.found:
         yield "", f"  found     {shorten(plain(finding.found), _SHOWN)}"
-    meaning = MEANINGS[kind] if failed or kind == "tail" else _INCOMPLETE
+    meaning = (MEANINGS if failed else _SHORT)[kind]
     yield from (("", f"  {line}") for line in wrap(meaning, _WIDTH))
     if finding.slug in _HELPS:
         yield "", f"  help      {_HELPS[finding.slug]}"
+
+
+def _anchored(report: Report) -> str:
+    if not report.anchored:
+        return (report.outside and cosigned(report.outside)) or "unanchored"
+    tail = report.records - report.anchored
+    return f"anchored but for the last {_many(tail, 'record')}" if tail else "anchored to its end"
 
 
 def _counts(report: Report) -> Iterable[tuple[str, str]]:
     counts = report.counts
     if not counts:
         return
+    epochs = f", in {_many(report.epochs, 'sealed epoch')}" if report.epochs else ""
+    if set(counts) <= _SIGNED:
+        yield "", f"  {_many(report.records, 'record')}{epochs}; those that sign were read"
+        return
     outcomes = ", ".join(f"{counts[name]} {name}" for name in _OUTCOMES if counts.get(name))
     decisions = f"{_many(counts.get('decision', 0), 'decision')}{f' ({outcomes})' if outcomes else ''}"
-    yield "", f"  {_many(report.records, 'record')} read: {decisions}, {_many(counts.get('effect', 0), 'effect')}"
+    yield (
+        "",
+        f"  {_many(report.records, 'record')} read: {decisions}, {_many(counts.get('effect', 0), 'effect')}{epochs}",
+    )
 
 
 def _many(count: int, what: str) -> str:

@@ -1,69 +1,123 @@
 """`rtshcua verify-log`: prove what a log proves, and name the first record that fails."""
 
-import gc
 import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from hashlib import file_digest
 from pathlib import Path
-from typing import Annotated, BinaryIO
+from typing import Annotated, NamedTuple
 
 import typer
 
-from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.runs import BUNDLE, LOG, SUMMARY, TELEMETRY
-from rtshcua.cli.faults import distrust, fail
+from rtshcua.adapters.files.verification import Asked, Progress, verify_carefully, verify_quickly
+from rtshcua.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
+from rtshcua.cli.disclosed import disclosed
+from rtshcua.cli.faults import distrust, fail, of_each
+from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin, pin
+from rtshcua.cli.simulation import with_simulated
 from rtshcua.cli.verdict import as_object, as_text
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.finding import Claim, Finding
-from rtshcua.evidence.report import Report, Verdict
-from rtshcua.ground.auditor.audit import Audit, Auditor
-from rtshcua.wire.bundle import MAX_BUNDLE
+from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-_MARK = b'"format":"rtshcua/log"'
-_HEAD = 1 << 26
 _LONG = 32 << 20  # bytes of a log that is worth a progress bar
+
+
+class Wanted(NamedTuple):
+    """How a log is verified: how deep, by how many, and whether it must be anchored to its end."""
+
+    audit: bool = False
+    derive: bool = True
+    fast: bool = False
+    jobs: int = 0
+    anchored: bool = False
 
 
 @app.command()
 def verify_log(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="a log, or the folder of a run")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")],
     root: Annotated[
         str | None, typer.Option(metavar="FILE|KEY", help="the trust root or its key [default: your key store's]")
     ] = None,
+    audit: Annotated[bool, typer.Option("--audit", help="read every record, and derive every decision again")] = False,
+    no_derive: Annotated[
+        bool, typer.Option("--no-derive", help="with --audit: read every record, but derive none")
+    ] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="hold the octets against the signatures, and nothing more")
+    ] = False,
+    jobs: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            metavar="N",
+            show_default=False,
+            help="processes that verify; 0, the default: one a core where the log is long. --audit has one always",
+        ),
+    ] = 0,
+    anchors: Annotated[
+        list[Path] | None,
+        typer.Option("--anchors", metavar="FILE", help="what witnesses cosigned, besides `*.anchors`"),
+    ] = None,
+    require_anchor: Annotated[
+        bool, typer.Option("--require-anchor", help="a log that witnesses did not see to its end is incomplete")
+    ] = False,
+    explain: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="audit the log, and tell of record N in words")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object a log on the standard output")] = False,
 ) -> ExitCode:
-    """Verify logs offline: chain, signature, trust, and every decision once more.
+    """Verify logs offline, from the log and one pinned key.
 
-    With several logs the exit code is the first that is not 0.
+    As it is: what was signed by whom, the chain of all records, and their tree. With --audit also the form of each
+    record, its clocks, and every decision once more; that is the slow way, and what an investigation wants. With
+    several logs the exit code is the first that is not 0.
     """
+    if (audit or explain is not None) and fast:
+        return fail(ExitCode.USAGE, "`--fast` does not go with `--audit` or `--explain`", "--fast reads no record")
+    if no_derive and not (audit or explain is not None):
+        return fail(ExitCode.USAGE, "`--no-derive` goes with `--audit`", "without `--audit` nothing is derived")
     try:
         pinned = pin(root)
     except Untrusted as error:
         help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else None
         return distrust(error, help, where="no root to trust: ")
-    codes = [_verify(path, pinned, as_json=as_json, first=number == 0) for number, path in enumerate(logs)]
-    return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
+    if explain is not None:
+        from rtshcua.cli.explaining import explained
+
+        return explained(logs, explain, pinned, tuple(anchors or ()), derive=not no_derive, as_json=as_json)
+    wanted = Wanted(audit, not no_derive, fast, jobs, require_anchor)
+    named = tuple(anchors or ())
+    return of_each(
+        logs_meant(logs), lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first)
+    )
 
 
-def _verify(given: Path, pinned: Pin, *, as_json: bool, first: bool) -> ExitCode:
-    path = given / LOG if given.is_dir() else given
-    folder = path.parent if path.name == LOG else None
-    with path.open("rb") as file:
-        size = path.stat().st_size
-        if size and _MARK not in file.readline(_HEAD):
-            return fail(ExitCode.INPUT, f"`{given}` is not a log of this program", "`rtshcua show` says what it is")
-        file.seek(0)
-        audit = _audit(file, size, pinned, _beside(folder))
-    if folder is not None:
-        audit = audit._replace(
-            report=_with_summary(_with_telemetry(audit.report, folder / TELEMETRY), folder / SUMMARY)
-        )
+def _verify(
+    given: Path, pinned: Pin, wanted: Wanted, anchors: tuple[Path, ...], *, as_json: bool, first: bool
+) -> ExitCode:
+    path = log_of(given)
+    if not is_log(path):
+        return fail(ExitCode.INPUT, f"`{given}` is not a log of this program", NO_LOG_HELP)
+    asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
+    raw = raw_frames(path)
+    with _progress(path.stat().st_size) as told:
+        if wanted.audit:
+            frames = raw.frames if raw is not None and wanted.derive else None
+            audit = verify_carefully(path, asked, derive=wanted.derive, frames=frames, progress=told)
+        else:
+            audit = verify_quickly(path, asked, fast=wanted.fast, jobs=wanted.jobs, progress=told)
+    report = audit.report
+    if raw is not None:
+        report = raw.unread(report) if wanted.fast else raw.judged(report, followed=wanted.audit and wanted.derive)
+    report = disclosed(report, path, audited=wanted.audit)
+    report = with_summary(_required(report) if wanted.anchored else report, path)
+    report = with_unread(with_simulated(report, path), path)
+    audit = audit._replace(report=report)
     code = exit_code(audit.report)
     if as_json:
         print(json.dumps(as_object(audit, path, pinned, code), ensure_ascii=False))
@@ -72,80 +126,25 @@ def _verify(given: Path, pinned: Pin, *, as_json: bool, first: bool) -> ExitCode
     return code
 
 
-def exit_code(report: Report) -> ExitCode:
-    """The exit code for a report."""
-    if report.failure is None:
-        return ExitCode.OK if report.verdict is Verdict.VERIFIED else ExitCode.INCOMPLETE
-    trust = report.failure.slug.startswith("trust/") or report.failure.slug == "genesis/format"
-    return ExitCode.UNTRUSTED if trust else ExitCode.EVIDENCE
-
-
-def _beside(folder: Path | None) -> bytes | None:
-    """The bundle in a run's folder: the log should be of it."""
-    if folder is None or not (folder / BUNDLE).exists():
-        return None
-    with (folder / BUNDLE).open("rb") as file:
-        return file.read(MAX_BUNDLE + 1)
-
-
-def _audit(file: BinaryIO, size: int, pinned: Pin, bundle: bytes | None) -> Audit:
-    auditor = Auditor(pinned.key, bundle=bundle)
-    gc.disable()  # nothing here makes cycles, and looking for them costs a tenth
-    try:
-        with _progress(file, size) as source:
-            for line in source:
-                if not auditor.take(line):
-                    break
-    finally:
-        gc.enable()
-    return auditor.audit()
+def _required(report: Report) -> Report:
+    """The report of a log that must be anchored to its end."""
+    if report.verdict is not Verdict.VERIFIED or report.anchored == report.records:
+        return report
+    text = "witnesses did not see the log to its end, as was asked for"
+    few = "" if report.outside is None else cosigned(report.outside)
+    found, expected = f"{report.anchored} records{few and f', the rest {few}'}", f"{report.records} records"
+    return report._replace(shortfall=Finding("anchor/missing", report.anchored, text, found, expected))
 
 
 @contextmanager
-def _progress(file: BinaryIO, size: int) -> Iterator[Iterator[bytes]]:
-    """The lines of a file, with a bar on the terminal while a long one is read."""
+def _progress(size: int) -> Iterator[Progress]:
+    """What takes how far a log of so many octets is read: a bar on the terminal if it is long."""
     if size < _LONG or not sys.stderr.isatty():
-        yield lines(file)
+        yield lambda _: None
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress as Bar
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    with Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("verifying", total=size)
-
-        def counted() -> Iterator[bytes]:
-            for number, line in enumerate(lines(file)):
-                if not number & 0xFFF:
-                    bar.update(task, completed=file.tell())
-                yield line
-
-        yield counted()
-
-
-def _with_summary(report: Report, path: Path) -> Report:
-    """The report, with what it says of the summary beside the log."""
-    if report.failure is not None or not path.exists():
-        return report
-    claim = Claim("summary", f"`{path.name}`: nothing signs it, and it was not read; what counts stands in the log")
-    return report._replace(unproven=(*report.unproven, claim))
-
-
-def _with_telemetry(report: Report, path: Path) -> Report:
-    """The report, with what it says of the raw frames whose digest the close signs."""
-    close = report.close
-    if close is None or report.failure is not None:
-        return report
-    if close.tlog is None:
-        if not path.exists():
-            return report
-        claim = Claim("telemetry", f"the raw frames: the log does not vouch for `{path.name}`, which is not whole")
-        return report._replace(unproven=(*report.unproven, claim))
-    if not path.exists():
-        claim = Claim("telemetry", f"the raw frames: `{path.name}` does not lie beside the log")
-        return report._replace(unproven=(*report.unproven, claim))
-    with path.open("rb") as file:
-        found = file_digest(file, "sha256").hexdigest()
-    if found == close.tlog:
-        return report._replace(proven=(*report.proven, Claim("telemetry", f"`{path.name}` is the one that was signed")))
-    text = f"`{path.name}` was changed: it is not the telemetry whose digest the close signs"
-    return report._replace(failure=Finding("telemetry/changed", close.seq, text, found, close.tlog))
+        yield lambda done: bar.update(task, completed=done)

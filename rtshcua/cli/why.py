@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.cli.faults import fail
 from rtshcua.cli.findings import Findings, exit_code
@@ -57,7 +58,7 @@ def why(
     """
     page = for_terminal()
     file = path / LOG if path.is_dir() else path
-    with file.open("rb") as opened:
+    with open_regular(file) as opened:
         logged = opened.read(len(_LOG)) == _LOG
     if logged:
         if step is not None or state or at is not None or waited or mission is not None:

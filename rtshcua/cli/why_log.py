@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.files.regular import open_regular
 from rtshcua.cli.faults import fail
+from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.showing.link import show_link
 from rtshcua.cli.showing.log import Names
 from rtshcua.cli.showing.page import Page
@@ -18,7 +20,7 @@ from rtshcua.cli.subject import Subject, after, unpacked
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.ground.why.link import of_contingency, trace_link
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
@@ -45,7 +47,8 @@ class _Log:
 
     def __init__(self, path: Path, number: int | None) -> None:
         self.start_us = 0
-        self.chosen: Decision | Effect | Close | None = None
+        self.chosen: Decision | Effect | Close | Recover | Seal | None = None
+        self.what = ""  # that record in one line
         self.subject: Subject | None = None  # the mission in force when the chosen record was written
         self.aloft = False  # something was sent before the chosen record that may have lifted it off
         self.ended: list[_Told] = []
@@ -55,9 +58,14 @@ class _Log:
         self._in_force: Subject | None = None
         self._flown = False
 
+    @property
+    def begun(self) -> bool:
+        """Whether its first record could be read."""
+        return self._in_force is not None
+
     def read(self) -> ExitCode | None:
         """Read all of it; an exit code where it makes no sense, which was told."""
-        with self._path.open("rb") as opened:
+        with open_regular(self._path) as opened:
             for line in lines(opened):
                 record = read(line)
                 if isinstance(record, Flaw):
@@ -76,12 +84,14 @@ class _Log:
             return None
         self._names.follow(record)
         self._choose(record)
+        if isinstance(record, Seal):
+            return None
         if isinstance(record, Effect):
             self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
         if isinstance(record, Decision):
             if record.kind != STEP:
                 self.ended.append(self._tell(record))
-        elif isinstance(record, Close):
+        elif isinstance(record, Close | Recover):
             self.ended.append(self._tell(record))
         elif record.event == "approval":
             self.answers.append((record.step, self._tell(record)))
@@ -94,10 +104,10 @@ class _Log:
             self._in_force = newer
         return None
 
-    def _tell(self, record: Decision | Effect | Close) -> _Told:
+    def _tell(self, record: Decision | Effect | Close | Recover | Seal) -> _Told:
         return _Told(record.seq, record.at_us, self._names.tell(record))
 
-    def _choose(self, record: Decision | Effect | Close) -> None:
+    def _choose(self, record: Decision | Effect | Close | Recover | Seal) -> None:
         if self._number is not None:
             if record.seq == self._number:
                 self._hold(record)
@@ -108,8 +118,9 @@ class _Log:
         if not isinstance(held, Decision) or held.outcome == "allow" or record.outcome != "allow":
             self._hold(record)
 
-    def _hold(self, record: Decision | Effect | Close) -> None:
+    def _hold(self, record: Decision | Effect | Close | Recover | Seal) -> None:
         self.chosen, self.subject, self.aloft = record, self._in_force, self._flown
+        self.what = self._names.tell(record)
 
 
 def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | ExitCode:
@@ -118,9 +129,11 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     refused = log.read()
     if refused is not None:
         return refused
+    if not log.begun:
+        return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")
     chosen, subject = log.chosen, log.subject
     if chosen is None or subject is None:
-        what = "no decision on a step" if number is None else f"no decision or effect with the number {number}"
+        what = "no decision on a step" if number is None else f"no record {number} that can be explained"
         return fail(ExitCode.INPUT, f"`{path}` has {what}", "`rtshcua show` lists the records with their numbers")
     page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
     shown = _decision(page, chosen, subject, log.aloft) if isinstance(chosen, Decision) else _effect(page, chosen, log)
@@ -153,12 +166,11 @@ def _decision(page: Page, chosen: Decision, subject: Subject, aloft: bool) -> di
     return fail(ExitCode.INPUT, f"record {chosen.seq} decides on a step or link that the bundle does not have")
 
 
-def _effect(page: Page, chosen: Effect | Close, log: _Log) -> dict[str, object]:
-    told = next((each for each in log.ended if each.seq == chosen.seq), None)
-    event = chosen.event if isinstance(chosen, Effect) else "close"
-    detail = chosen.detail if isinstance(chosen, Effect) else chosen.ending
+def _effect(page: Page, chosen: Effect | Close | Recover | Seal, log: _Log) -> dict[str, object]:
+    event = chosen.event if isinstance(chosen, Effect) else chosen.type
+    detail = chosen.detail if isinstance(chosen, Effect) else chosen.ending if isinstance(chosen, Close) else ""
     page.head(f"{event}: something that happened, not a decision")
-    page.row("says", told.what if told is not None else detail)
+    page.row("says", log.what.strip())
     return {"kind": "why", "event": event, "detail": detail}
 
 

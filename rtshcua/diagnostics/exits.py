@@ -22,10 +22,16 @@ class ExitCode(IntEnum):
     STOOD_DOWN = 7, "stood-down", "the pilot or the autopilot's own failsafe took over; the runtime stood down"
     LINK = 8, "link", "no vehicle answered, the port is busy, or the vehicle went silent"
     EVIDENCE = 9, "evidence", "the log fails verification; the first record that fails was named"
-    INCOMPLETE = 10, "incomplete", "the log verifies as far as it goes, but has no signed close"
+    INCOMPLETE = 10, "incomplete", "the log verifies as far as it goes, but lacks its close, or the anchor asked for"
+    DECISION = 11, "decision", "the log is whole and signed, but a decision does not derive or a command had no record"
+    ANCHOR = 12, "anchor", "the log contradicts what a witness cosigned: it was rewritten or cut"
     FAULT = 70, "fault", "an internal fault, never your input: please report it"
     FULL = 74, "io", "writing failed: disk full, device error, or a closed pipe"
-    INTERRUPTED = 130, "interrupted", "stopped by Ctrl-C; a flight falls back and closes its log first"
+    INTERRUPTED = (
+        130,
+        "interrupted",
+        "stopped by Ctrl-C; a flight falls back and closes its log first, a waiting witness ends with 0",
+    )
 
     def __new__(cls, value: int, slug: str, meaning: str) -> "ExitCode":
         member = int.__new__(cls, value)

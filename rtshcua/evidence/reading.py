@@ -5,10 +5,31 @@ import re
 import msgspec
 
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.records import FORMAT, VERSION, AnyRecord, Close, Decision, Effect, Genesis, encode
+from rtshcua.evidence.records import (
+    FORMAT,
+    VERSION,
+    AnyRecord,
+    Close,
+    Decision,
+    Effect,
+    Genesis,
+    Recover,
+    Seal,
+    encode,
+)
+from rtshcua.model.outcome import Outcome
 
 #: the longest line in bytes; a genesis carries a whole bundle
 LONGEST = 1 << 26
+
+
+def may_be_torn(line: bytes, prev: str) -> bool:
+    """Whether a last line without its end may be what a crash left of the record after the line of hash `prev`: its
+    beginning, or nothing but zeros, as a file system leaves what was not on the disk yet.
+    """
+    start = b'{"_prev":"' + prev.encode() + b'","at_us":'
+    return line.startswith(start) or start.startswith(line) or not line.strip(b"\0")
+
 
 _TYPE = b',"type":"'  # no text can hold it, for a quote inside a text stands behind a backslash
 _VERSION = re.compile(rb',"version":(\d{1,15})[,}]')
@@ -16,8 +37,12 @@ _DECODERS: dict[bytes, msgspec.json.Decoder[AnyRecord]] = {
     b"genesis": msgspec.json.Decoder(Genesis),
     b"decision": msgspec.json.Decoder(Decision),
     b"effect": msgspec.json.Decoder(Effect),
+    b"seal": msgspec.json.Decoder(Seal),
+    b"recover": msgspec.json.Decoder(Recover),
     b"close": msgspec.json.Decoder(Close),
 }
+_OUTCOMES = frozenset(outcome.name.lower() for outcome in Outcome)
+_DIGITS = "0123456789abcdef"
 _WORDS = {
     "`int`": "an integer", "`float`": "a fraction", "`str`": "a text", "`bool`": "a truth value", "`null`": "null",
     "`array`": "a list", "`object`": "an object", "JSON is malformed": "it is not JSON",
@@ -30,7 +55,7 @@ def read(line: bytes) -> AnyRecord | Flaw:
     name = line[start : line.find(b'"', start)] if start >= len(_TYPE) else b""
     decoder = _DECODERS.get(name)
     if decoder is None:
-        return Flaw("record/malformed", "it is not a record: genesis, decision, effect or close")
+        return Flaw("record/malformed", "it is not a record: genesis, decision, effect, seal, recover or close")
     try:
         record = decoder.decode(line)
     except UnicodeDecodeError:
@@ -42,8 +67,21 @@ def read(line: bytes) -> AnyRecord | Flaw:
         return Flaw("record/malformed", f"it has not the form of a record of type {name.decode()}: {_words(error)}")
     if encode(record) != line:
         return Flaw("record/not-canonical", "it is not written in the one form that this record has (RFC 8785)")
+    if isinstance(record, Decision):
+        return _decision(record)
     if isinstance(record, Genesis) and (record.format != FORMAT or record.version != VERSION):
         return _unknown_format(record.format, record.version)
+    return record
+
+
+def _decision(record: Decision) -> Decision | Flaw:
+    if record.outcome not in _OUTCOMES:
+        text = "it has not the form of a record of type decision: its outcome is none that there is"
+        return Flaw("record/malformed", text, record.outcome, ", ".join(sorted(_OUTCOMES)))
+    for octets in (record.binding, record.invocation):
+        if octets.strip(_DIGITS) or len(octets) & 1:
+            text = "it has not the form of a record of type decision: its binding or invocation is not hexadecimal"
+            return Flaw("record/malformed", text, octets)
     return record
 
 

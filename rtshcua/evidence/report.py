@@ -1,11 +1,17 @@
 """What a verification says: what was proven, what was not, and the first record that fails."""
 
 from collections.abc import Mapping
+from datetime import UTC, datetime, timedelta
 from enum import Enum
 from typing import NamedTuple
 
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.records import Close, Genesis
+from rtshcua.evidence.seals import Recoveries
+from rtshcua.evidence.witnessing.anchors import Anchored
+
+_LAST_S = 253_402_300_799  # the end of the year 9999
+_NONE = Recoveries()
 
 
 class Verdict(Enum):
@@ -21,7 +27,9 @@ class Report(NamedTuple):
 
     `records` is how many were sound, `counts` how many of each kind: record types, and outcomes of the decisions.
     `failure` is the first record that fails; `shortfall` says why a log without failure is incomplete. `root` is the
-    RFC 9162 root over the sound records (for a closed log, the signed one); `last_us` the last record's monotonic time.
+    RFC 9162 root over the sound records; `last_us` the last record's monotonic time. `sealed` of the records lie up to
+    the last signature, in `epochs` and the record that signs; `anchored` of them the threshold of witnesses has
+    cosigned. `outside` is what all witnesses saw, of a log without failure.
     """
 
     records: int
@@ -34,6 +42,10 @@ class Report(NamedTuple):
     root: bytes
     proven: tuple[Claim, ...]
     unproven: tuple[Claim, ...]
+    sealed: int = 0
+    epochs: int = 0
+    anchored: int = 0
+    outside: Anchored | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -44,17 +56,110 @@ class Report(NamedTuple):
 
 
 def claims(
-    records: int, genesis: Genesis | None, close: Close | None, failure: Finding | None
-) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
-    """What the chain of `records` sound records proves, and what it does not, whoever holds the keys."""
+    records: int, sealed: int, epochs: int, genesis: Genesis | None, close: Close | None, failure: Finding | None,
+    recoveries: Recoveries = _NONE,
+) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:  # fmt: skip
+    """What the chain of `records` sound records proves, and what it does not; `sealed` of them are signed for."""
     if failure is not None:
         text = f"a log that fails proves nothing, neither about record {failure.record} nor about those around it"
         return (), (Claim("log", text),)
-    first = "record 0 is" if records == 1 else f"records 0 to {records - 1} are"
-    chain = Claim("chain", f"{first} whole, in order, and follow one another without a gap")
-    if genesis is None or close is None:
-        text = "no signed close: whatever was cut off the end, or rewritten from any record on, cannot be seen"
-        return (chain,), (Claim("signed-close", text),)
-    text = f"closed and signed by log key {genesis.log_kid}: nothing was changed, added or taken out since"
-    anchor = "unanchored: no witness outside holds this log's root, so the log key's holder could have written it anew"
-    return (chain, Claim("signed-close", text)), (Claim("anchor", anchor),)
+    assert genesis is not None
+    chain = Claim("chain", f"{_span(0, records)} whole, in order, and follow{_s(records)} one another without a gap")
+    seals = Claim("seals", f"{_span(0, sealed)} signed for, in {epochs} sealed epoch{'' if epochs == 1 else 's'}")
+    if close is None:
+        text = "no signed close: whatever was cut off the end cannot be seen"
+        unproven = [Claim("signed-close", text)]
+        if records > sealed:
+            text = f"{_span(sealed, records)} chained but not yet signed for: anyone could have written them anew"
+            unproven.append(Claim("seals", text))
+        return (chain, seals), (*unproven, unanchored(records, 0))
+    text = (
+        f"closed and signed by log key {genesis.log_kid} and the keys of the epochs after it: nothing was changed, "
+        f"added or taken out by anyone who did not hold the log key, or the epoch keys of the time{_loose(recoveries)}"
+    )
+    return (chain, seals, Claim("signed-close", text)), (unanchored(records, 0),)
+
+
+def _loose(recoveries: Recoveries) -> str:
+    """What no key spoke for until a recovery did."""
+    if not recoveries.crashes:
+        return ""
+    many = f"{recoveries.unsigned} record{'' if recoveries.unsigned == 1 else 's'}"
+    return f"; but for {many}, unsigned when the log broke off, and what stood after them"
+
+
+def unsealed(recoveries: Recoveries) -> tuple[Claim, ...]:
+    """What is not proven of a log that was recovered."""
+    crashes = recoveries.crashes
+    if not crashes:
+        return ()
+    after = "a crash" if crashes == 1 else f"{crashes} crashes"
+    text = (
+        f"recovered after {after}: that the last records before (unsigned then: {recoveries.unsigned}) are as they "
+        f"were written, and that no others came after them (discarded: {recoveries.discarded} octets)"
+    )
+    return (Claim("recovered", text),)
+
+
+def with_anchors(report: Report, anchored: Anchored) -> Report:
+    """A report without failure, with what witnesses saw of its log."""
+    count = min(anchored.records, report.records)
+    unproven = tuple(claim for claim in report.unproven if claim.slug != "anchor")
+    if count < report.records:
+        unproven = (unanchored(report.records, count, anchored), *unproven)
+    if anchored.rejected:
+        unproven = (*unproven, rejected(anchored))
+    proven = report.proven
+    if count:
+        saw = [seen for seen in anchored.witnessed if seen.size + 1 >= count]
+        text = f"{_span(0, count)} as {_list([f'`{seen.name}`' for seen in saw])} saw {'it' if count == 1 else 'them'}"
+        when = max(seen.time_s for seen in saw)
+        proven = (*proven, Claim("anchor", f"{text}, outside of the vehicle, {utc_of(when)}"))
+    return report._replace(anchored=count, proven=proven, unproven=unproven, outside=anchored)
+
+
+def rejected(anchored: Anchored) -> Claim:
+    """What notes of witnesses do not say, for they are damaged or forged."""
+    many = "1 note" if anchored.rejected == 1 else f"{anchored.rejected} notes"
+    text = f"what {many} of witnesses would say, damaged or forged and passed over: {anchored.first}"
+    return Claim("anchor/signature", text)
+
+
+def cosigned(anchored: Anchored) -> str:
+    """By how many of how many witnesses more is cosigned than is anchored, in words; empty where by none."""
+    if not anchored.ahead:
+        return ""
+    return f"cosigned by {len(anchored.ahead)} of the {anchored.threshold} witnesses that are needed"
+
+
+def utc_of(time_s: int) -> str:
+    """A moment in seconds since the Unix epoch, for a person."""
+    if time_s > _LAST_S:
+        return f"{time_s} s after the Unix epoch"
+    return (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=time_s)).strftime("%Y-%m-%d %H:%M:%SZ")
+
+
+def unanchored(records: int, anchored: int, outside: Anchored | None = None) -> Claim:
+    """What is not proven where the first `anchored` of `records` records are held by witnesses; `outside` says whether
+    some of the others were cosigned, by too few.
+    """
+    tail = f"unanchored tail: {records - anchored} record{'' if records - anchored == 1 else 's'}"
+    since = "the beginning on" if not anchored else f"record {anchored - 1} on"
+    few = "no witness outside holds them"
+    if outside is not None and outside.ahead:
+        end = min(outside.ahead[0].size + 1, records)
+        few = f"{_span(anchored, end)} {cosigned(outside)}"
+    text = f"{tail}: {few}; who held the log key, or the keys from {since}, could have cut or rewritten them"
+    return Claim("anchor", text)
+
+
+def _span(first: int, end: int) -> str:
+    return f"record {first} is" if end - first == 1 else f"records {first} to {end - 1} are"
+
+
+def _s(count: int) -> str:
+    return "s" if count == 1 else ""
+
+
+def _list(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

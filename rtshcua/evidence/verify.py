@@ -2,26 +2,28 @@
 
 1. the line: ended by a newline, not too long, nothing after the close
 2. the record: known type, every field there and of its kind, written in the one canonical form
-3. the genesis: first, and only there; a known format and version; a log key that is the one it names
+3. the genesis: first, and only there; a known format and version
 4. the chain: numbered without gap, and each record names the hash of the line before it
-5. the clock: monotonic time never goes back, nor does UTC by more than its stated error allows
-6. the close: count, signature by the log key of the genesis, size and Merkle root recomputed from the lines
-7. the end: a signed close, or else what is missing
+5. the clocks: monotonic time never goes back, nor does UTC by more than its stated error allows, and both go on alike
+6. the epochs: each sealed in time, by the key that the signed record before names (`seals`)
+7. the end: a close, or else what is missing
 
-What the caller must do: trust the genesis' log key, bundle and trust root, and derive the decisions again
-(`rtshcua.ground.auditor`).
+That is section 5 of docs/log-format.md but for its step 2. What the caller must do: trust the genesis' log key, bundle
+and trust root, and derive the decisions again (`rtshcua.ground.auditor`).
 """
 
 from collections.abc import Iterable
+from hashlib import sha256
 
-from rtshcua.evidence.chain import START
-from rtshcua.evidence.closing import check_close
+from rtshcua.evidence.clocks import Clocks
+from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Finding, Flaw
+from rtshcua.evidence.heads import START
 from rtshcua.evidence.merkle import Tree, leaf_hash
-from rtshcua.evidence.reading import LONGEST, read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Genesis
-from rtshcua.evidence.report import Report, claims
-from rtshcua.wire.keys import Duty, key_id
+from rtshcua.evidence.reading import LONGEST, may_be_torn, read
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Signed
+from rtshcua.evidence.report import Report, claims, unsealed
+from rtshcua.evidence.seals import Seals, Segment
 
 _LINK = slice(10, 74)  # where the value of `_prev` stands
 _SHOWN = 80  # bytes of a line that a finding quotes
@@ -35,12 +37,17 @@ class Verifier:
         self.genesis: Genesis | None = None
         self.close: Close | None = None
         self.failure: Finding | None = None
+        self.offset = 0  # where the next line begins
+        self.seals = Seals()
         self._counts: dict[str, int] = {}
         self._tree = Tree()
         self._prev = START
-        self._at_us = self._utc_low = 0
+        self._clocks = Clocks()
+        self._before = 0  # where the last line began
         self._torn: bytes | None = None
         self._doubt: tuple[bytes, Finding] | None = None  # hash of the line after a broken link, and what it then is
+        self._signed = self._signed_us = self._segment = 0  # last signed record: number, time, where its line began
+        self._digest = sha256()  # of the octets from there on
 
     def take(self, line: bytes) -> AnyRecord | None:
         """The record of the next line (newline included), or None when the log ends or fails there."""
@@ -53,31 +60,31 @@ class Verifier:
         if record is None:
             return None
         if isinstance(record, Flaw):
-            self.failure = record.at(self.records)
+            self.failure = record.at(self.records, self.offset)
             return None
         leaf = leaf_hash(line)
         flaw = self._check_place(record)
         if flaw is None and record.prev != self._prev:
             self._doubt = leaf, self._broken_link(record)
             return None
-        flaw = flaw or self._check_clock(record) or self._check_end_of(record, leaf)
+        flaw = flaw or self._clocks.check(record) or self._check_epoch(record)
         if flaw is not None:
-            self.failure = flaw.at(self.records)
+            self.failure = flaw.at(self.records, self.offset)
             return None
+        self._tree.push(leaf)
+        self._digest.update(line)
         self._prev = leaf.hex()
         self.records += 1
-        self._count(record)
+        self._before, self.offset = self.offset, self.offset + len(line)
+        counts = self._counts
+        counts[record.type] = counts.get(record.type, 0) + 1
+        if isinstance(record, Decision):
+            counts[record.outcome] = counts.get(record.outcome, 0) + 1
         return record
 
     def fail(self, finding: Finding) -> None:
         """Ends the verification for a reason of the caller's own."""
         self.failure = finding
-
-    def _count(self, record: AnyRecord) -> None:
-        counts = self._counts
-        counts[record.type] = counts.get(record.type, 0) + 1
-        if isinstance(record, Decision):
-            counts[record.outcome] = counts.get(record.outcome, 0) + 1
 
     def _read(self, line: bytes) -> AnyRecord | Flaw | None:
         # 1 the line
@@ -102,10 +109,6 @@ class Verifier:
         if isinstance(record, Genesis):
             if number:
                 return Flaw("genesis/repeated", "a second log begins inside this one")
-            key = key_id(Duty.LOG, bytes.fromhex(record.log_key)).hex()
-            if record.log_kid != key:
-                return Flaw("genesis/log-key", "the log key is not the one that is named", record.log_kid, key)
-            self.genesis = record
         elif self.genesis is None:
             text = "the log does not begin with its genesis: its head was cut off"
             return Flaw("genesis/missing", text, record.type, "genesis")
@@ -120,35 +123,43 @@ class Verifier:
     def _broken_link(self, record: AnyRecord) -> Finding:
         before, after = self.records - 1, self.records
         text = f"record {after} was not written after record {before} as it stands here: one of the two was changed"
-        return Finding("chain/broken", before, text, self._prev, record.prev)
+        return Finding("chain/broken", before, text, self._prev, record.prev, self._before)
 
     def _settled(self, line: bytes) -> Finding:
         """Which of the two records at a broken link was changed: the line after them was written after the second."""
         assert self._doubt is not None
         (leaf, finding), self._doubt = self._doubt, None
-        return finding if line[_LINK] == leaf.hex().encode() else finding._replace(record=self.records)
+        if line[_LINK] == leaf.hex().encode():
+            return finding
+        return finding._replace(record=self.records, offset=self.offset)
 
-    def _check_clock(self, record: AnyRecord) -> Flaw | None:
-        # 5 the clock
-        at_us, latest, earliest = record.at_us, record.utc_us + record.utc_error_us, record.utc_us - record.utc_error_us
-        if at_us < self._at_us:
-            text = "its monotonic time lies before that of the record before it"
-            return Flaw("clock/backwards", text, f"{at_us} us", f"{self._at_us} us or later")
-        if latest < self._utc_low:
-            text = "its time of day lies before that of an earlier record, by more than the errors stated for both"
-            return Flaw("clock/utc-backwards", text, f"{latest} us at most", f"{self._utc_low} us at least")
-        self._at_us, self._utc_low = at_us, max(self._utc_low, earliest)
-        return None
-
-    def _check_end_of(self, record: AnyRecord, leaf: bytes) -> Flaw | None:
-        if not isinstance(record, Close):
-            self._tree.push(leaf)
-            return None
-        # 6 the close
-        assert self.genesis is not None
-        flaw = check_close(record, self.genesis, self._tree)
-        self.close = record if flaw is None else None
+    def _check_epoch(self, record: AnyRecord) -> Flaw | None:
+        # 6 the epochs
+        if isinstance(record, Decision | Effect):
+            return self._check_sealed(record)
+        segment = Segment(
+            self.records - self._signed, self.offset - self._segment, self._digest.hexdigest(), self._tree.root()
+        )
+        flaw = self.seals.check(record, segment)
+        if flaw is None:
+            self._follow(record)
         return flaw
+
+    def _check_sealed(self, record: Decision | Effect) -> Flaw | None:
+        records, lasted_us = self.records - self._signed, record.at_us - self._signed_us
+        if records <= MOST_RECORDS and lasted_us <= LONGEST_US:
+            return None
+        text = f"the epoch that record {self._signed} began should have been sealed before"
+        found = f"{records} records, {lasted_us} us after it"
+        return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {LONGEST_US} us")
+
+    def _follow(self, record: Signed) -> None:
+        self._signed, self._signed_us, self._segment = self.records, record.at_us, self.offset
+        self._digest = sha256()
+        if isinstance(record, Genesis):
+            self.genesis = record
+        elif isinstance(record, Close):
+            self.close = record
 
     def report(self) -> Report:
         """The whole, once the lines are over."""
@@ -158,7 +169,12 @@ class Verifier:
         shortfall = None
         if self.failure is None and self.close is None:
             self.failure, shortfall = self._end()
-        proven, unproven = claims(self.records, self.genesis, self.close, self.failure)
+        sealed = self._signed + 1 if self.genesis is not None else 0
+        proven, unproven = claims(
+            self.records, sealed, self.seals.epochs, self.genesis, self.close, self.failure, self.seals.recoveries
+        )
+        if self.failure is None:
+            unproven = (*unproven, *unsealed(self.seals.recoveries))
         return Report(
             records=self.records,
             counts=self._counts,
@@ -166,30 +182,32 @@ class Verifier:
             shortfall=shortfall,
             genesis=self.genesis,
             close=self.close,
-            last_us=self._at_us,
+            last_us=self._clocks.at_us,
             root=self._tree.root(),
             proven=proven,
             unproven=unproven,
+            sealed=sealed,
+            epochs=self.seals.epochs,
         )
 
     def _end(self) -> tuple[Finding | None, Finding | None]:
         """Failure and shortfall of a log that ends without a close."""
-        number, torn = self.records, self._torn
+        number, torn, offset = self.records, self._torn, self.offset
         if torn is None and number:
-            return None, Finding(
-                "close/missing", number, f"the log ends after {number} records, without its signed close"
-            )
+            text = f"the log ends after {number} records, without its signed close"
+            return None, Finding("close/missing", number, text, offset=offset)
         if not torn:
             text = "the log is empty: nothing was ever written, or all of it was cut off"
-            return Finding("log/empty", number, text), None
-        start = b'{"_prev":"' + self._prev.encode() + b'","at_us":'
-        if not (torn.startswith(start) or start.startswith(torn)):
+            return Finding("log/empty", number, text, offset=offset), None
+        if not may_be_torn(torn, self._prev):
+            start = '{"_prev":"' + self._prev
             text = "what stands after the last whole record is not the beginning of another"
-            return Finding("record/malformed", number, text, _shown(torn), _shown(start)), None
+            return Finding("record/malformed", number, text, _shown(torn), start[:_SHOWN], offset), None
         if not number:
-            return Finding("genesis/missing", number, "the log ends inside its first record", _shown(torn)), None
+            text = "the log ends inside its first record"
+            return Finding("genesis/missing", number, text, _shown(torn), offset=offset), None
         text = f"the log ends inside record {number}, {len(torn)} bytes into it"
-        return None, Finding("tail/torn", number, text)
+        return None, Finding("tail/torn", number, text, offset=offset)
 
 
 def verify(lines: Iterable[bytes]) -> Report:

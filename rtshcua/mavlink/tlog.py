@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import BinaryIO
 
 from rtshcua.mavlink.framing import HEADER, MARKER, frame_length
 
@@ -44,3 +45,17 @@ def read(data: bytes) -> Iterator[Entry]:
             raise DamagedTlog(offset)
         yield Entry(int.from_bytes(data[offset:start], "big"), data[start:end])
         offset = end
+
+
+def stream(file: BinaryIO) -> Iterator[Entry]:
+    """As `read`, from a file that need not fit into memory."""
+    offset = 0
+    while head := file.read(STAMP + HEADER):
+        if len(head) < STAMP + HEADER or head[STAMP] != MARKER:
+            raise DamagedTlog(offset)
+        length = frame_length(head, STAMP)
+        frame = head[STAMP:] + file.read(length - HEADER)
+        if len(frame) < length:
+            raise DamagedTlog(offset)
+        yield Entry(int.from_bytes(head[:STAMP], "big"), frame)
+        offset += STAMP + length

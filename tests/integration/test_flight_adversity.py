@@ -16,7 +16,7 @@ def closed(run: Any, ending: str) -> None:
     """The log is whole, and was closed with this ending."""
     last = run.log()[-1]
     assert (last["type"], last["ending"]) == ("close", ending)
-    assert last["count"] == len(run.log()) - 1
+    assert last["seq"] == len(run.log()) - 1
     assert run.summary["whole"]
 
 

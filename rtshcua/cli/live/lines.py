@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import msgspec
 
 from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration, printable
+from rtshcua.cli.shown import many
 
 
 def plain(message: Message) -> Iterable[str]:
@@ -39,7 +40,7 @@ def ending(summary: Summary) -> Iterable[str]:
     whole = "whole" if summary.whole else "evidence NOT whole"
     yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
     yield f"  decided  {counts}"
-    yield f"  log      {summary.log} ({summary.records} records, {whole})"
+    yield f"  log      {summary.log} ({many(summary.records, 'record')}, {whole})"
     yield from (f"  missing  {printable(what)}" for what in summary.missing)
     yield f"  next     {summary.next}"
 

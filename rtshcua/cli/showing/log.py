@@ -9,10 +9,12 @@ import msgspec
 from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
-from rtshcua.cli.shown import utc
+from rtshcua.cli.shown import many, utc
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import parse, read_signature, split
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
@@ -47,7 +49,19 @@ def detail_of(event: str, detail: str) -> str:
     """An effect's detail for a person: a document by what it says, a number by what it counts."""
     if event in DOCUMENTS:
         return recorded(detail)
+    if event == ANCHORED:
+        return _witnessed(detail)
     return f"the same answer again, {detail} times" if event == "repeated" else detail
+
+
+def _witnessed(note: str) -> str:
+    """How far an anchor reaches, and who it names; whether they made it, `verify-log` says."""
+    text, signatures = split(note)
+    checkpoint = parse(text)
+    if isinstance(checkpoint, Flaw):
+        return "no checkpoint"
+    names = [read_signature(line)[0] for line in signatures[1:]]
+    return f"records 0 to {checkpoint.size}, seen by {' and '.join(names)}"
 
 
 def _records(lines: Iterable[bytes]) -> Iterator[AnyRecord | Flaw]:
@@ -106,7 +120,11 @@ class Names:
             detail = detail_of(record.event, record.detail)
             return "  ".join(word for word in (f"· {record.event:<15}", subject, detail) if word).rstrip()
         if isinstance(record, Close):
-            return f"closed after {record.count} records: {record.ending}"
+            return f"closed after {many(record.seq, 'record')}: {record.ending}"
+        if isinstance(record, Seal):
+            return f"  epoch {record.epoch} sealed, {many(record.records, 'record')}"
+        if isinstance(record, Recover):
+            return f"recovered, {record.discarded_bytes} bytes discarded; epoch {record.epoch} sealed"
         return f"begun in mode {record.mode}"
 
     def _subject(self, kind: int, step: int, link: int) -> str:

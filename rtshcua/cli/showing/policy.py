@@ -4,11 +4,16 @@ from rtshcua.adapters.loop import WAIT_US
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.contract import show_contract
 from rtshcua.cli.showing.page import Page
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, WithoutEvidence
 from rtshcua.model.flat.signal import Signal
 from rtshcua.onboard.runtime.bounds import falling_us
 from rtshcua.onboard.runtime.flight import Limits
 
+#: what `without evidence` says, and means
+_WITHOUT_EVIDENCE: dict[int, str] = {
+    WithoutEvidence.LAND: "evidence land: while records are not kept the mission is given up",
+    WithoutEvidence.REFUSE: "evidence refuse: while records are not kept no further step begins",
+}
 _HOUR_US = 3_600_000_000
 _MINUTE_US = 60_000_000
 
@@ -43,6 +48,7 @@ def show_policy(page: Page, policy: Policy) -> None:
     if policy.contingency and all(0 <= link.skill < len(policy.contracts) for link in policy.contingency):
         most = words.duration(-(-falling_us(policy, None, Limits(), WAIT_US) // _MINUTE_US) * _MINUTE_US)
         page.row("", f"at most {most} until it is down, or given up after the last tries")
+    page.row("without", _WITHOUT_EVIDENCE.get(policy.without_evidence, f"evidence: {policy.without_evidence}?"))
 
     if policy.monitors:
         page.head("Temporal monitors: what conditions of the past look at")

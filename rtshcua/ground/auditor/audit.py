@@ -2,29 +2,35 @@
 
 8. trust: the root under the pinned key, the log key's duty, the bundle under that root (`trust`)
 9. the bundle is the one that the caller knows of, if there is one
-10. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
+10. anchors: what witnesses cosigned is what the log holds (`rtshcua.evidence.witnessing.anchors`)
+11. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
     ruled out by the states that the records hold (`observed`)
-11. documents: each approval, recall and replacement is verified again, and no decision read another (`documents`)
-12. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
+12. documents: each approval, recall and replacement is verified again, and no decision read another (`documents`)
+13. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
     `none`
+
+Of several flaws the first of these is told: of the genesis and its trust, of the log itself, of its anchors, of what
+its records mean. For a log that is not whole proves nothing, whatever its records say.
 
 What no log can prove: that the state it records is what the vehicle's sensors saw, and that the temporal monitors said
 what follows from all observations, of which the log has those at which something was decided.
 """
 
-from base64 import b64encode
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
-from rtshcua.evidence.report import Report, claims
+from rtshcua.evidence.report import Report, claims, with_anchors
 from rtshcua.evidence.verify import Verifier
-from rtshcua.ground.auditor.cover import Cover
-from rtshcua.ground.auditor.derive import UNENFORCED, Deriver
-from rtshcua.ground.auditor.documents import Documents
+from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
+from rtshcua.ground.auditor.frames import Frames
+from rtshcua.ground.auditor.meaning import Meaning
+from rtshcua.ground.auditor.told import of_meaning, of_trust
 from rtshcua.ground.auditor.trust import Basis, establish
-from rtshcua.ground.auditor.turns import Turns
+
+_NOT_DERIVED = "that decisions follow from what they record, and commands from them: `--audit` without `--no-derive`"
 
 
 class Audit(NamedTuple):
@@ -37,133 +43,134 @@ class Audit(NamedTuple):
 
 
 class Auditor:
-    """Takes the lines of a log in order, in memory that the bundle bounds, not the log."""
+    """Takes the lines of a log in order, in memory that the bundle bounds, and some hundred bytes an epoch.
 
-    def __init__(self, pinned: bytes, *, bundle: bytes | None = None) -> None:
+    `derive` says whether what the records mean is worked out again. `anchors` are notes that witnesses cosigned, from
+    wherever; those that the log itself holds are looked at too. `frames` follows the raw frames beside the log; what
+    it found, the caller asks it, once it is known that they are those of the log.
+    """
+
+    def __init__(
+        self, pinned: bytes, *, bundle: bytes | None = None, derive: bool = True, anchors: Iterable[str] = (),
+        frames: Frames | None = None,
+    ) -> None:  # fmt: skip
+        self.record: AnyRecord | None = None  # the last line's, if it is sound in itself and in its place
         self._pinned = pinned
         self._expected = bundle
+        self._derive = derive
+        self._given = anchors
+        self._frames = frames
         self._verifier = Verifier()
         self._basis: Basis | None = None
-        self._deriver: Deriver | None = None
-        self._documents: Documents | None = None
-        self._cover = Cover()
-        self._turns: Turns | None = None
-        self._mode = ""
-        self._derived = 0
+        self._meaning: Meaning | None = None
+        self._anchors: Anchors | None = None
+        self._untrusted: Finding | None = None
+        self._contradicted: Finding | None = None
         self._suspect: Finding | None = None
 
     def take(self, line: bytes) -> bool:
         """Takes the next line; False when no further one would change the result."""
-        record = self._verifier.take(line)
-        if self._suspect is not None:
-            # A record that means something wrong was perhaps only changed: the link of the line after it tells.
-            # What another root vouches for may be sound in itself: it is read to its end, for how long it lasted.
-            on = record is None or self._suspect.slug.startswith("trust/")
-            return on and self._verifier.failure is None
-        if record is not None:
-            flaw = self._check(record)
-            if flaw is not None:
-                self._suspect = flaw.at(record.seq)
-        return self._verifier.failure is None
-
-    def _check(self, record: AnyRecord) -> Flaw | None:
+        verifier = self._verifier
+        record = self.record = verifier.take(line)
+        if record is None:
+            return verifier.failure is None
         if isinstance(record, Genesis):
-            return self._begin(record)
-        if isinstance(record, Decision):
-            return self._decided(record)
-        if isinstance(record, Effect):
-            return self._happened(record)
-        return None
-
-    def _happened(self, record: Effect) -> Flaw | None:
-        assert self._documents is not None
-        flaw = self._documents.check(record)
-        if flaw is None and self._mode != UNENFORCED:
-            self._cover.recalled = self._documents.counts["recall"] > 0
-            assert self._turns is not None
-            flaw = self._cover.check(record) or self._turns.check(record)
-        return flaw
+            flaw = self._begin(record)
+            self._untrusted = flaw and flaw.at(0, 0)
+        if self._untrusted is not None:
+            return True  # what another root vouches for may be sound in itself: it is read on, for how long it lasted
+        if self._contradicted is None and (flaw := self._witnessed(record)):
+            self._contradicted = flaw.at(record.seq, verifier.offset - len(line))
+        if self._suspect is None and self._meaning is not None and (flaw := self._meaning.check(record)):
+            self._suspect = flaw.at(record.seq, verifier.offset - len(line))
+        return True
 
     def _begin(self, genesis: Genesis) -> Flaw | None:
-        basis = establish(genesis, self._pinned)
+        basis = establish(genesis, self._pinned, bundle=self._expected)
         if isinstance(basis, Flaw):
             return basis
-        self._basis, self._deriver, self._mode = basis, Deriver(basis), genesis.mode
-        self._documents = Documents(basis, self._deriver)
-        self._turns = Turns(basis)
-        if self._expected is not None and b64encode(self._expected).decode() != genesis.bundle:
-            return Flaw("genesis/other-bundle", "the log is of another bundle than the one that lies beside it")
+        self._basis = basis
+        if self._derive:
+            self._meaning = Meaning(basis, genesis.mode, self._frames)
+        self._anchors = anchors_of(basis, genesis)
+        for note in self._given:
+            flaw = self._anchors.anchor(note)
+            if flaw is not None and self._contradicted is None:
+                self._contradicted = flaw.at(0, 0)
         return None
 
-    def _decided(self, record: Decision) -> Flaw | None:
-        assert self._deriver is not None
-        if record.mode != self._mode:
-            text = "the decision was made in another mode than the log began in"
-            return Flaw("decision/mode", text, record.mode, self._mode)
-        flaw = self._deriver.check(record)
-        if flaw is None:
-            self._derived += 1
-            self._cover.decided(record)
-        return flaw
+    def _witnessed(self, record: AnyRecord) -> Flaw | None:
+        assert self._anchors is not None
+        if isinstance(record, Decision):
+            return None
+        if isinstance(record, Effect):
+            return self._anchors.anchor(record.detail) if record.event == ANCHORED else None
+        assert record.checkpoint is not None
+        return self._anchors.checkpoint(record.checkpoint)
 
     def audit(self) -> Audit:
         """The whole, once the lines are over."""
-        report = self._verifier.report()
-        if self._suspect is not None and (report.failure is None or report.failure.record > self._suspect.record):
-            proven, unproven = claims(report.records, None, None, self._suspect)
-            report = report._replace(failure=self._suspect, shortfall=None, proven=proven, unproven=unproven)
-        if report.failure is None:
-            report = self._claimed(report)
-        return Audit(report, self._basis, self._derived, self._cover.dispatches)
+        report = self._judged(self._verifier.report())
+        meaning = self._meaning
+        if meaning is None:
+            return Audit(report, self._basis, 0, 0)
+        return Audit(report, self._basis, meaning.derived, meaning.dispatches)
+
+    def _judged(self, report: Report) -> Report:
+        if self._untrusted is not None:
+            return failing(report, self._untrusted)
+        if report.failure is not None:
+            return report
+        if self._contradicted is not None:
+            return failing(report, self._contradicted)
+        assert self._anchors is not None
+        anchored = self._anchors.finish(report.records)
+        if isinstance(anchored, Flaw):
+            return failing(report, anchored.at(report.records, self._verifier.offset))
+        if self._suspect is not None:
+            return failing(report, self._suspect)
+        return self._claimed(with_anchors(report, anchored))
 
     def _claimed(self, report: Report) -> Report:
-        genesis, basis = report.genesis, self._basis
-        assert genesis is not None
-        assert basis is not None
-        bundle = basis.bundle
-        kind = "development root" if basis.root.development else "trust root"
-        proven = [
-            Claim("trust", f"the {kind} is signed by the pinned key, and gives log key {genesis.log_kid} its duty"),
-            Claim(
-                "bundle",
-                f"mission `{bundle.mission.name}` under `{bundle.policy.name}@{bundle.policy.version}` on "
-                f"`{genesis.vehicle}`, both signed by keys that the root trusts for them",
-            ),
-            *report.proven,
-            Claim("decisions", f"{_many(self._derived, 'decision')} derived again, each with the same answer"),
-        ]
-        assert self._documents is not None
-        documents = [_many(count, kind) for kind, count in self._documents.counts.items() if count]
-        if documents:
-            text = f"{', '.join(documents)}, each signed by a key that the root trusts for it, and good when it came"
-            proven.append(Claim("documents", text))
-        unproven = [*report.unproven, Claim("state", "that the recorded state is what the vehicle's sensors saw")]
-        if basis.policy.monitors:
-            text = "what the temporal monitors said between the records: only that no recorded state rules it out"
-            unproven.append(Claim("monitors", text))
-        if self._mode == UNENFORCED:
-            unproven.append(Claim("enforcement", "mode `none`: nothing was enforced, so dispatches needed no permit"))
-        else:
-            text = f"{_many(self._cover.dispatches, 'dispatch', 'dispatches')}, each after a record that permits it"
-            proven.append(Claim("dispatches", text))
-        if basis.root.development:
-            text = "development keys lie unencrypted where they were made: whoever can read them can sign anything"
-            unproven.append(Claim("development", text))
-        return report._replace(proven=tuple(proven), unproven=tuple(unproven))
+        assert self._basis is not None
+        if self._meaning is None:
+            unproven = (*report.unproven, Claim("decisions", _NOT_DERIVED))
+            return trusted(report._replace(unproven=unproven), self._basis)
+        proven, but = of_meaning(self._basis, self._meaning)
+        report = report._replace(proven=(*report.proven, *proven), unproven=(*report.unproven, *but))
+        return trusted(report, self._basis)
 
 
-def audit(lines: Iterable[bytes], pinned: bytes, *, bundle: bytes | None = None) -> Audit:
+def trusted(report: Report, basis: Basis) -> Report:
+    """The report with what the pinned key vouches for, of a log that was trusted."""
+    assert report.genesis is not None
+    proven, unproven = of_trust(report.genesis, basis)
+    return report._replace(proven=(*proven, *report.proven), unproven=(*report.unproven, *unproven))
+
+
+def anchors_of(basis: Basis, genesis: Genesis) -> Anchors:
+    """What the witnesses of a log's root saw is held against its checkpoints by this."""
+    root, origin = basis.root, origin_of(genesis.vehicle, genesis.boot)
+    return Anchors(origin, root.witnesses(genesis.vehicle, genesis.utc_us), root.witness_threshold)
+
+
+def failing(report: Report, failure: Finding) -> Report:
+    """The report with a failure that its log's own chain and seals do not show."""
+    proven, unproven = claims(report.records, 0, 0, report.genesis, None, failure)
+    return report._replace(failure=failure, shortfall=None, proven=proven, unproven=unproven)
+
+
+def audit(
+    lines: Iterable[bytes], pinned: bytes, *, bundle: bytes | None = None, derive: bool = True,
+    anchors: Iterable[str] = (),
+) -> Audit:  # fmt: skip
     """Audits the lines of a log, each with its newline.
 
     `pinned` is the trust root's public key (32 bytes) or its `kid` (16 bytes), which must come from elsewhere than the
-    log. `bundle` is what the log should be of, where the caller knows.
+    log. `bundle` is what the log should be of, where the caller knows. `derive` and `anchors`: see `Auditor`.
     """
-    auditor = Auditor(pinned, bundle=bundle)
+    auditor = Auditor(pinned, bundle=bundle, derive=derive, anchors=anchors)
     for line in lines:
         if not auditor.take(line):
             break
     return auditor.audit()
-
-
-def _many(count: int, one: str, more: str | None = None) -> str:
-    return f"{count} {one if count == 1 else more or one + 's'}"

@@ -4,12 +4,14 @@ from typing import NamedTuple
 
 from rtshcua.decision.case import SINGLE
 from rtshcua.decision.decide import decide
+from rtshcua.decision.durability import durability_of
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Decision
 from rtshcua.ground.auditor.observed import Observed
 from rtshcua.ground.auditor.trust import Basis
+from rtshcua.model.durability import WORDS, WRITTEN
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.policy import Airspace, Rule
@@ -82,7 +84,20 @@ class Deriver:
             if found != expected:
                 text = f"derived again from the inputs that it records, this decision has another {_WHAT[field]}"
                 return Flaw(f"decision/{field.replace('_', '-')}", text, str(found), str(expected))
-        return None
+        return self._durable(record)
+
+    def _durable(self, record: Decision) -> Flaw | None:
+        """What is wrong with how durable a record that derived again says it was."""
+        if record.kind == STEP:
+            contract = self._basis.invocations[record.step].invocation.contract
+            approved = any(granted for _, _, granted, _ in record.context.approvals)
+            asked = durability_of(contract, Outcome[record.outcome.upper()], confirmed=approved, kind=STEP)
+        else:
+            asked = WRITTEN
+        if record.durability == asked:
+            return None
+        text = "its record was not as durable as the contract and the risk ask, or more"
+        return Flaw("decision/durability", text, _class(record.durability), _class(asked))
 
     def _derived(self, record: Decision) -> Answer | Flaw:
         basis = self._basis
@@ -180,6 +195,10 @@ class Deriver:
             return Flaw("decision/invocation", "a link of the contingency belongs to no step", record.invocation)
         admissible = link_admissible(chain[record.link], state, basis.policy, now)
         return _of_link(record, basis.bundle.policy_digest, now, admissible=admissible)
+
+
+def _class(durability: int) -> str:
+    return WORDS[durability] if 0 <= durability < len(WORDS) else str(durability)
 
 
 def _octets(text: str) -> bytes | None:

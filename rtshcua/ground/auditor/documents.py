@@ -4,8 +4,9 @@ from typing import Final
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Effect
+from rtshcua.evidence.rooted import octets
 from rtshcua.ground.auditor.derive import Deriver
-from rtshcua.ground.auditor.trust import Basis, octets
+from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.receipt import APPROVAL, RECALL, REPLACEMENT
 

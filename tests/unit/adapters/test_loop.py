@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters.loop import HELD_WAIT_US, WAIT_US, Loop
+from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
     Append,
@@ -14,8 +15,10 @@ from rtshcua.onboard.ports import (
     End,
     Ending,
     EvidenceFailed,
+    EvidenceKept,
     Failed,
     Interrupted,
+    Noted,
     Release,
     Show,
     Succeeded,
@@ -32,9 +35,10 @@ class World:
         self.did: list[Any] = []
         self.full = False
         self.slow = False
-        self.kept = 0
+        self.kept = self.synced = 0
         self.given = 0
         self.troubles: list[str] = []
+        self.lags: list[str] = []
         self.polled: list[int] = []
         self.events: list[Any] = []
         self.saw: list[Any] = []
@@ -56,17 +60,20 @@ class World:
     def release(self) -> None:
         self.did.append("release")
 
-    def append(self, line: bytes, durable: bool) -> int:
+    def append(self, line: bytes, durability: int) -> int:
+        self.given += 1
         if self.full:
             raise OSError(28, "no space left on device")
         self.did.append(line)
-        self.given += 1
         if not self.slow:
-            self.kept = self.given
+            self.kept = self.synced = self.given
         return self.given
 
     def trouble(self) -> str | None:
         return self.troubles.pop(0) if self.troubles else None
+
+    def late(self) -> str | None:
+        return self.lags.pop(0) if self.lags else None
 
     def close(self) -> None:
         pass
@@ -77,7 +84,7 @@ class World:
 
 
 def test_actions_are_carried_out_in_their_order() -> None:
-    actions = [Append(b"1", False), Dispatch(COMMAND, 1_000, True), Append(b"2", False), Show("k", "t"), Release()]
+    actions = [Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True), Append(b"2", WRITTEN), Show("k", "t"), Release()]
     world = World(actions)
     assert world.loop.turn() is None
     assert world.did == [b"1", ("begin", 7), b"2", "release"]
@@ -94,7 +101,7 @@ def test_what_is_late_is_not_sent_and_the_runtime_is_told() -> None:
 
 
 def test_what_could_not_be_recorded_is_withheld() -> None:
-    world = World([Append(b"1", False), Dispatch(COMMAND, 1_000, True)])
+    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True)])
     world.full = True
     world.loop.turn()
     assert world.did == []
@@ -105,14 +112,14 @@ def test_what_could_not_be_recorded_is_withheld() -> None:
 
 
 def test_a_fallback_goes_out_even_when_nothing_can_be_recorded() -> None:
-    world = World([Append(b"1", False), Dispatch(COMMAND, 1_000, False)])
+    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False)])
     world.full = True
     world.loop.turn()
     assert world.did == [("begin", 7)]
 
 
 def test_a_record_that_failed_before_withholds_nothing_now() -> None:
-    world = World([Append(b"1", False)], [Append(b"2", False), Dispatch(COMMAND, 1_000, True)])
+    world = World([Append(b"1", WRITTEN)], [Append(b"2", WRITTEN), Dispatch(COMMAND, 1_000, True)])
     world.full = True
     world.loop.turn()
     world.full = False
@@ -129,12 +136,12 @@ def test_events_from_elsewhere_come_first_and_without_waiting() -> None:
 
 
 def test_the_end_comes_after_all_else_was_done() -> None:
-    world = World([End(Ending.COMPLETED), Append(b"last", True)])
+    world = World([End(Ending.COMPLETED), Append(b"last", SYNCED_FIRST)])
     assert world.loop.turn() is Ending.COMPLETED
     assert world.did == [b"last"]
 
 
-STEP = [Append(b"allowed", False), Dispatch(COMMAND, 5_000, True), Append(b"dispatched", False)]
+STEP = [Append(b"allowed", WRITTEN), Dispatch(COMMAND, 5_000, True), Append(b"dispatched", WRITTEN)]
 OTHER = Command(8, "return_home", 4, (), (), 0, 0)
 
 
@@ -179,7 +186,7 @@ def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
 
 
 def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
-    world = held([Append(b"violated", False), Dispatch(OTHER, 9_000, False)])
+    world = held([Append(b"violated", WRITTEN), Dispatch(OTHER, 9_000, False)])
     world.loop.turn()
     assert world.did == [b"violated", ("begin", 8)]
     world.kept = 9
@@ -207,8 +214,81 @@ def test_a_disk_that_fails_withholds_a_step_that_waits() -> None:
 
 
 def test_a_failure_is_told_though_nothing_waits() -> None:
-    world = World()
-    world.troubles = ["input/output error"]
+    world = World([Append(b"1", SYNCED)])
+    world.slow = True
+    world.loop.turn()
+    world.kept, world.troubles = 1, ["input/output error"]
     world.loop.turn()
     assert world.events == [EvidenceFailed(1_000, "input/output error")]
-    assert world.polled == [0]
+    assert world.polled == [WAIT_US, 0]
+
+
+@pytest.mark.parametrize("durability", [WRITTEN, SYNCED])
+def test_a_step_whose_record_is_to_be_written_or_synced_later_waits_until_it_is_written(durability: int) -> None:
+    world = World([Append(b"allowed", durability), Dispatch(COMMAND, 5_000, True)])
+    world.slow = True
+    world.loop.turn()
+    assert world.did == [b"allowed"]
+    world.kept = 1
+    world.loop.turn()
+    assert world.did == [b"allowed", ("begin", 7)]
+
+
+def test_a_step_whose_record_is_to_be_synced_first_waits_for_the_disk() -> None:
+    world = World([Append(b"allowed", SYNCED_FIRST), Dispatch(COMMAND, 5_000, True)])
+    world.slow = True
+    world.loop.turn()
+    world.kept = 1
+    world.loop.turn()
+    assert world.did == [b"allowed"]
+    world.synced = 1
+    world.loop.turn()
+    assert world.did == [b"allowed", ("begin", 7)]
+
+
+def test_a_seal_before_it_makes_no_step_wait() -> None:
+    seal = Append(b"seal", SYNCED_FIRST, awaited=False)
+    world = World([seal, Append(b"allowed", SYNCED), Dispatch(COMMAND, 5_000, True)])
+    world.slow = True
+    world.loop.turn()
+    world.kept = 2
+    world.loop.turn()
+    assert ("begin", 7) in world.did
+
+
+def test_a_step_whose_record_is_buffered_waits_for_nothing_but_is_withheld_where_no_record_is_taken() -> None:
+    effects = [Append(effect, WRITTEN, awaited=False) for effect in (b"succeeded", b"replaced")]
+    step = [effects[0], Append(b"allowed", BUFFERED), effects[1], Dispatch(COMMAND, 5_000, True)]
+    world = World(step)
+    world.slow = True
+    world.loop.turn()
+    assert world.did == [b"succeeded", b"allowed", b"replaced", ("begin", 7)]
+    world = World(step)
+    world.full = True
+    world.loop.turn()
+    assert world.did == []
+
+
+def test_that_the_sink_took_everything_again_is_told_once() -> None:
+    world = World([Append(b"1", WRITTEN)], [Append(b"2", WRITTEN)])
+    world.slow = True
+    world.loop.turn()
+    world.troubles = ["input/output error"]
+    for _ in range(3):
+        world.loop.turn()
+        assert EvidenceKept(1_000) not in world.events
+    world.kept = 2
+    world.loop.turn()
+    assert world.events == [], "what was refused is written, and not yet on the disk"
+    world.synced = 1
+    world.loop.turn()
+    assert world.events == [EvidenceKept(1_000)]
+    world.loop.turn()
+    assert world.events == []
+
+
+def test_a_line_that_is_late_on_the_disk_is_noted() -> None:
+    world = World()
+    world.lags = ["not on the disk yet"]
+    world.loop.turn()
+    assert world.events == [Noted(1_000, "not on the disk yet")]

@@ -71,7 +71,7 @@ def test_a_replacement_that_is_none(log: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["verify-log", str(log), "--root", ROOT_KEY.public.hex(), "--json"]) == ExitCode.OK
+    assert main(["verify-log", str(log), "--root", ROOT_KEY.public.hex(), "--json", "--audit"]) == ExitCode.OK
     proven = {claim["slug"]: claim["text"] for claim in json.loads(capsys.readouterr().out)["proven"]}
     assert proven["documents"].startswith("1 approval, 1 recall, 1 replacement, ")
 

@@ -11,7 +11,7 @@ from reference.flat_case import MISSION, POLICY
 from reference.world import VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.replay import FileReplayStore
-from rtshcua.cli import launch
+from rtshcua.cli import launch, opening
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.signal import SignalSource
 
@@ -20,10 +20,37 @@ LATER = 1 << 52  # us
 
 def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
     FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
-    order: Any = SimpleNamespace(state=tmp_path)
     with pytest.raises(launch.Refused, match="a later version of `bridge_inspection` than 7") as refused:
-        launch._opened_before(order, loaded(), cast("Any", None), SystemClock(), [])
+        opening.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), [])
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "old-policy")
+
+
+class Grounded:
+    """A flight that is told not to be."""
+
+    refused = False
+
+    def refuse(self) -> None:
+        self.refused = True
+
+
+def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: Path) -> None:
+    first, second = Grounded(), Grounded()
+    assert opening.flown_before(tmp_path, loaded()) is None
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", first))
+    assert not first.refused
+    with pytest.raises(launch.Refused, match="a bundle flies once"):
+        opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
+    assert second.refused, "and its log is closed"
+    assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "replay").write_bytes(b"")
+    flight = Grounded()
+    with pytest.raises(OSError, match=r"exists|Not a directory"):
+        opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+    assert flight.refused
 
 
 def test_a_policy_that_reads_what_no_vehicle_sends() -> None:

@@ -194,6 +194,13 @@ def test_what_cannot_be_shown(data: bytes, code: ExitCode, tmp_path: Path, capsy
     assert "internal fault" not in err
 
 
+@pytest.mark.parametrize(("number", "said"), [(0, "evidence land: "), (1, "evidence refuse: "), (7, "evidence: 7?")])
+def test_what_is_done_without_evidence(number: int, said: str) -> None:
+    page = Page()
+    show_policy(page, replace(case.policy(), without_evidence=number))
+    assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
+
+
 def test_a_bundle_that_makes_no_sense(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     policy = case.policy()
     broken = replace(policy, contingency=tuple(replace(link, skill=99) for link in policy.contingency))

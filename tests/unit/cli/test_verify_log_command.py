@@ -2,12 +2,15 @@
 
 import hashlib
 import json
+import os
 import re
 from pathlib import Path
 
 import pytest
 
 from reference.forgery import edit, flight, signed
+from reference.marked import mark, note_of
+from rtshcua.adapters.files import anchors
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli import app, verdict, verify_log
@@ -44,7 +47,8 @@ def test_a_sound_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     count = len(flight())
     assert f"VERIFIED  {count} records, closed and signed; unanchored" in out
-    assert f"{count} records read: 3 decisions (3 allow), {count - 5} effects" in out
+    assert f"{count} records, in 8 sealed epochs; those that sign were read" in out
+    assert f"- unanchored tail: {count} records" in out
     assert "closed and signed by log key" in out
     assert "complete" not in out.replace("completed", "")
     assert "\033" not in out
@@ -118,6 +122,7 @@ def test_a_changed_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(run) == ExitCode.EVIDENCE
     out = capsys.readouterr().out
     assert "FAILED  at record 4, line 5: chain/broken" in out
+    assert f"begins    at byte {sum(map(len, lines[:4]))} of the log" in out
     assert "The log was changed after it was written" in out
     assert "shown" not in out.replace("not shown", "")
     assert "VERIFIED" not in out
@@ -142,7 +147,7 @@ def test_an_empty_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_later_format_is_not_trusted(run: Path) -> None:
-    rewrite(run, [edit(flight()[0], version=2), *flight()[1:]])
+    rewrite(run, [edit(flight()[0], version=3), *flight()[1:]])
     assert verify(run) == ExitCode.UNTRUSTED
 
 
@@ -203,16 +208,109 @@ def test_as_json(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "verified", 0, len(flight()), None,
     )  # fmt: skip
     assert sound["flight"]["ending"] == "completed"
-    assert sound["counts"]["allow"] == 3
+    assert sound["counts"] == {"genesis": 1, "seal": 7, "close": 1}
+    assert (sound["signed"], sound["epochs"]) == (len(flight()), 8)
+    assert (sound["anchored"], sound["unanchored_tail"]) == (0, len(flight()))
+    assert verify(run, "--json", "--audit") == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["counts"]["allow"] == 3
     rewrite(run, [flight()[0], *flight()[2:]])
     assert verify(run, "--json") == ExitCode.EVIDENCE
     broken = json.loads(capsys.readouterr().out)
     assert broken["failure"]["slug"] == "chain/sequence"
     assert (broken["failure"]["record"], broken["failure"]["line"]) == (1, 2)
+    assert broken["failure"]["offset"] == len(flight()[0])
     assert broken["flight"]["ending"] is None
     rewrite(run, [])
     assert verify(run, "--json") == ExitCode.EVIDENCE
     assert json.loads(capsys.readouterr().out)["flight"] is None
+
+
+def test_an_audit_derives_every_decision(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert verify(run, "--audit") == ExitCode.OK
+    out = capsys.readouterr().out
+    count = len(flight())
+    assert f"{count} records read: 3 decisions (3 allow), {count - 12} effects, in 8 sealed epochs" in out
+    assert "+ 3 decisions derived again" in out
+    assert verify(run, "--audit", "--no-derive") == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "3 decisions (3 allow)" in out
+    assert "- that decisions follow from what they record" in out
+
+
+def test_a_decision_that_its_own_signers_forged(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    forged = list(flight())
+    number = next(number for number, line in enumerate(forged) if b'"type":"decision"' in line)
+    forged[number] = edit(forged[number], outcome="deny")
+    rewrite(run, signed(forged))
+    assert verify(run) == ExitCode.OK
+    assert "- the form and number of each record that is not signed itself, its clocks" in capsys.readouterr().out
+    assert verify(run, "--audit") == ExitCode.DECISION
+    assert f"FAILED  at record {number}, line {number + 1}: decision/outcome" in capsys.readouterr().out
+    assert verify(run, "--audit", "--no-derive") == ExitCode.OK
+
+
+def test_fast_says_no_more_than_it_saw(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert verify(run, "--fast") == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "+ the octets of records 0 to 18 are those that were signed" in out
+    assert "- that records are linked line by line" in out
+    lines = list(flight())
+    lines[4] = edit(lines[4], event="failed")
+    rewrite(run, lines)
+    assert verify(run, "--fast") == ExitCode.EVIDENCE
+    assert "chain/broken" in capsys.readouterr().out
+
+
+def test_a_log_may_have_to_be_anchored(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for how in ([], ["--audit"], ["--fast"]):
+        assert verify(run, "--require-anchor", *how) == ExitCode.INCOMPLETE
+        assert "INCOMPLETE  at record 0, line 1: anchor/missing" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("how", [[], ["--audit"], ["--fast"]])
+def test_anchors_beside_a_log_and_elsewhere(
+    how: list[str], run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    count = len(flight())
+    last = mark(note_of(flight(), count - 1))
+    (tmp_path / "seen.anchors").write_text(last + "\n")
+    assert verify(run, "--require-anchor", "--anchors", tmp_path / "seen.anchors", *how) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert f"VERIFIED  {count} records, closed and signed; anchored to its end" in out
+    assert "unanchored" not in out
+    (run / "log.anchors").write_text(mark(note_of(flight(), 5)) + "\n")
+    assert verify(run, *how) == ExitCode.OK
+    assert f"anchored but for the last {count - 6} records" in capsys.readouterr().out
+    assert verify(run, "--require-anchor", "--json", *how) == ExitCode.INCOMPLETE
+    told = json.loads(capsys.readouterr().out)
+    assert (told["anchored"], told["unanchored_tail"], told["shortfall"]["record"]) == (6, count - 6, 6)
+    rewrite(run, signed([flight()[0], *flight()[2:]]))
+    assert verify(run, *how) == ExitCode.ANCHOR
+    assert "anchor/root" in capsys.readouterr().out
+    assert verify(run, "--anchors", tmp_path / "none.anchors", *how) == ExitCode.INPUT
+
+
+@pytest.mark.parametrize("how", [[], ["--audit"], ["--fast"]])
+def test_anchors_that_were_named_are_read_or_it_is_said(
+    how: list[str], run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "folder.anchors").mkdir()
+    os.mkfifo(tmp_path / "pipe.anchors")
+    (tmp_path / "loop.anchors").symlink_to("loop.anchors")
+    (tmp_path / "large.anchors").write_bytes(b"x" * 65)
+    monkeypatch.setattr(anchors, "_LARGEST", 64)
+    for name, reason in (
+        ("folder", "no regular file"), ("pipe", "no regular file"), ("loop", ""), ("large", "more than"),
+    ):  # fmt: skip
+        assert verify(run, "--anchors", tmp_path / f"{name}.anchors", *how) == ExitCode.INPUT
+        assert reason in capsys.readouterr().err
+    (tmp_path / "large.anchors").write_bytes(b"x" * 64)
+    assert verify(run, "--anchors", tmp_path / "large.anchors", *how) == ExitCode.OK
+
+
+@pytest.mark.parametrize("words", [["--fast", "--audit"], ["--fast", "--explain", "1"], ["--no-derive"]])
+def test_options_that_contradict_each_other(words: list[str], run: Path) -> None:
+    assert verify(run, *words) == ExitCode.USAGE
 
 
 def test_several_logs(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -258,7 +356,8 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
     for folder in ("evidence", "ground/auditor", "cli"):
         for file in (Path(verdict.__file__).parents[1] / folder).glob("*.py"):
             slugs |= set(re.findall(r'(?:Flaw|Finding)\(\s*f?"([a-z]+)/', file.read_text()))
-    assert slugs <= set(verdict.MEANINGS)
+    of_others = {"note", "proof"}  # a note's are told as those of a `seal`, a proof's by who reads proofs
+    assert slugs - of_others <= set(verdict.MEANINGS)
     assert "chain" in slugs
 
 
@@ -268,7 +367,14 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
         ("trust/log-key", ExitCode.UNTRUSTED),
         ("genesis/format", ExitCode.UNTRUSTED),
         ("genesis/mission", ExitCode.EVIDENCE),
-        ("close/root", ExitCode.EVIDENCE),
+        ("seal/root", ExitCode.EVIDENCE),
+        ("telemetry/changed", ExitCode.EVIDENCE),
+        ("decision/outcome", ExitCode.DECISION),
+        ("document/wrong-key", ExitCode.DECISION),
+        ("dispatch/late", ExitCode.DECISION),
+        ("frames/early", ExitCode.DECISION),
+        ("anchor/root", ExitCode.ANCHOR),
+        ("anchor/beyond", ExitCode.ANCHOR),
     ],
 )
 def test_exit_codes_of_failures(slug: str, code: ExitCode) -> None:

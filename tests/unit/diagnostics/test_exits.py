@@ -19,6 +19,8 @@ def test_codes_and_slugs_never_change() -> None:
         8: "link",
         9: "evidence",
         10: "incomplete",
+        11: "decision",
+        12: "anchor",
         70: "fault",
         74: "io",
         130: "interrupted",

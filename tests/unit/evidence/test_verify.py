@@ -2,28 +2,38 @@
 
 import json
 import re
-from base64 import b64decode
-from collections.abc import Callable
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Iterable
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
+from reference.resealing import line_of, note_of, resealed
 from rtshcua.evidence import verify as module
-from rtshcua.evidence.chain import Recorder, origin_of
+from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.merkle import leaf_hash
-from rtshcua.evidence.note import Checkpoint, sign
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.evidence.verify import Verifier, verify
 from rtshcua.model.flat.situation import Now
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import SigningKey
+
+SEEDS = [bytes([number]) * 32 for number in range(256)]  # those of `recorder`, and of `log_key`
+KEYS = {Ed25519PrivateKey.from_private_bytes(seed).public_key().public_bytes_raw().hex(): seed for seed in SEEDS}
 
 
-def failure(lines: list[bytes]) -> tuple[str, int]:
+def failed(lines: list[bytes]) -> Finding:
     report = verify(lines)
     assert report.verdict is Verdict.FAILED
     assert report.failure is not None
     assert report.shortfall is None
-    return report.failure.slug, report.failure.record
+    assert report.failure.offset == sum(map(len, lines[: report.failure.record]))
+    return report.failure
+
+
+def failure(lines: list[bytes]) -> tuple[str, int]:
+    found = failed(lines)
+    return found.slug, found.record
 
 
 def shortfall(lines: list[bytes]) -> tuple[str, int]:
@@ -31,6 +41,7 @@ def shortfall(lines: list[bytes]) -> tuple[str, int]:
     assert report.verdict is Verdict.INCOMPLETE
     assert report.failure is None
     assert report.shortfall is not None
+    assert report.shortfall.offset == sum(map(len, lines[: report.shortfall.record]))
     return report.shortfall.slug, report.shortfall.record
 
 
@@ -40,8 +51,25 @@ def edit(line: bytes, **fields: object) -> bytes:
     return json.dumps(record, ensure_ascii=False, separators=(",", ":"), sort_keys=True).encode() + b"\n"
 
 
+def anew(
+    lines: Iterable[bytes], keep: Iterable[str] = (), text: Callable[[int, str], str] = lambda _, text: text
+) -> list[bytes]:
+    """The lines, numbered, linked, sealed and signed anew by the holder of all keys."""
+    return resealed(lines, KEYS.__getitem__, keep=keep, text=text)
+
+
+def changed(log: list[bytes], number: int, **fields: object) -> list[bytes]:
+    """The log with some fields of one record set, and nothing else."""
+    return [*log[:number], edit(log[number], **fields), *log[number + 1 :]]
+
+
+def rewritten(log: list[bytes], number: int, **fields: object) -> list[bytes]:
+    """The log with some fields of one record set, and all the rest written anew but for the fields that are set."""
+    return anew(changed(log, number, **fields))
+
+
 def chained(lines: list[bytes]) -> list[bytes]:
-    """The lines, numbered and linked anew."""
+    """The lines, numbered and linked anew: all that anyone can do without a key."""
     done: list[bytes] = []
     for seq, line in enumerate(lines):
         done.append(edit(line, seq=seq, _prev=leaf_hash(done[-1]).hex() if done else "0" * 64))
@@ -52,15 +80,24 @@ def test_a_whole_log(log: list[bytes], log_key: SigningKey) -> None:
     report = verify(log)
     assert report.verdict is Verdict.VERIFIED
     assert (report.failure, report.shortfall) == (None, None)
-    assert report.records == 6
-    assert report.counts == {"genesis": 1, "decision": 2, "allow": 1, "fallback": 1, "effect": 2, "close": 1}
+    assert report.records == report.sealed == 9
+    assert report.epochs == 3
+    assert report.counts == {
+        "genesis": 1, "decision": 2, "allow": 1, "fallback": 1, "effect": 3, "seal": 2, "close": 1,
+    }  # fmt: skip
     assert report.genesis is not None
     assert report.close is not None
     assert report.last_us == 5_020_000
-    assert [claim.slug for claim in report.proven] == ["chain", "signed-close"]
-    assert log_key.kid.hex() in report.proven[1].text
+    assert [claim.slug for claim in report.proven] == ["chain", "seals", "signed-close"]
+    assert "records 0 to 8 are signed for, in 3 sealed epochs" in report.proven[1].text
+    assert log_key.kid.hex() in report.proven[2].text
     assert [claim.slug for claim in report.unproven] == ["anchor"]
-    assert b64decode(json.loads(log[-1])["checkpoint"].split("\n")[2]) == report.root
+    assert report.unproven[0].text.startswith("unanchored tail: 9 records")
+    assert report.root != b64decode(json.loads(log[-1])["checkpoint"].split("\n")[2])  # that is the root before it
+
+
+def test_writing_anew_is_what_the_next_tests_think(log: list[bytes]) -> None:
+    assert anew(log) == log
 
 
 def test_a_verified_log_is_never_called_complete_without_an_anchor(log: list[bytes]) -> None:
@@ -72,7 +109,7 @@ def test_a_verified_log_is_never_called_complete_without_an_anchor(log: list[byt
 def test_records_are_handed_on_as_they_are_read(log: list[bytes]) -> None:
     verifier = Verifier()
     assert [getattr(verifier.take(line), "type", None) for line in log] == [
-        "genesis", "decision", "effect", "decision", "effect", "close",
+        "genesis", "decision", "effect", "decision", "effect", "seal", "seal", "effect", "close",
     ]  # fmt: skip
 
 
@@ -88,9 +125,9 @@ def test_whoever_reads_along_can_end_it(log: list[bytes]) -> None:
 
 
 def test_nothing_may_follow_the_close(log: list[bytes]) -> None:
-    assert failure([*log, b"\n"]) == ("close/junk-after", 6)
-    assert failure([*log, b"x"]) == ("close/junk-after", 6)
-    assert failure([*log, log[-1]]) == ("close/junk-after", 6)
+    assert failure([*log, b"\n"]) == ("close/junk-after", 9)
+    assert failure([*log, b"x"]) == ("close/junk-after", 9)
+    assert failure([*log, log[-1]]) == ("close/junk-after", 9)
 
 
 def test_a_line_has_a_limit(log: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,9 +161,9 @@ def test_a_log_begins_with_its_genesis(log: list[bytes]) -> None:
 @pytest.mark.parametrize(
     ("fields", "found"),
     [
-        ({"version": 2}, "rtshcua/log version 2"),
-        ({"version": 2, "later": 1}, "rtshcua/log version 2"),
-        ({"format": "other/log"}, "other/log version 1"),
+        ({"version": 3}, "rtshcua/log version 3"),
+        ({"version": 1, "later": 1}, "rtshcua/log version 1"),
+        ({"format": "other/log"}, "other/log version 2"),
     ],
 )
 def test_a_format_must_be_known(fields: dict[str, object], found: str, log: list[bytes]) -> None:
@@ -134,7 +171,7 @@ def test_a_format_must_be_known(fields: dict[str, object], found: str, log: list
     assert report.failure is not None
     assert report.failure.slug == "genesis/format"
     assert report.failure.found == found
-    assert report.failure.expected == "rtshcua/log version 1"
+    assert report.failure.expected == "rtshcua/log version 2"
 
 
 def test_an_unknown_field_in_a_known_version(log: list[bytes]) -> None:
@@ -158,67 +195,170 @@ def test_numbers_leave_no_gap(log: list[bytes]) -> None:
 
 
 def test_a_changed_record_is_named_not_the_one_that_shows_it(log: list[bytes]) -> None:
-    for number in range(1, 5):
-        changed = [*log[:number], edit(log[number], utc_error_us=2_001), *log[number + 1 :]]
-        assert failure(changed) == ("chain/broken", number)
+    for number in (1, 2, 3, 4, 7):
+        assert failure(changed(log, number, utc_error_us=2_001)) == ("chain/broken", number)
 
 
 def test_a_changed_link_is_named(log: list[bytes]) -> None:
-    for number in range(1, 5):
-        changed = [*log[:number], edit(log[number], _prev="a" * 64), *log[number + 1 :]]
-        assert failure(changed) == ("chain/broken", number)
+    for number in (1, 2, 3, 4, 5, 6, 7):
+        assert failure(changed(log, number, _prev="a" * 64)) == ("chain/broken", number)
 
 
 def test_a_broken_link_at_the_end(log: list[bytes]) -> None:
-    assert failure([*log[:-1], edit(log[-1], _prev="a" * 64)]) == ("chain/broken", 4)
+    assert failure(changed(log, 8, _prev="a" * 64)) == ("chain/broken", 7)
     assert failure([log[0], edit(log[1], _prev="a" * 64), log[2][:80]]) == ("chain/broken", 1)
 
 
-# 5 the clock
+# 5 the clocks
 
 
 def test_monotonic_time_stands_or_goes_on(log: list[bytes]) -> None:
-    assert shortfall(chained([log[0], edit(log[1], at_us=5_000_000)])) == ("close/missing", 2)
+    start = 1_750_000_000_000_000
+    assert shortfall(chained([log[0], edit(log[1], at_us=5_000_000, utc_us=start)])) == ("close/missing", 2)
     assert failure(chained([log[0], edit(log[1], at_us=4_999_999)])) == ("clock/backwards", 1)
 
 
 def test_utc_may_step_back_within_its_stated_error(log: list[bytes]) -> None:
     start = 1_750_000_000_000_000
-    assert shortfall(chained([log[0], edit(log[1], utc_us=start - 4_000)]))[0] == "close/missing"
+    assert shortfall(chained([log[0], edit(log[1], at_us=5_000_000, utc_us=start - 4_000)]))[0] == "close/missing"
     assert failure(chained([log[0], edit(log[1], utc_us=start - 4_001)])) == ("clock/utc-backwards", 1)
     assert failure(chained([log[0], log[1], edit(log[2], utc_us=start, utc_error_us=1)]))[0] == "clock/utc-backwards"
 
 
-# 6 the close
+def test_utc_and_monotonic_time_go_on_alike(log: list[bytes]) -> None:
+    ahead = 1_750_000_000_010_000 + 4_000
+    assert shortfall(chained([log[0], edit(log[1], utc_us=ahead)]))[0] == "close/missing"
+    assert failure(chained([log[0], edit(log[1], utc_us=ahead + 1)])) == ("clock/utc-jump", 1)
+    assert failure(chained([log[0], edit(log[1], utc_us=ahead - 8_001, utc_error_us=2_000)])) == ("clock/utc-jump", 1)
+    slowly = [edit(log[2], at_us=5_010_000 + 5_000 * n, utc_us=ahead + 6_000 * n) for n in range(3)]
+    assert failure(chained([log[0], edit(log[1], utc_us=ahead), *slowly]))[0] == "clock/utc-jump"
 
 
-def resigned(log: list[bytes], key: SigningKey, checkpoint: Callable[[Checkpoint], Checkpoint]) -> list[bytes]:
-    """The log with a close over a changed checkpoint, signed in the name of the log's own origin."""
-    record = json.loads(log[-1])
-    origin, size, root = record["checkpoint"].split("\n")[:3]
-    text = checkpoint(Checkpoint(origin, int(size), b64decode(root))).text()
-    line = sign(Checkpoint(origin, 0, b""), key.public, lambda _: key.sign(text.encode(), duty=Duty.LOG))
-    return [*log[:-1], edit(log[-1], checkpoint=text + "\n" + line.rpartition("\n\n")[2])]
+# 6 the epochs
+
+SIGNED = (0, 5, 6, 8)
 
 
-def test_signing_anew_is_what_the_next_tests_think(log: list[bytes], log_key: SigningKey) -> None:
-    assert resigned(log, log_key, lambda checkpoint: checkpoint) == log
+@pytest.mark.parametrize("number", SIGNED)
+def test_a_signature_belongs_to_this_very_place(number: int, log: list[bytes]) -> None:
+    def other(line: int, new: str) -> list[bytes]:
+        def text(at: int, text: str) -> str:
+            lines = text.split("\n")
+            return "\n".join([*lines[:line], new, *lines[line + 1 :]]) if at == number else text
+
+        return anew(log, text=text)
+
+    zeros = b64encode(bytes(32)).decode()
+    assert failure(other(0, "rtshcua/log/another/00")) == ("seal/note", number)
+    assert failure(other(1, "7")) == ("seal/size", number)
+    assert failure(other(2, zeros)) == ("seal/root", number)
+    assert failure(other(3, f"record {zeros}")) == ("seal/self", number)
+    assert failure(other(4, f"key {zeros}")) == ("seal/next-key", number)
+    assert failure(other(4, f"key {zeros}\n")) == ("seal/note", number)
+    place = 4 if number == 8 else 5
+    assert failure(other(place, f"after {zeros}" + "\n" * (number == 0))) == ("seal/after", number)
+    if number:
+        assert failure(other(place, f"after {zeros}\n")) == ("seal/note", number)
 
 
-def test_the_close_belongs_to_this_very_log(log: list[bytes], log_key: SigningKey) -> None:
-    other = origin_of("another", "00")
-    assert failure(resigned(log, log_key, lambda c: c._replace(origin=other))) == ("close/origin", 5)
-    assert failure(resigned(log, log_key, lambda c: c._replace(size=5))) == ("close/size", 5)
-    assert failure(resigned(log, log_key, lambda c: c._replace(root=bytes(32)))) == ("close/root", 5)
+def test_a_close_names_no_further_key(log: list[bytes]) -> None:
+    zeros = b64encode(bytes(32)).decode()
+    key = f"\nkey {zeros}\nafter "
+    found = failed(anew(log, text=lambda number, text: text.replace("\nafter ", key) if number == 8 else text))
+    assert (found.slug, found.found, found.expected) == ("seal/next-key", "none", "00" * 32)
 
 
-def test_every_field_of_the_close_is_signed(log: list[bytes]) -> None:
-    changed = {"at_us": 5_020_001, "ending": "completed", "tlog": "11" * 32, "utc_us": 1_750_000_000_020_001}
-    for field, value in changed.items():
-        assert failure([*log[:-1], edit(log[-1], **{field: value})]) == ("close/root", 5)
-    assert failure([*log[:-1], edit(log[-1], count=4)]) == ("close/count", 5)
-    assert failure([*log[:-1], edit(log[-1], checkpoint=None)]) == ("close/unsigned", 5)
-    assert failure([*log[:-1], edit(log[-1], checkpoint="")]) == ("close/unsigned", 5)
+@pytest.mark.parametrize("number", SIGNED)
+def test_a_signed_record_bears_one_good_signature(number: int, log: list[bytes]) -> None:
+    note: str = json.loads(log[number])["checkpoint"]
+    other = json.loads(log[5 if number == 0 else 0])["checkpoint"].rpartition("\n\n")[2]
+    wrong = note[:-8] + ("A" if note[-8] != "A" else "B") + note[-7:]
+    for checkpoint in (None, "", note[:-1], note + "x", note + other):
+        assert failure(changed(log, number, checkpoint=checkpoint)) == ("seal/note", number)
+    assert failure(changed(log, number, checkpoint=note.rpartition("\n\n")[0] + "\n\n" + other)) == ("seal/key", number)
+    for checkpoint in (wrong, "\n" + note):
+        assert failure(changed(log, number, checkpoint=checkpoint)) == ("seal/signature", number)
+
+
+def test_every_field_of_a_signed_record_is_signed(log: list[bytes]) -> None:
+    same = {"at_us": 5_020_001, "utc_us": 1_750_000_000_020_001, "utc_error_us": 2_001}
+    for field, value in (same | {"ending": "completed", "tlog": "11" * 32, "disclosure": None}).items():
+        assert failure(changed(log, 8, **{field: value})) == ("seal/self", 8)
+    for number in (5, 6, 8):
+        counted = {"epoch": 7, "records": 7, "bytes": 7, "digest": "00" * 32}
+        for field, value in counted.items():
+            assert failure(changed(log, number, **{field: value})) == (f"seal/{field}", number)
+            assert failure(anew(changed(log, number, **{field: value}), keep=[field])) == (f"seal/{field}", number)
+    assert failure(changed(log, 5, next_key="00" * 32)) == ("seal/self", 5)
+    assert failure(changed(log, 0, vehicle="quad")) == ("seal/key", 0)
+    for field, value in {"mission": "m", "sync_us": 0, "before": "00" * 32, "utc_us": 0, "next_key": "00" * 32}.items():
+        assert failure(changed(log, 0, **{field: value})) == ("seal/self", 0)
+
+
+def test_what_was_written_anew_without_keys(log: list[bytes]) -> None:
+    edited = chained(changed(log, 3, outcome="allow"))
+    assert failure(edited) == ("seal/bytes", 5)
+    assert failure(chained(changed(log, 3, outcome="fallback", kind=1))) == ("seal/digest", 5)
+    fixed = anew(changed(log, 3, outcome="allow"), keep=["checkpoint"])
+    assert failure(fixed) == ("seal/root", 5)
+    assert failure(chained([*log[:3], *log[4:]])) == ("seal/records", 4)
+    assert failure(anew([*log[:3], *log[4:]], keep=["checkpoint"])) == ("seal/size", 4)
+    assert failure(chained([*log[:5], *log[6:]])) == ("seal/epoch", 5)
+
+
+def test_a_record_that_all_keys_wrote_anew_passes_here(log: list[bytes]) -> None:
+    assert verify(anew(changed(log, 3, outcome="allow"))).verdict is Verdict.VERIFIED
+    assert verify(anew([*log[:2], *log[3:]])).verdict is Verdict.VERIFIED
+
+
+def seconds(line: bytes, ms: int) -> bytes:
+    return edit(line, at_us=5_000_000 + ms * 1_000, utc_us=1_750_000_000_000_000 + ms * 1_000)
+
+
+def test_an_epoch_lasts_no_longer_than_twenty_seconds(log: list[bytes]) -> None:
+    first, record, seal, close = log[0], log[2], log[5], log[8]
+    assert verify(anew([first, seconds(record, 20_000), seconds(close, 60_000)])).verdict is Verdict.VERIFIED
+    assert failure(anew([first, seconds(record, 20_001), seconds(close, 60_000)])) == ("seal/missing", 1)
+    late = [first, seconds(seal, 30_000), seconds(record, 50_000), seconds(close, 50_000)]
+    assert verify(anew(late)).verdict is Verdict.VERIFIED
+    assert failure(anew([*late[:2], seconds(record, 50_001)])) == ("seal/missing", 2)
+
+
+def test_an_epoch_has_no_more_than_twice_as_many_records_as_its_writer_puts_in(
+    log: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, record, seal, close = log[0], log[2], log[5], log[8]
+    assert module.MOST_RECORDS == 2_048
+    monkeypatch.setattr(module, "MOST_RECORDS", 3)
+    assert verify(anew([first, record, record, record, close])).verdict is Verdict.VERIFIED
+    assert failure(anew([first, record, record, record, record, close])) == ("seal/missing", 4)
+    more = [edit(record, at_us=5_014_000, utc_us=1_750_000_000_014_000)] * 3
+    assert verify(anew([first, record, seal, *more, close])).verdict is Verdict.VERIFIED
+
+
+def recover_from(line: bytes) -> bytes:
+    """A recover in the place of a seal."""
+    return line_of(json.loads(line) | {"type": "recover", "discarded_bytes": 3, "discarded_digest": "00" * 32})
+
+
+def test_monotonic_time_begins_anew_at_a_recover(log: list[bytes]) -> None:
+    recover = edit(recover_from(log[5]), at_us=3)
+    tail = [edit(line, at_us=4 + number * 1_000) for number, line in enumerate(log[6:])]
+    whole = anew([*log[:5], recover, *tail])
+    assert verify(whole).verdict is Verdict.VERIFIED
+    assert verify(whole).counts["recover"] == 1
+    assert failure(anew([*log[:5], recover, edit(log[7], at_us=2)])) == ("clock/backwards", 6)
+    assert failure(anew([*log[:5], edit(recover, utc_us=0), *tail])) == ("clock/utc-backwards", 5)
+    assert failure(anew([*log[:5], recover, edit(log[7], at_us=10_000_000)])) == ("clock/utc-jump", 6)
+
+
+def test_the_log_key_signs_a_recover_and_no_other_does(log: list[bytes]) -> None:
+    recovered = [*log[:5], recover_from(log[5]), *log[6:]]
+    whole, first = anew(recovered), json.loads(log[0])
+    origin, epoch_key = f"rtshcua/log/quad%2007%2B%C3%A9/{first['boot']}", KEYS[first["next_key"]]
+    text = json.loads(whole[5])["checkpoint"].rpartition("\n\n")[0] + "\n"
+    assert verify(whole).verdict is Verdict.VERIFIED
+    assert failure(changed(whole, 5, checkpoint=note_of(origin, text, epoch_key))) == ("seal/key", 5)
 
 
 def test_a_log_of_genesis_and_close_alone(
@@ -232,12 +372,20 @@ def test_a_log_of_genesis_and_close_alone(
 
 
 def test_a_log_without_close_is_incomplete(log: list[bytes]) -> None:
-    for count in range(1, 6):
+    for count in range(1, 8):
         assert shortfall(log[:count]) == ("close/missing", count)
     report: Report = verify(log[:1])
-    assert [claim.slug for claim in report.proven] == ["chain"]
-    assert [claim.slug for claim in report.unproven] == ["signed-close"]
+    assert [claim.slug for claim in report.proven] == ["chain", "seals"]
+    assert [claim.slug for claim in report.unproven] == ["signed-close", "anchor"]
     assert report.proven[0].text.startswith("record 0 is")
+
+
+def test_what_follows_the_last_seal_is_not_signed_for(log: list[bytes]) -> None:
+    report = verify(log[:8])
+    assert (report.records, report.sealed, report.epochs) == (8, 7, 2)
+    assert report.unproven[1].text.startswith("record 7 is chained but not yet signed for")
+    assert report.unproven[2].text.startswith("unanchored tail: 8 records")
+    assert verify(log[:5]).unproven[1].text.startswith("records 1 to 4 are chained")
 
 
 def test_a_log_cut_inside_a_record_is_torn(log: list[bytes]) -> None:

@@ -1,6 +1,7 @@
 """The tlog format: what is written reads back, and a cut file says where it was cut."""
 
 import itertools
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ def test_round_trip(stamps: list[tuple[int, int]]) -> None:
     codec = Codec(1, 1)
     entries = [tlog.Entry(at_us, codec.pack(mavlink.MAVLink_system_time_message(value, 7))) for at_us, value in stamps]
     data = b"".join(tlog.encode(entry.at_us, entry.frame) for entry in entries)
-    assert list(tlog.read(data)) == entries
+    assert list(tlog.read(data)) == list(tlog.stream(BytesIO(data))) == entries
 
 
 @pytest.mark.parametrize("name", ["px4", "arducopter", "arducopter-signed"])
@@ -40,8 +41,14 @@ def test_a_cut_file_gives_its_whole_entries_and_the_place() -> None:
             seen.extend(entry for entry in tlog.read(data[:length]))
         assert caught.value.offset == size
         assert seen == [first]
+        with pytest.raises(tlog.DamagedTlog) as caught:
+            seen.extend(tlog.stream(BytesIO(data[:length])))
+        assert caught.value.offset == size
+        assert seen == [first, first]
 
 
 def test_what_is_no_tlog_is_refused() -> None:
     with pytest.raises(tlog.DamagedTlog):
         list(tlog.read(b"not a tlog at all, but long enough for one"))
+    with pytest.raises(tlog.DamagedTlog):
+        list(tlog.stream(BytesIO(b"not a tlog at all, but long enough for one")))

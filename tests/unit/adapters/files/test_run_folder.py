@@ -2,16 +2,15 @@
 
 import errno
 import hashlib
-import io
 import json
 from pathlib import Path
-from threading import Event
-from typing import Any
 
 import pytest
 
+from reference.faulty_disk import FaultyDisk, until
 from rtshcua.adapters.files import telemetry
 from rtshcua.adapters.files.runs import RunFolder
+from rtshcua.evidence.durability import SYNCED_FIRST
 from rtshcua.mavlink import tlog
 
 UTC_US = 1_750_000_000_999_999  # 2025-06-15T15:06:40Z
@@ -23,7 +22,7 @@ def test_folder_holds_the_bundle_and_makes_room(tmp_path: Path) -> None:
     assert run.path == tmp_path / "runs" / "20250615T150640Z-short"
     assert (run.path / "mission.bundle").read_bytes() == b"bundle"
     log = run.log()
-    log.append(b"{}\n", durable=True)
+    log.append(b"{}\n", SYNCED_FIRST)
     log.close()
     run.write_summary({"ending": "completed", "records": 1})
     run.write_summary({"ending": "aborted", "records": 1})
@@ -58,12 +57,7 @@ def test_telemetry_is_a_tlog_and_its_digest_that_of_the_file(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("size", [10, 1 << 20])
 def test_a_full_disk_ends_the_telemetry_and_not_the_flight(size: int, tmp_path: Path) -> None:
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("needs /dev/full")
-    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
-    file._file.close()
-    file._file = full.open("wb")
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog", FaultyDisk(room=0))
     for _ in range(3):
         file.write(UTC_US, bytes(size))
     assert file.finish() == hashlib.sha256(b"").digest()
@@ -74,26 +68,7 @@ def test_a_full_disk_ends_the_telemetry_and_not_the_flight(size: int, tmp_path: 
 
 @pytest.mark.parametrize("size", [1, 10 * (8 + len(FRAME)) + 5, 1 << 17])
 def test_what_a_full_disk_took_ends_at_a_whole_frame_and_the_rest_is_counted(size: int, tmp_path: Path) -> None:
-    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
-    raw = file._file.detach()
-
-    class Disk(io.RawIOBase):
-        left = size
-
-        def writable(self) -> bool:
-            return True
-
-        def write(self, data: Any) -> int:
-            if not self.left:
-                raise OSError(errno.ENOSPC, "No space left on device")
-            taken = raw.write(bytes(data[: self.left]))
-            self.left -= taken
-            return int(taken)
-
-        def close(self) -> None:
-            raw.close()
-
-    file._file = io.BufferedWriter(Disk(), 1 << 16)
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog", FaultyDisk(room=size))
     for number in range(6_000):
         file.write(UTC_US + number, FRAME)
     digest = file.finish()
@@ -101,6 +76,28 @@ def test_what_a_full_disk_took_ends_at_a_whole_frame_and_the_rest_is_counted(siz
     kept = size // (8 + len(FRAME))
     assert [entry.at_us for entry in tlog.read(data)] == [UTC_US + number for number in range(kept)]
     assert (file.lost, digest) == (6_000 - kept, hashlib.sha256(data).digest())
+
+
+def test_frames_that_were_not_synced_are_not_vouched_for(tmp_path: Path) -> None:
+    disk = FaultyDisk()
+    disk.failing["sync"] = errno.EIO
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog", disk)
+    file.write(UTC_US, FRAME)
+    file.finish()
+    assert file.error is not None
+    assert (file.error.errno, file.lost) == (errno.EIO, 0)
+
+
+def test_a_disk_that_hangs_is_not_waited_for_for_ever(tmp_path: Path) -> None:
+    disk = FaultyDisk()
+    disk.open["write"].clear()
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog", disk)
+    file.write(UTC_US, FRAME)
+    with pytest.raises(OSError, match=r"has not answered for 0\.01 s"):
+        file.finish(0.01)
+    disk.heal()
+    until(lambda: not file._thread.is_alive())
+    file.finish()
 
 
 def test_the_last_room_on_the_disk_is_left_to_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,24 +122,15 @@ def test_a_disk_that_does_not_say_how_much_room_it_has(tmp_path: Path, monkeypat
 
 def test_nobody_waits_for_a_disk_that_stands_still(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(telemetry, "MOST_WAITING", 3)
-    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog")
-    still, real, writing = Event(), file._file, Event()
-
-    class Disk:
-        def write(self, data: bytes) -> None:
-            writing.set()
-            assert still.wait(20)
-            real.write(data)
-
-        flush, close = real.flush, real.close
-
-    file._file = Disk()
+    disk = FaultyDisk()
+    disk.open["write"].clear()
+    file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog", disk)
     file.write(UTC_US, FRAME)
-    assert writing.wait(20)
+    until(lambda: not file._waiting)
     for number in range(1, 6):
         file.write(UTC_US + number, FRAME)
     assert file.lost == 2
-    still.set()
+    disk.heal()
     file.finish()
     data = (tmp_path / "telemetry.tlog").read_bytes()
     assert [entry.at_us for entry in tlog.read(data)] == [UTC_US + number for number in range(4)]

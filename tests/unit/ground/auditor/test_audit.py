@@ -79,7 +79,7 @@ def test_a_flight_that_was_interrupted() -> None:
 def test_what_is_proven_and_what_is_not() -> None:
     report = sound(flight()).report
     assert [claim.slug for claim in report.proven] == [
-        "trust", "bundle", "chain", "signed-close", "decisions", "dispatches",
+        "trust", "bundle", "chain", "seals", "signed-close", "decisions", "dispatches",
     ]  # fmt: skip
     assert [claim.slug for claim in report.unproven] == ["anchor", "state", "development"]
     texts = " ".join(claim.text for claim in report.proven)
@@ -99,7 +99,7 @@ def test_one_is_not_many() -> None:
 def test_a_log_that_was_cut_still_proves_its_beginning() -> None:
     report = prove(flight()[:-1]).report
     assert report.verdict is Verdict.INCOMPLETE
-    assert [claim.slug for claim in report.proven] == ["trust", "bundle", "chain", "decisions", "dispatches"]
+    assert [claim.slug for claim in report.proven] == ["trust", "bundle", "chain", "seals", "decisions", "dispatches"]
     assert "signed-close" in [claim.slug for claim in report.unproven]
 
 

@@ -11,13 +11,13 @@ DEGRADE = -1
 
 def decision(kind: int, step: int, link: int, outcome: str = "allow", until_us: int = 100) -> Decision:
     return Decision(
-        "0" * 64, 0, "", None, None, RecordedContext((), 0, 0, 1, 0, 0, ""), "", kind, link, "software", outcome, "",
+        "0" * 64, 0, "", None, None, RecordedContext((), 0, 0, 1, 0, 0, ""), 2, "", kind, link, "software", outcome, "",
         8, 1, RecordedState(ages=(), values=()), step, None, -1, "decision", 0, 0, until_us,
     )  # fmt: skip
 
 
 def sent(kind: int, step: int, link: int, at_us: int = 50, event: str = "dispatched") -> Effect:
-    return Effect("0" * 64, at_us, "", event, kind, link, 2, step, 1, "effect", 0, 0)
+    return Effect("0" * 64, at_us, "", 1, event, kind, link, 2, step, 1, "effect", 0, 0)
 
 
 def slug(cover: Cover, effect: Effect) -> str | None:

@@ -1,0 +1,47 @@
+"""`rtshcua verify-log --explain N`: an audit of the log, and record N in words."""
+
+import json
+from pathlib import Path
+
+from rtshcua.adapters.files.verification import Asked, verify_carefully
+from rtshcua.cli.beside import anchors_beside, bundle_beside
+from rtshcua.cli.disclosed import disclosed
+from rtshcua.cli.faults import fail
+from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
+from rtshcua.cli.pin import Pin
+from rtshcua.cli.showing.page import for_terminal
+from rtshcua.cli.showing.record import Told, show_record
+from rtshcua.diagnostics.exits import ExitCode
+
+
+def explained(
+    logs: list[Path], number: int, pinned: Pin, anchors: tuple[Path, ...], *, derive: bool, as_json: bool
+) -> ExitCode:
+    """Prints record `number` of one log; the exit code is that of the log's audit."""
+    logs = logs_meant(logs)
+    if len(logs) != 1:
+        return fail(ExitCode.USAGE, "`--explain` tells of a record of one log", f"{len(logs)} logs were given")
+    path = log_of(logs[0])
+    if not is_log(path):
+        return fail(ExitCode.INPUT, f"`{logs[0]}` is not a log of this program", NO_LOG_HELP)
+    told = Told(number)
+    asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
+    audit = verify_carefully(path, asked, derive=derive, each=told.take)
+    report = disclosed(audit.report, path, audited=True)
+    if told.record is None:
+        if report.failure is None:
+            return fail(ExitCode.INPUT, f"`{path}` has no record {number}: it ends after {report.records}")
+        slug = report.failure.slug
+        text = (
+            f"`{path}` fails before record {number}, at record {report.failure.record}: {slug}, {report.failure.text}"
+        )
+        return fail(exit_code(report), text, slug=slug)
+    code = exit_code(report)
+    page = for_terminal()
+    shown = show_record(page, told, report)
+    if as_json:
+        head = {"log": str(path), "verdict": report.verdict.value, "exit_code": int(code)}
+        print(json.dumps({**head, **shown}, ensure_ascii=False))
+    else:
+        print(page)
+    return code

@@ -1,0 +1,59 @@
+"""Which file is meant by a log, and how its verification ends for the shell."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rtshcua.adapters.files.logs import START
+from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.files.runs import LOG, logs_of
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.report import Report, Verdict
+
+_MARK = b'"format":"rtshcua/log"'
+_HEAD = 1 << 26
+
+#: of a log whose first record is not whole, in every command
+CUT_AT_FIRST = "the log is cut inside its first record, or that record is damaged"
+
+#: where a file is no log
+NO_LOG_HELP = "accepted: a log, the folder of a run, or a folder of these"
+
+_EXITS = {
+    "trust": ExitCode.UNTRUSTED,
+    "decision": ExitCode.DECISION,
+    "document": ExitCode.DECISION,
+    "dispatch": ExitCode.DECISION,
+    "frames": ExitCode.DECISION,
+    "anchor": ExitCode.ANCHOR,
+}
+
+
+def log_of(given: Path) -> Path:
+    """The log that is meant: itself, or that in the folder of a run."""
+    return given / LOG if given.is_dir() else given
+
+
+def logs_meant(given: Iterable[Path]) -> list[Path]:
+    """The logs that are meant by files, folders of runs and folders of these; where there is none, the missing one."""
+    return [log for path in given for log in logs_of(path) or [path / LOG]]
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file looks like a log, or is empty, as one is of which all was cut off; its first line may be cut."""
+    with open_regular(path) as file:
+        line = file.readline(_HEAD)
+    return not line or line.startswith(START) or _MARK in line
+
+
+def exit_code(report: Report) -> ExitCode:
+    """The exit code for a report."""
+    if report.failure is None:
+        return ExitCode.OK if report.verdict is Verdict.VERIFIED else ExitCode.INCOMPLETE
+    return exit_code_of(report.failure.slug)
+
+
+def exit_code_of(slug: str) -> ExitCode:
+    """The exit code for what makes a log fail."""
+    if slug == "genesis/format":
+        return ExitCode.UNTRUSTED
+    return _EXITS.get(slug.partition("/")[0], ExitCode.EVIDENCE)

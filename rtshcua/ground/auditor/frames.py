@@ -1,0 +1,196 @@
+"""Evidence before effect, held against the raw frames: what we sent had a record first, and was what that permits.
+
+A frame of ours is one that the companion's component sent in a system of which an autopilot was heard; before any was
+heard, in every system. For whoever reaches the link can send the heartbeat of another system, nothing follows from one:
+frames of a companion like ours in another vehicle's system, heard over the same link, count as ours too. Each that is
+not harmless (`sent`) must be part (`obeyed`) of a command whose `dispatched` record is earlier and whose end is not.
+Frames of others, which came over the same link, are theirs to answer for.
+
+Frames carry UTC, records UTC too, both of one clock that never goes back: their order is exact, but for frames and
+records of the same microsecond, whose order among themselves nobody can tell and which count for either.
+
+What is kept does not grow with the flight: for each system (there are 255) its autopilot, and the height of its home.
+"""
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from rtshcua.evidence.finding import Finding, Flaw
+from rtshcua.evidence.records import Effect
+from rtshcua.ground.auditor.cover import DISPATCHED
+from rtshcua.ground.auditor.obeyed import ARDUPILOT, PX4, Home, Target, obeyed, of_link, of_step
+from rtshcua.ground.auditor.sent import GLOBAL_POSITION_INT, HEARTBEAT, Frame, Nature, name, nature, read
+from rtshcua.ground.auditor.trust import Basis
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
+
+#: MAV_COMP_ID_ONBOARD_COMPUTER: who we are; MAV_COMP_ID_AUTOPILOT1: who the vehicle is
+OURS: Final = 191
+_AUTOPILOT: Final = 1
+
+
+class _Entry(NamedTuple):
+    number: int
+    at_us: int
+    octets: bytes
+
+
+class _Suspect(NamedTuple):
+    """The first frame that nothing covers. `record` is the last record before it."""
+
+    frame: Frame
+    number: int
+    at_us: int
+    record: int
+    running: bool
+
+
+class _Running(NamedTuple):
+    targets: tuple[Target, ...]
+    token: int
+    since_us: int
+    record: int
+
+
+class Frames:
+    """Follows a log and the frames that lie beside it, in step. `entries` are (UTC us, frame) as they were kept.
+
+    `count` is how many frames of ours were commands, `begun` whether the log has any that was sent.
+    `DamagedTlog` or the like passes through from `entries`.
+    """
+
+    def __init__(self, entries: Iterator[tuple[int, bytes]]) -> None:
+        self.count = 0
+        self._entries = enumerate(entries)
+        self._next: _Entry | None = None
+        self._over = False
+        self._basis: Basis | None = None
+        self._autopilots: dict[int, int] = {}  # of each system that has one
+        self._homes: dict[int, Home] = {}
+        self._running: _Running | None = None
+        self._ended: tuple[_Running, int] | None = None  # what ended last, and when
+        self.begun = False
+        self._record = 0
+        self._suspect: _Suspect | None = None
+        self._finding: Finding | None = None
+
+    def begin(self, basis: Basis) -> None:
+        """The log was found to rest on this."""
+        self._basis = basis
+
+    def happened(self, record: Effect) -> None:
+        """Takes note of an effect, in the order of the log, once it is known to be sound."""
+        if self._finding is not None:
+            return
+        self._until(record.utc_us)
+        running = self._running
+        if record.event == DISPATCHED:
+            self._dispatched(record)
+        elif running is not None and record.token == running.token:
+            self._running, self._ended = None, (running, record.utc_us)
+        self._record = record.seq
+
+    def over(self) -> Finding | None:
+        """The first frame that should not be, once the log is over."""
+        if self._finding is None:
+            self._until(None)
+            if self._suspect is not None:
+                self._finding = _unrecorded(self._suspect)
+        return self._finding
+
+    def _dispatched(self, record: Effect) -> None:
+        targets = self._targets(record)
+        suspect = self._suspect
+        if suspect is not None:
+            early = self._any(suspect.frame, targets)
+            self._finding = _early(suspect, record.utc_us, record.seq) if early else _unrecorded(suspect)
+        self._running = _Running(targets, record.token, record.utc_us, record.seq)
+        self.begun = True
+
+    def _targets(self, record: Effect) -> tuple[Target, ...]:
+        """What the dispatch may have the vehicle do; several only for degrade rules, of which the record names none."""
+        assert self._basis is not None
+        policy, invocations = self._basis.policy.policy, self._basis.invocations
+        links = policy.contingency
+        if record.kind != CONTINGENCY_LINK:
+            if not 0 <= record.step < len(invocations):
+                return ()
+            invocation = invocations[record.step].invocation
+            if record.kind == STEP:
+                return (of_step(invocation, policy),) if invocation.contract.name == record.detail else ()
+            links = invocation.contract.fallback
+        if record.link == DEGRADE:
+            chosen = [rule.target for rule in policy.rules if rule.target is not None]
+        else:
+            chosen = list(links[record.link : record.link + 1]) if record.link >= 0 else []
+        return tuple(of_link(link, policy) for link in chosen if policy.contracts[link.skill].name == record.detail)
+
+    def _until(self, utc_us: int | None) -> None:
+        """Judges the frames before a moment; all that are left, if there is none."""
+        while True:
+            entry = self._next or self._take()
+            if entry is None:
+                return
+            if utc_us is not None and entry.at_us >= utc_us:
+                self._next = entry
+                return
+            self._next = None
+            self._judge(entry)
+
+    def _take(self) -> _Entry | None:
+        found = None if self._over else next(self._entries, None)
+        self._over = found is None
+        return None if found is None else _Entry(found[0], *found[1])
+
+    def _judge(self, entry: _Entry) -> None:
+        frame = read(entry.octets)
+        if frame is None:
+            return  # nothing that an autopilot would take for a frame
+        if frame.component == _AUTOPILOT:
+            self._heard(frame)
+        if frame.component != OURS or (self._autopilots and frame.system not in self._autopilots):
+            return
+        what = nature(frame)
+        if what is Nature.HARMLESS or (what is Nature.FENCE and not self.begun):
+            return
+        self.count += 1
+        if self._suspect is not None or self._finding is not None:
+            return
+        running, ended = self._running, self._ended
+        if ended is not None and entry.at_us == ended[1] and self._any(frame, ended[0].targets):
+            return
+        suspect = _Suspect(frame, entry.number, entry.at_us, self._record, running is not None)
+        if running is None or not self._any(frame, running.targets):
+            self._suspect = suspect
+        elif entry.at_us < running.since_us:  # frames do not stand in the order of their times
+            self._finding = _early(suspect, running.since_us, running.record)
+
+    def _heard(self, frame: Frame) -> None:
+        """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies."""
+        fields, system = frame.fields, frame.system
+        if frame.message == HEARTBEAT and fields[2:3] and fields[2] in (PX4, ARDUPILOT):
+            self._autopilots.setdefault(system, fields[2])
+        elif frame.message == GLOBAL_POSITION_INT and system in self._autopilots and fields:
+            height = fields[3] - fields[4]  # mm: above sea, less above home
+            home = self._homes.get(system, Home(height, height))
+            self._homes[system] = Home(min(home.low, height), max(home.high, height))
+
+    def _any(self, frame: Frame, targets: tuple[Target, ...]) -> bool:
+        autopilot, home = self._autopilots.get(frame.system, 0), self._homes.get(frame.system)
+        return any(obeyed(frame, target, autopilot, home) for target in targets)
+
+
+def _early(suspect: _Suspect, utc_us: int, record: int) -> Finding:
+    text = "a command was sent before the record that permits it"
+    return Flaw("frames/early", text, _found(suspect), f"after {utc_us} us").at(record)
+
+
+def _unrecorded(suspect: _Suspect) -> Finding:
+    if suspect.running:
+        text = "a command was sent that is no part of what the record before it permits"
+        return Flaw("frames/other-command", text, _found(suspect)).at(suspect.record)
+    text = "a command was sent while no record permits any"
+    return Flaw("frames/unrecorded", text, _found(suspect)).at(suspect.record)
+
+
+def _found(suspect: _Suspect) -> str:
+    return f"{name(suspect.frame)} at {suspect.at_us} us, frame {suspect.number}"

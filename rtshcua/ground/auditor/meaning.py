@@ -1,0 +1,62 @@
+"""What the records of a log mean together: each decision follows from its inputs, and each command from a record."""
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.records import AnyRecord, Decision, Effect
+from rtshcua.ground.auditor.cover import Cover
+from rtshcua.ground.auditor.derive import UNENFORCED, Deriver
+from rtshcua.ground.auditor.documents import Documents
+from rtshcua.ground.auditor.frames import Frames
+from rtshcua.ground.auditor.trust import Basis
+from rtshcua.ground.auditor.turns import Turns
+
+
+class Meaning:
+    """Takes the records of one log after its genesis, in order, in memory that the bundle bounds, not the log."""
+
+    def __init__(self, basis: Basis, mode: str, frames: Frames | None = None) -> None:
+        self.mode = mode
+        self._frames = frames
+        if frames is not None:
+            frames.begin(basis)
+        self.derived = 0
+        self._deriver = Deriver(basis)
+        self._documents = Documents(basis, self._deriver)
+        self._cover = Cover()
+        self._turns = Turns(basis)
+
+    @property
+    def dispatches(self) -> int:
+        """How many commands were sent."""
+        return self._cover.dispatches
+
+    @property
+    def documents(self) -> dict[str, int]:
+        """How many documents of each kind were verified."""
+        return self._documents.counts
+
+    def check(self, record: AnyRecord) -> Flaw | None:
+        """What is wrong with the next record, or None."""
+        if isinstance(record, Decision):
+            return self._decided(record)
+        if isinstance(record, Effect):
+            return self._happened(record)
+        return None
+
+    def _decided(self, record: Decision) -> Flaw | None:
+        if record.mode != self.mode:
+            text = "the decision was made in another mode than the log began in"
+            return Flaw("decision/mode", text, record.mode, self.mode)
+        flaw = self._deriver.check(record)
+        if flaw is None:
+            self.derived += 1
+            self._cover.decided(record)
+        return flaw
+
+    def _happened(self, record: Effect) -> Flaw | None:
+        flaw = self._documents.check(record)
+        if flaw is None and self.mode != UNENFORCED:
+            self._cover.recalled = self._documents.counts["recall"] > 0
+            flaw = self._cover.check(record) or self._turns.check(record)
+        if flaw is None and self._frames is not None:
+            self._frames.happened(record)
+        return flaw

@@ -1,0 +1,138 @@
+"""Whether a frame is part of flying a command of the bundle: a table of the auditor's own, by autopilot and motion.
+
+| motion | PX4 | ArduCopter |
+|---|---|---|
+| climb | mode Hold, arm, take off to the height above sea | mode GUIDED, arm, take off to the height above home |
+| fly, cover | reposition to a point of the path, at its height | mode GUIDED, speed, position target on the path |
+| hold | mode Hold | mode BRAKE |
+| home | mode Return | mode RTL |
+| land | mode Land | mode LAND |
+
+Heights above sea are judged by what the vehicle reported of its home.
+"""
+
+from math import isfinite, isnan
+from typing import Any, Final, NamedTuple
+
+from rtshcua.ground.auditor.sent import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT, Frame
+from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import unproject
+
+#: MAV_AUTOPILOT
+ARDUPILOT, PX4 = 3, 12
+_SET_MODE, _ARM, _TAKEOFF, _SPEED, _REPOSITION = 176, 400, 22, 178, 192  # MAV_CMD
+
+_TRAVELS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
+#: the modes (custom main mode, sub-mode) that an autopilot is put in, and for which motions
+_MODES: Final = {
+    (PX4, 4, 3): frozenset({MotionKind.CLIMB, MotionKind.HOLD}),
+    (PX4, 4, 5): frozenset({MotionKind.HOME}),
+    (PX4, 4, 6): frozenset({MotionKind.LAND}),
+    (ARDUPILOT, 4, 0): frozenset({MotionKind.CLIMB}) | _TRAVELS,
+    (ARDUPILOT, 17, 0): frozenset({MotionKind.HOLD}),
+    (ARDUPILOT, 6, 0): frozenset({MotionKind.HOME}),
+    (ARDUPILOT, 9, 0): frozenset({MotionKind.LAND}),
+}
+_ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
+_DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
+_POSITION_ONLY: Final = 0x0DF8  # POSITION_TARGET_TYPEMASK: all but the position is ignored
+_ABOVE_SEA, _ABOVE_HOME = 0, 6  # MAV_FRAME of the two ways to say a height
+
+
+class Target(NamedTuple):
+    """What a step or link of the bundle has the vehicle do.
+
+    `points` in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s, 0 where it is the vehicle's own.
+    """
+
+    kind: int
+    points: frozenset[tuple[int, int]]
+    altitude: int
+    speed: int
+
+
+class Home(NamedTuple):
+    """The lowest and the highest height above sea that home was reported at, in mm."""
+
+    low: int
+    high: int
+
+
+def of_step(invocation: Invocation, policy: Policy) -> Target:
+    """What a step does."""
+    plan = invocation.plan
+    return Target(plan.kind, _points(plan.path, policy), plan.altitude, plan.speed)
+
+
+def of_link(link: Link, policy: Policy) -> Target:
+    """What a link of a chain, or the target of a degrade rule, does."""
+    contract = policy.contracts[link.skill]
+    motion = contract.motion
+    altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
+    path = _place(contract, link) if motion.kind == MotionKind.FLY else ()
+    return Target(motion.kind, _points(path, policy), altitude, speed)
+
+
+def obeyed(frame: Frame, target: Target, autopilot: int, home: Home | None) -> bool:
+    """Whether an autopilot that obeys the frame does what the target is, or a part of it."""
+    fields = frame.fields
+    if not fields:
+        return False
+    if frame.message == COMMAND_LONG:
+        return _command(fields, target, autopilot, home)
+    if target.kind not in _TRAVELS:
+        return False
+    if frame.message == COMMAND_INT and autopilot == PX4:
+        speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+        asked = _near(speed, target.speed) if target.speed else speed == -1
+        plain = flags == 1 and radius == 0 and isnan(yaw)  # in Hold, without a circle or a heading of its own
+        there = number == _REPOSITION and reference == _ABOVE_SEA and (x, y) in target.points
+        return there and asked and plain and _above_sea(z, target, home)
+    if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT:
+        _, x, y, z, *_, mask, _, _, reference = fields
+        alone = mask == _POSITION_ONLY and reference == _ABOVE_HOME
+        return alone and (x, y) in target.points and _near(z, target.altitude)
+    return False
+
+
+def _command(fields: tuple[Any, ...], target: Target, autopilot: int, home: Home | None) -> bool:
+    one, two, three, four, five, six, seven, number, *_ = fields
+    if number == _SET_MODE:
+        return one == 1 and target.kind in _MODES.get((autopilot, two, three), ()) and not any(fields[3:7])
+    if number == _ARM:  # to arm, and not by force
+        return target.kind == MotionKind.CLIMB and one == 1 and not any(fields[1:7])
+    if number == _TAKEOFF:
+        if target.kind != MotionKind.CLIMB:
+            return False
+        if autopilot == PX4:  # where it is, turned as it is
+            here = (isnan(one) or not one) and not two and not three and all(map(isnan, (four, five, six)))
+            return here and _above_sea(seven, target, home)
+        return not any(fields[:6]) and _near(seven, target.altitude)
+    if number == _SPEED:  # over ground, the throttle as it is
+        asked = target.kind in _TRAVELS and target.speed > 0 and _near(two, target.speed)
+        return asked and one == 1 and three == -1 and not any(fields[3:7])
+    return False
+
+
+def _above_sea(metres: float, target: Target, home: Home | None) -> bool:
+    if home is None or not isfinite(metres):
+        return False
+    above_home = round(metres * 1_000) - target.altitude
+    return home.low - _DATUM <= above_home <= home.high + _DATUM
+
+
+def _near(metres: float, millimetres: int) -> bool:
+    return isfinite(metres) and abs(round(metres * 1_000) - millimetres) <= _ROUNDING
+
+
+def _place(contract: Contract, link: Link) -> tuple[int, ...]:
+    cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
+    return link.arguments[cell : cell + 2]
+
+
+def _points(path: tuple[int, ...], policy: Policy) -> frozenset[tuple[int, int]]:
+    """Points that are local, in mm, as they are sent."""
+    local = zip(path[::2], path[1::2], strict=True)
+    return frozenset(unproject(policy.projection, x, y) for x, y in local)

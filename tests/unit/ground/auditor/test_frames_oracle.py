@@ -1,0 +1,115 @@
+"""A frame that is sent once more, at any other moment: found, unless a record then permits it, by a naive reading."""
+
+from bisect import insort
+from functools import cache
+from typing import NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+from reference.forgery import ROOT_KEY
+from reference.kept_frames import Entries, kept
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import Effect, Genesis
+from rtshcua.ground.auditor.frames import OURS, Frames
+from rtshcua.ground.auditor.obeyed import ARDUPILOT, PX4
+from rtshcua.ground.auditor.sent import Nature, nature
+from rtshcua.ground.auditor.sent import read as read_frame
+from rtshcua.ground.auditor.trust import Basis, establish
+from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.frame_shape import GLOBAL_POSITION_INT
+from rtshcua.onboard.enforcement.frame_shape import read_frame as read_shape
+from rtshcua.onboard.enforcement.motion_frames import carries_out
+from rtshcua.onboard.ports import Command
+from rtshcua.simulation.faults import WindStep
+from virtual import case
+from virtual.flight import Flight
+
+AUTOPILOTS = {"px4": PX4, "ardupilot": ARDUPILOT}
+
+
+class Window(NamedTuple):
+    """A command, and from when to when it was under way, UTC us."""
+
+    command: Command
+    begin: int
+    end: int
+
+
+class Case(NamedTuple):
+    """A flight that falls back, its frames, and what a naive reading makes of its log."""
+
+    basis: Basis
+    effects: tuple[Effect, ...]
+    entries: Entries
+    commands: tuple[bytes, ...]
+    windows: tuple[Window, ...]
+    home_amsl: int
+
+
+@cache
+def flown(kind: str) -> Case:
+    config = case.simulated(kind, faults=(WindStep(40 * case.S, 14 * case.M),))
+    flight = Flight(case.seal(case.mission()), config)
+    entries = kept(flight)
+    records = [read(line) for line in flight.fly().lines]
+    genesis = records[0]
+    assert isinstance(genesis, Genesis)
+    basis = establish(genesis, ROOT_KEY)
+    assert isinstance(basis, Basis)
+    effects = tuple(record for record in records if isinstance(record, Effect))
+    bundle = basis.bundle
+    made = Commands(bundle.policy, bundle.mission)
+    windows = []
+    for effect in effects:
+        if effect.event == "dispatched":
+            end = min(
+                (each.utc_us for each in effects if each.token == effect.token and each.seq > effect.seq),
+                default=1 << 60,
+            )
+            command = made.command(effect.kind, effect.step, effect.link, effect.token)
+            windows.append(Window(command, effect.utc_us, end))
+    ours = tuple(dict.fromkeys(octets for _, octets in entries if is_command(octets)))
+    positions = [read_shape(octets) for _, octets in entries]
+    heights = {each.fields[3] - each.fields[4] for each in positions if each and each.message == GLOBAL_POSITION_INT}
+    assert len(windows) > 3
+    told = entries[:400] + [entry for entry in entries[400:] if is_command(entry[1])]  # the rest tells nothing new
+    return Case(basis, effects, told, ours, tuple(windows), max(heights))
+
+
+def is_command(octets: bytes) -> bool:
+    frame = read_frame(octets)
+    return frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND
+
+
+def covered(of: Case, octets: bytes, at_us: int, autopilot: int) -> bool:
+    frame = read_shape(octets)
+    assert frame is not None
+    return any(
+        window.begin <= at_us <= window.end and carries_out(frame, window.command, autopilot, of.home_amsl)
+        for window in of.windows
+    )
+
+
+@pytest.mark.parametrize("kind", AUTOPILOTS)
+@settings(max_examples=150, deadline=None)
+@given(data=some.data())
+def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
+    of, autopilot = flown(kind), AUTOPILOTS[kind]
+    edges = [edge + by for window in of.windows for edge in window[1:] if edge < 1 << 60 for by in (-1, 0, 1)]
+    first, last = of.entries[0][0], of.entries[-1][0]
+    at_us = data.draw(some.one_of(some.sampled_from(edges), some.integers(first, last + case.S)))
+    octets = data.draw(some.sampled_from(of.commands))
+    entries = list(of.entries)
+    insort(entries, (at_us, octets), key=lambda entry: entry[0])
+    frames = Frames(iter(entries))
+    frames.begin(of.basis)
+    for effect in of.effects:
+        frames.happened(effect)
+    found = frames.over()
+    heard = next(at for at, each in of.entries if (shape := read_shape(each)) and shape.message == GLOBAL_POSITION_INT)
+    if at_us > heard:
+        assert (found is None) == covered(of, octets, at_us, autopilot)
+    if found is not None:
+        assert str(at_us) in found.found

@@ -28,6 +28,7 @@ app = typer.Typer(add_completion=False)
 
 _DAY_US = 86_400_000_000
 _SHORTEST = 12  # characters of a passphrase
+_MOST_WITNESSES = 16
 
 
 @app.callback()
@@ -43,17 +44,26 @@ def init(
     ] = True,
     days: Annotated[int, typer.Option(min=1, max=3660, help="how long the trust root is valid")] = 365,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase to encrypt with")] = None,
+    witnesses: Annotated[int, typer.Option(min=0, max=_MOST_WITNESSES, help="how many keys for witnesses")] = 1,
+    witness_threshold: Annotated[
+        int, typer.Option(min=1, max=_MOST_WITNESSES, help="how many of them must cosign what counts as anchored")
+    ] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
     """Make a key for each duty, and the trust root that names them.
 
-    A development root says so of itself: its keys lie unencrypted in your data folder, readable by you alone.
+    A development root says so of itself: its keys lie unencrypted in your data folder, readable by you alone. A witness
+    is worth something only away from the vehicle: move its key to where `rtshcua witness` runs, and the log's aboard.
     """
     store = KeyStore(data_folder())
     if store.exists():
         if if_missing:
             return _listed(store, as_json=as_json)
         return fail(ExitCode.REFUSED, f"there are keys already in `{store.folder}`", "`rtshcua keys list` shows them")
+    if witness_threshold > max(1, witnesses):
+        return fail(
+            ExitCode.USAGE, f"`--witness-threshold {witness_threshold}` is more than the {witnesses} of `--witnesses`"
+        )
     passphrase = None
     if not development:
         passphrase = _new_passphrase(passphrase_file)
@@ -68,6 +78,8 @@ def init(
         passphrase=passphrase,
         now_us=now_us,
         expires_us=now_us + days * _DAY_US,
+        witnesses=witnesses,
+        witness_threshold=witness_threshold,
     )
     return _listed(store, as_json=as_json)
 
@@ -138,10 +150,13 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
     print(f"  {'duty':<9} {'key':<33} may speak for")
     for key in root.keys:
         print(f"  {key.duty:<9} {key.kid.hex():<33} {speaks(key)}")
+    if root.witness_threshold > 1:
+        print(f"\n  {root.witness_threshold} witnesses must cosign what counts as anchored")
     return ExitCode.OK
 
 
 def _as_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
+    paths = store.paths(root)
     return {
         "folder": str(store.folder),
         "root": str(store.root_path),
@@ -149,7 +164,8 @@ def _as_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
         "version": root.version,
         "issued_at_us": root.issued_at_us,
         "expires_at_us": root.expires_at_us,
-        "keys": [{**as_object(key), "file": str(store.key_path(key.duty))} for key in root.keys],
+        "witness_threshold": root.witness_threshold,
+        "keys": [{**as_object(key), "file": str(paths[key.kid])} for key in root.keys],
     }
 
 

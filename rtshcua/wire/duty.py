@@ -11,6 +11,7 @@ class Duty(StrEnum):
     MISSION = "mission"  # signs missions, for the roles and through the sources that the root lists
     APPROVAL = "approval"  # answers a `confirm`
     LOG = "log"  # signs evidence
+    WITNESS = "witness"  # cosigns the checkpoints of logs, away from the vehicle
 
     @property
     def label(self) -> bytes:

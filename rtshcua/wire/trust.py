@@ -19,19 +19,24 @@ MAX_ROOT: Final = 1 << 20
 class RootError(Untrusted):
     """A trust root that is refused.
 
-    `malformed`, `unsupported-threshold`, `shared-key`, `development-key`, `not-self-signed`, `expired`, `key-expired`,
-    `unpinned`, `unknown-key`, `rollback`, `version-gap`, `development-root`.
+    `malformed`, `unsupported-threshold`, `unreachable-threshold`, `shared-key`, `development-key`, `not-self-signed`,
+    `expired`, `key-expired`, `unpinned`, `unknown-key`, `rollback`, `version-gap`, `development-root`.
     """
 
 
 class Thresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How many keys of a duty must sign. Only 1 is supported; the field is there so that more never passes for one."""
+    """How many keys of a duty must sign: of witnesses as many as there are keys, of the others 1.
+
+    Only that is supported; the fields are there so that more never passes for one. Without `witness` it is 1; the field
+    came later, and a root without it keeps its bytes.
+    """
 
     root: int = 1
     policy: int = 1
     mission: int = 1
     approval: int = 1
     log: int = 1
+    witness: int | msgspec.UnsetType = msgspec.UNSET
 
 
 class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,6 +52,17 @@ class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def keys_for(self, duty: Duty) -> dict[bytes, VerificationKey]:
         """The keys of a duty by `kid`, expired ones included: see `key_refusal`."""
         return {key.kid: key for key in self.keys if key.duty is duty}
+
+    def witnesses(self, vehicle: str, now_us: int) -> frozenset[bytes]:
+        """The public keys that may witness logs of a vehicle at a UTC time."""
+        keys = self.keys_for(Duty.WITNESS).values()
+        return frozenset(key.public for key in keys if key_refusal(key, vehicle=vehicle, now_us=now_us) is None)
+
+    @property
+    def witness_threshold(self) -> int:
+        """How many witnesses must have cosigned what counts as anchored."""
+        witness = self.thresholds.witness
+        return 1 if isinstance(witness, msgspec.UnsetType) else witness
 
     def encode(self) -> bytes:
         """The payload that a root key signs."""
@@ -157,8 +173,10 @@ def _check(root: TrustRoot) -> None:
     if root.version < 1 or root.expires_at_us <= root.issued_at_us:
         raise RootError("malformed", "a root counts its versions from 1 and expires after it was issued")
     for duty in Duty:
-        threshold = getattr(root.thresholds, duty)
-        if threshold > 1:
+        threshold = root.witness_threshold if duty is Duty.WITNESS else getattr(root.thresholds, duty)
+        if duty is Duty.WITNESS and threshold > 1:
+            _check_witnesses(root, threshold)
+        elif threshold > 1:
             raise RootError(
                 "unsupported-threshold", f"`{duty}` asks for {threshold} signatures; only 1 is supported so far"
             )
@@ -168,3 +186,10 @@ def _check(root: TrustRoot) -> None:
         raise RootError("shared-key", "one public key is named twice: a key has one duty")
     if not root.development and any(key.development for key in root.keys):
         raise RootError("development-key", "a root that is not for development names a development key")
+
+
+def _check_witnesses(root: TrustRoot, threshold: int) -> None:
+    count = len(root.keys_for(Duty.WITNESS))
+    if threshold > count:
+        text = f"`{Duty.WITNESS}` asks for {threshold} signatures, and the root names {count} keys for it"
+        raise RootError("unreachable-threshold", text)

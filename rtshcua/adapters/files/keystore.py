@@ -1,4 +1,4 @@
-"""The user's signing keys and trust root: `<data folder>/keys/`, one file a duty and `root.trust`.
+"""The user's signing keys and trust root: `<data folder>/keys/`, one file a key and `root.trust`.
 
 A key file is readable by its owner alone and encrypted, unless its key is for development. The folder appears whole,
 with every key and the root that names them, or not at all.
@@ -8,20 +8,24 @@ import os
 import shutil
 import stat
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from msgspec import UNSET
 
 from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, sync_folder, write_new
 from rtshcua.wire import cose
 from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import ANY, Duty, SigningKey
-from rtshcua.wire.trust import MAX_ROOT, TrustRoot
+from rtshcua.wire.trust import MAX_ROOT, Thresholds, TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
 ROOT = "root.trust"
 
 _SOURCES = ("agent", "operator")
+_SPEAKERS = (Duty.MISSION, Duty.APPROVAL)
 
 
 class KeyStoreError(Untrusted):
@@ -38,9 +42,18 @@ class KeyStore:
         """Whether keys were made here."""
         return self.folder.is_dir()
 
-    def key_path(self, duty: Duty) -> Path:
-        """Where the key of a duty is."""
-        return self.folder / f"{duty}.key"
+    def key_path(self, duty: Duty, number: int = 1) -> Path:
+        """Where the key of a duty is; there may be several of witnesses."""
+        return self.folder / (f"{duty}.key" if number == 1 else f"{duty}-{number}.key")
+
+    def paths(self, root: TrustRoot) -> dict[bytes, Path]:
+        """Where the key of each `kid` in the root is, if it is here: they are numbered as the root names them."""
+        counts: Counter[Duty] = Counter()
+        found = {}
+        for key in root.keys:
+            counts[key.duty] += 1
+            found[key.kid] = self.key_path(key.duty, counts[key.duty])
+        return found
 
     @property
     def root_path(self) -> Path:
@@ -55,15 +68,23 @@ class KeyStore:
         passphrase: bytes | None,
         now_us: int,
         expires_us: int,
+        witnesses: int = 1,
+        witness_threshold: int = 1,
     ) -> TrustRoot:
         """Makes a key for each duty, from 32 secret bytes of `seed` each, and the root that names them.
 
-        The root trusts the mission and approval keys for every role, through agent and operator, on every vehicle.
+        The root trusts the mission and approval keys for every role, through agent and operator, on every vehicle. So
+        many `witnesses` have a key each; what `witness_threshold` of them cosigned counts as anchored.
         Raises `KeyStoreError` (`exists`), and `KeyFileError` for keys that are neither encrypted nor for development.
         """
         if self.exists():
             raise KeyStoreError("exists", f"there are keys already in `{self.folder}`")
-        keys = {duty: SigningKey.from_seed(seed(), duty=duty, development=development) for duty in Duty}
+        counts = {duty: witnesses if duty is Duty.WITNESS else 1 for duty in Duty}
+        keys = {
+            self.key_path(duty, number).name: SigningKey.from_seed(seed(), duty=duty, development=development)
+            for duty, count in counts.items()
+            for number in range(1, count + 1)
+        }
         root = TrustRoot(
             version=1,
             development=development,
@@ -71,19 +92,19 @@ class KeyStore:
             expires_at_us=expires_us,
             keys=tuple(
                 key.verification(
-                    roles=(ANY,) if duty in (Duty.MISSION, Duty.APPROVAL) else (),
-                    sources=_SOURCES if duty in (Duty.MISSION, Duty.APPROVAL) else (),
-                    vehicles=() if duty is Duty.ROOT else (ANY,),
+                    roles=(ANY,) if key.duty in _SPEAKERS else (),
+                    sources=_SOURCES if key.duty in _SPEAKERS else (),
+                    vehicles=() if key.duty is Duty.ROOT else (ANY,),
                 )
-                for duty, key in keys.items()
+                for key in keys.values()
             ),
+            thresholds=Thresholds(witness=UNSET if witness_threshold == 1 else witness_threshold),
         )
         make_folder(self.folder.parent, mode=PRIVATE_FOLDER)
         with self._appearing() as folder:
-            for duty, key in keys.items():
-                data = dump_signing_key(key, passphrase=passphrase)
-                write_new(folder / self.key_path(duty).name, data, mode=PRIVATE_FILE)
-            write_new(folder / ROOT, root.sign(keys[Duty.ROOT]), mode=PRIVATE_FILE)
+            for name, key in keys.items():
+                write_new(folder / name, dump_signing_key(key, passphrase=passphrase), mode=PRIVATE_FILE)
+            write_new(folder / ROOT, root.sign(keys[self.key_path(Duty.ROOT).name]), mode=PRIVATE_FILE)
         return root
 
     @contextmanager

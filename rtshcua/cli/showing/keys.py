@@ -27,6 +27,8 @@ def show_root(page: Page, data: bytes, now_us: int) -> dict[str, object]:
         page.row(key.duty, key.kid.hex(), width=9)
         page.row("", f"public {key.public.hex()}", width=9)
         page.row("", speaks(key), width=9)
+    if root.witness_threshold > 1:
+        page.row("anchored", f"what {root.witness_threshold} witnesses cosigned", width=9)
     return {
         "kind": "root",
         "version": root.version,
@@ -34,6 +36,7 @@ def show_root(page: Page, data: bytes, now_us: int) -> dict[str, object]:
         "issued_at_us": root.issued_at_us,
         "expires_at_us": root.expires_at_us,
         "signed_by": kid.hex(),
+        "witness_threshold": root.witness_threshold,
         "keys": [as_object(key) for key in root.keys],
     }
 
@@ -80,6 +83,9 @@ def speaks(key: VerificationKey) -> str:
     """What a key may speak for."""
     if key.duty is Duty.ROOT:
         return "names the other keys"
+    if key.duty is Duty.WITNESS:
+        until = "" if key.expires_us is None else f", until {utc(key.expires_us)}"
+        return f"cosigns logs of {_any(key.vehicles, 'vehicle')}{until}"
     who = f"{_any(key.roles, 'role')} through {' or '.join(key.sources)}, " if key.roles else ""
     until = "" if key.expires_us is None else f", until {utc(key.expires_us)}"
     return f"{who}on {_any(key.vehicles, 'vehicle')}{until}"

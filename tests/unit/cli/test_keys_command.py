@@ -52,7 +52,7 @@ def test_listing_says_what_each_key_is_trusted_for(capsys: pytest.CaptureFixture
     assert listed["expires_at_us"] - listed["issued_at_us"] == 2 * 86_400_000_000
     assert listed["development"] is True
     assert {key["duty"]: key["roles"] for key in listed["keys"]} == {
-        "root": [], "policy": [], "mission": ["*"], "approval": ["*"], "log": [],
+        "root": [], "policy": [], "mission": ["*"], "approval": ["*"], "log": [], "witness": [],
     }  # fmt: skip
     assert all(Path(key["file"]).is_file() for key in listed["keys"])
 

@@ -120,6 +120,8 @@ def test_a_tampered_root_is_refused():
         ({"thresholds": Thresholds(root=2)}, "unsupported-threshold"),
         ({"thresholds": Thresholds(log=3)}, "unsupported-threshold"),
         ({"thresholds": Thresholds(mission=0)}, "malformed"),
+        ({"thresholds": Thresholds(witness=0)}, "malformed"),
+        ({"thresholds": Thresholds(witness=2)}, "unreachable-threshold"),
         ({"keys": (*KEYS, ROOT.verification())}, "shared-key"),
         ({"keys": (*KEYS, VerificationKey(Duty.LOG, POLICY.public))}, "shared-key"),
         ({"keys": (*KEYS, signing_key(5, Duty.LOG, development=True).verification())}, "development-key"),
@@ -130,6 +132,32 @@ def test_a_root_that_contradicts_itself_is_neither_signed_nor_opened(fields, slu
     root = changed(**fields)
     assert refusal(root.sign, ROOT) == slug
     assert opening(envelope(root.encode())) == slug
+
+
+WITNESSES = tuple(signing_key(20 + number, Duty.WITNESS) for number in range(2))
+
+
+@pytest.mark.parametrize("threshold", [1, 2])
+def test_witnesses_may_have_a_threshold(threshold):
+    keys = (*KEYS, WITNESSES[0].verification(vehicles=(ANY,)), WITNESSES[1].verification(vehicles=("quad-07",)))
+    root = changed(keys=keys, thresholds=Thresholds(witness=threshold))
+    opened = open_root(root.sign(ROOT), pinned=ROOT.public, now_us=200)
+    assert opened == root
+    assert opened.witness_threshold == threshold
+    assert opened.witnesses("quad-07", 200) == {key.public for key in WITNESSES}
+    assert opened.witnesses("quad-08", 200) == {WITNESSES[0].public}
+    more = changed(root, thresholds=Thresholds(witness=3))
+    assert refusal(more.sign, ROOT) == "unreachable-threshold"
+
+
+def test_without_a_threshold_one_witness_is_enough():
+    """As in a root that is older than the field, which is not in its bytes."""
+    assert b"witness" not in TRUST.encode()
+    assert TRUST.witness_threshold == 1
+    assert TRUST.witnesses("quad-07", 200) == set()
+    expired = changed(keys=(*KEYS, WITNESSES[0].verification(vehicles=(ANY,), expires_us=150)))
+    assert expired.witnesses("quad-07", 149) == {WITNESSES[0].public}
+    assert expired.witnesses("quad-07", 150) == set()
 
 
 def test_a_threshold_above_one_says_so():

@@ -1,0 +1,73 @@
+"""Files of anchors beside a log: `*.anchors`, notes one after another, each ended by an empty line."""
+
+import errno
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from rtshcua.adapters.files.durable import PUBLIC_FILE, naming, sync_data, sync_folder, write_all
+from rtshcua.adapters.files.regular import open_regular
+from rtshcua.evidence.witnessing.anchors import notes
+
+SUFFIX: Final = ".anchors"
+#: more of a file than this, and more files than this in a folder, are not looked at
+_LARGEST: Final = 16 << 20
+_MOST: Final = 64
+
+
+def beside(log: Path) -> Path:
+    """Where the anchors of a log are put."""
+    return log.with_suffix(SUFFIX)
+
+
+def read_anchors(log: Path) -> list[str]:
+    """The notes in all files of anchors in the folder of a log, those of other logs included.
+
+    What cannot be read says nothing: an anchor can only be missing. To be read before the log is, for a log may grow
+    while it is read, and an anchor must not be ahead of it.
+    """
+    return [note for path in _files(log) for note in read_notes(path)]
+
+
+def unreadable(log: Path) -> list[Path]:
+    """The files of anchors in the folder of a log in which there is something, but no note."""
+    return [path for path in _files(log) if not (path.is_file() and not path.stat().st_size) and not read_notes(path)]
+
+
+def _files(log: Path) -> list[Path]:
+    found = sorted(log.parent.glob(f"*{SUFFIX}"), key=lambda path: (path != beside(log), path.name))
+    return found[:_MOST]
+
+
+def read_notes(path: Path) -> list[str]:
+    """The notes in a file of anchors; none of a file that cannot be read."""
+    if not path.is_file():  # a pipe would be waited for
+        return []
+    with suppress(OSError), path.open("rb") as file:
+        return list(notes(file.read(_LARGEST).decode("utf-8", "replace")))
+    return []
+
+
+def read_named(path: Path) -> list[str]:
+    """The notes in a file that somebody named, all of them. Raises OSError for one that cannot be read or is too large,
+    and for what is no regular file, which might be waited for.
+    """
+    with open_regular(path) as file:
+        data = file.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise OSError(errno.E2BIG, f"more than {_LARGEST >> 20} MiB of anchors", str(path))
+    return list(notes(data.decode("utf-8", "replace")))
+
+
+def add_anchors(path: Path, found: list[str]) -> None:
+    """Put notes behind those of a file, and on the disk. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_CLOEXEC", 0)
+    with naming(path):
+        handle = os.open(path, flags, PUBLIC_FILE)
+        try:
+            write_all(handle, "".join(f"{note}\n" for note in found).encode())
+            sync_data(handle)
+        finally:
+            os.close(handle)
+        sync_folder(path.parent)

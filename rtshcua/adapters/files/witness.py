@@ -1,0 +1,130 @@
+"""What a witness remembers: of each log the last checkpoint that it cosigned. One process at a time.
+
+A checkpoint is on the disk before its cosignature leaves. So after a crash the witness may have forgotten that it
+answered, never what. Whoever deletes the folder makes the witness forget: that nobody else can is why it is not aboard.
+"""
+
+import fcntl
+import os
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, write_new
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import parse
+from rtshcua.evidence.witnessing.cosign import cosign
+from rtshcua.evidence.witnessing.witness import OK, Answer, LogKeys, Refusal, Request, Seen, judge
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.untrusted import Untrusted
+
+#: notes that contradict what was cosigned are kept, as proof, up to so many
+MOST_CONTRADICTIONS: Final = 100
+_FOLDER: Final = "contradictions"
+
+
+class WitnessError(Untrusted):
+    """What a witness remembers does not serve: `in-use`, `damaged`. It does not cosign then."""
+
+
+class _Kept(msgspec.Struct, forbid_unknown_fields=True):
+    """One file: the text that was cosigned, who signed it, and when it was cosigned (seconds since the Unix epoch)."""
+
+    text: str
+    signer: str
+    time_s: int
+
+
+class WitnessStore:
+    """The memory of one witness key. Held by one process at a time, until it is closed or dies."""
+
+    def __init__(self, state: Path, key: SigningKey) -> None:
+        """Raises WitnessError (`in-use`), and OSError."""
+        self.folder = state / "witness" / key.kid.hex()
+        make_folder(self.folder, mode=PRIVATE_FOLDER)
+        self._lock = os.open(self.folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._lock)
+            raise WitnessError("in-use", f"another process cosigns with key {key.kid.hex()}") from None
+
+    def seen(self, origin: str) -> tuple[Seen, int] | None:
+        """What was cosigned last of a log, and when. Raises WitnessError (`damaged`), and OSError."""
+        path = self._path(origin)
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        try:
+            kept = msgspec.json.decode(data, type=_Kept)
+            signer = bytes.fromhex(kept.signer)
+        except (msgspec.DecodeError, ValueError):
+            kept, signer = _Kept("", "", 0), b""
+        checkpoint = parse(kept.text)
+        if isinstance(checkpoint, Flaw) or checkpoint.origin != origin or len(signer) != 32:
+            raise WitnessError("damaged", f"`{path}` is damaged: what was cosigned of `{origin}` is not known")
+        return Seen(kept.text, signer), kept.time_s
+
+    def keep(self, origin: str, seen: Seen, time_s: int) -> None:
+        """Remember. Raises OSError; then what was remembered before still is, or this."""
+        kept = _Kept(seen.text, seen.signer.hex(), time_s)
+        replace(self._path(origin), msgspec.json.encode(kept) + b"\n", mode=PRIVATE_FILE)
+
+    def contradicted(self, note: str) -> Path | None:
+        """Keep a note that contradicts what was cosigned; gives where it is. Raises OSError."""
+        folder = self.folder / _FOLDER
+        make_folder(folder, mode=PRIVATE_FOLDER)
+        path = folder / f"{sha256(note.encode()).hexdigest()[:32]}.note"
+        if not path.exists():
+            if sum(1 for _ in folder.iterdir()) >= MOST_CONTRADICTIONS:
+                return None
+            write_new(path, note.encode(), mode=PRIVATE_FILE)
+        return path
+
+    def close(self) -> None:
+        """Let another process have it."""
+        os.close(self._lock)
+
+    def _path(self, origin: str) -> Path:
+        return self.folder / f"{sha256(origin.encode()).hexdigest()}.seen"
+
+
+class FileWitness:
+    """A witness: judges requests, remembers, cosigns.
+
+    `now_s` is UTC in seconds; for `log_keys` see `evidence.witnessing.witness`.
+    """
+
+    def __init__(self, store: WitnessStore, key: SigningKey, log_keys: LogKeys, now_s: Callable[[], int]) -> None:
+        self.store = store
+        self._key = key
+        self._log_keys = log_keys
+        self._now_s = now_s
+
+    @property
+    def public(self) -> bytes:
+        """The witness's public key."""
+        return self._key.public
+
+    def known(self, origin: str) -> int | None:
+        """How large the tree is that was cosigned last of a log; None for a log that is not known. Raises as `seen`."""
+        before = self.store.seen(origin)
+        return None if before is None else int(before[0].text.split("\n", 2)[1])
+
+    def consider(self, request: Request) -> Answer | Refusal:
+        """The cosignature, once it is remembered what for; or why there is none. Raises WitnessError and OSError."""
+        origin = request.note.partition("\n")[0]
+        before = self.store.seen(origin)
+        found = judge(request, None if before is None else before[0], self._log_keys)
+        if isinstance(found, Refusal):
+            return found
+        time_s = max(self._now_s(), 0 if before is None else before[1])
+        self.store.keep(origin, found, time_s)
+        return Answer(OK, cosign(found.text, time_s, self._key.public, self._sign))
+
+    def _sign(self, message: bytes) -> bytes:
+        return self._key.sign(message, duty=Duty.WITNESS)

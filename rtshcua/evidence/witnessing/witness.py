@@ -1,0 +1,201 @@
+"""A witness: it cosigns a checkpoint only if the log that it saw before is still the beginning of this one.
+
+After c2sp.org/tlog-witness, with two things of our own. A log changes its key with every epoch, so behind the
+checkpoint a request may carry the notes in between, each of which names the key of the next; the first is the genesis'
+note, which the log key of the trust root signs. And with a size the witness holds on to the whole text that it cosigned
+there, with the record that carried it and the next key, and to the key that signed it: an epoch's key signs once.
+
+Everything here is pure. Whoever keeps the state must have it on the disk before the cosignature leaves, or a crash lets
+the witness contradict itself.
+"""
+
+from base64 import b64encode
+from collections.abc import Callable, Iterable
+from typing import Final, NamedTuple
+from urllib.parse import unquote
+
+from rtshcua.evidence.chain import origin_of
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.merkle import EMPTY
+from rtshcua.evidence.merkle_proofs import verify_consistency
+from rtshcua.evidence.note import Checkpoint, open_note, parse, split, strict_base64
+
+#: the most lines of a proof (c2sp.org/tlog-witness)
+MOST_PROOF: Final = 63
+OK, MALFORMED, FORBIDDEN, UNKNOWN, CONFLICT, INCONSISTENT = 200, 400, 403, 404, 409, 422
+
+_ORIGIN: Final = "rtshcua/log/"
+_HASH_BYTES: Final = 32
+_LONGEST_SIZE: Final = 16  # digits
+_STRANGER: Final = "it is not signed by the key that the record before names, nor by the log's"
+
+#: the public log keys that the trust root names for a vehicle
+LogKeys = Callable[[str], Iterable[bytes]]
+
+
+class Request(NamedTuple):
+    """A checkpoint to be cosigned. `proof` shows that the tree of `old` leaves is its beginning.
+
+    `chain` holds the notes of the signed records between the checkpoint of `old` leaves and this one, oldest first;
+    when the witness is thought to know nothing, from the genesis' on.
+    """
+
+    old: int
+    proof: tuple[bytes, ...]
+    note: str
+    chain: tuple[str, ...] = ()
+
+    def encode(self) -> bytes:
+        """The body of c2sp.org/tlog-witness, and behind it each note of the chain after an empty line."""
+        proof = "".join(f"{b64encode(each).decode()}\n" for each in self.proof)
+        chain = "".join(f"\n{note}" for note in self.chain)
+        return f"old {self.old}\n{proof}\n{self.note}{chain}".encode()
+
+
+class Seen(NamedTuple):
+    """What was cosigned last of a log: the text of its checkpoint, and the public key that the log signed it with."""
+
+    text: str
+    signer: bytes
+
+
+class Refusal(NamedTuple):
+    """Why nothing is cosigned. `status` is one of HTTP's, as c2sp.org/tlog-witness uses them.
+
+    `size` is that of the tree that the witness saw, with a conflict. `contradiction`: the log's own key signed what
+    contradicts what was cosigned before; the note is worth keeping.
+    """
+
+    status: int
+    text: str
+    size: int = 0
+    contradiction: bool = False
+
+    def answer(self) -> "Answer":
+        """What the sender is told: for a conflict the size, else why."""
+        return Answer(self.status, f"{self.size}\n" if self.status == CONFLICT else f"{self.text}\n")
+
+
+class Answer(NamedTuple):
+    """What a witness answers: one of HTTP's numbers, and the body of c2sp.org/tlog-witness."""
+
+    status: int
+    body: str
+
+    def encode(self) -> bytes:
+        """The number in a line of its own, and the body."""
+        return f"{self.status}\n{self.body}".encode()
+
+    @property
+    def size(self) -> int | None:
+        """With a conflict: how large the tree is that the witness cosigned last; None for nonsense."""
+        digits = self.body.removesuffix("\n")
+        return int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_SIZE else None
+
+
+def decode_answer(data: bytes) -> Answer | None:
+    """The answer in these bytes; None when they are none."""
+    status, newline, body = data.partition(b"\n")
+    if not newline or len(status) != 3 or not status.isdigit():
+        return None
+    return Answer(int(status), body.decode("utf-8", "replace"))
+
+
+def decode(data: bytes) -> Request | Refusal:
+    """The request in a body; never raises, whatever the bytes."""
+    try:
+        head, *parts = data.decode().split("\n\n")
+    except UnicodeDecodeError:
+        return Refusal(MALFORMED, "the request is not UTF-8")
+    first, *proof = head.split("\n")
+    old = first.removeprefix("old ")
+    number = int(old) if old.isascii() and old.isdigit() and len(old) <= _LONGEST_SIZE else 0
+    # a part is the text of a note, the next one its signatures; the last ends with one newline
+    texts = [f"{body}\n\n{lines}\n" for body, lines in zip(parts[::2], parts[1::2], strict=False)]
+    if not texts or len(parts) % 2 or not data.endswith(b"\n") or len(proof) > MOST_PROOF:
+        return Refusal(MALFORMED, "the request has not the form of one")
+    texts[-1] = texts[-1][:-1]
+    request = Request(number, tuple(strict_base64(each) for each in proof), texts[0], tuple(texts[1:]))
+    if {len(each) for each in request.proof} - {_HASH_BYTES} or request.encode() != data:
+        return Refusal(MALFORMED, "the request has not the form of one")
+    return request
+
+
+def judge(request: Request, seen: Seen | None, log_keys: LogKeys) -> Seen | Refusal:
+    """What may be cosigned, or why it may not. `seen` is what was cosigned last for this origin, if anything was."""
+    text, lines = split(request.note)
+    checkpoint = parse(text)
+    if not lines or isinstance(checkpoint, Flaw):
+        return Refusal(MALFORMED, "what is to be cosigned is not the checkpoint of a log")
+    known = None if seen is None else parse(seen.text)
+    assert not isinstance(known, Flaw), "what was cosigned is a checkpoint"
+    vehicle = vehicle_of(checkpoint.origin)
+    keys = tuple(log_keys(vehicle)) if vehicle else ()
+    if not keys:
+        return Refusal(UNKNOWN, f"nothing is known of `{checkpoint.origin}`")
+    size = 0 if known is None else known.size
+    if request.old > checkpoint.size:
+        return Refusal(MALFORMED, f"a tree of {checkpoint.size} records does not begin with one of {request.old}")
+    if request.old != size:
+        return Refusal(CONFLICT, f"the tree of {size} records was cosigned last, not that of {request.old}", size)
+    if seen is not None and text == seen.text:
+        return seen  # again, for the answer may have been lost
+    signer = _follow(request, known, seen, keys)
+    if isinstance(signer, Refusal):
+        return signer
+    root = EMPTY if known is None else known.root
+    if not verify_consistency(size, root, checkpoint.size, checkpoint.root, request.proof):
+        # Anyone can put a wrong proof to a right note: that alone is no contradiction.
+        return Refusal(INCONSISTENT, f"it is not shown that the tree begins with that of {size} records")
+    return Seen(text, signer)
+
+
+def vehicle_of(origin: str) -> str:
+    """The vehicle whose log has this origin; empty for an origin that no log has."""
+    quoted, _, boot = origin.removeprefix(_ORIGIN).rpartition("/")
+    vehicle = unquote(quoted, errors="replace")
+    return vehicle if origin == origin_of(vehicle, boot) else ""
+
+
+def _follow(
+    request: Request, known: Checkpoint | None, seen: Seen | None, log_keys: tuple[bytes, ...]
+) -> bytes | Refusal:
+    """The key that signed the last note, if each is signed by the key that the one before it names, or by the log key,
+    and goes on from there.
+    """
+    chain = [*request.chain, request.note]
+    if seen is not None and split(chain[0])[0] == seen.text:
+        del chain[0]  # who did not know that the witness knows the genesis tells it again
+    before, signer, origin = known, b"", request.note.partition("\n")[0]
+    for note in chain:
+        named = () if before is None or before.key is None else (before.key,)
+        signer, checkpoint = _opened(note, origin, (*named, *log_keys))
+        if checkpoint is None:
+            twice = seen is not None and _opened(note, origin, (seen.signer,))[1] is not None
+            return _conflict(known, contradiction=True) if twice else Refusal(FORBIDDEN, _STRANGER)
+        if before is None and (checkpoint.size or checkpoint.root != EMPTY or checkpoint.after is not None):
+            return Refusal(FORBIDDEN, "the first that is seen of a log is the checkpoint of its genesis")
+        if before is not None and (before.key is None or checkpoint.size <= before.size):
+            return _conflict(known, contradiction=before is known and checkpoint.size >= before.size)
+        if before is not None and checkpoint.after != before.digest():
+            # The log key may sign more than once, and there may be others in between: that alone is no contradiction.
+            if before is known and signer == before.key:
+                return _conflict(known, contradiction=True)
+            return Refusal(INCONSISTENT, "it does not follow the checkpoint that is to come before it")
+        before = checkpoint
+    return signer
+
+
+def _opened(note: str, origin: str, keys: Iterable[bytes]) -> tuple[bytes, Checkpoint | None]:
+    """Which of the keys signed the note of a log, and its checkpoint."""
+    for key in keys:
+        checkpoint = open_note(note, origin, key)
+        if not isinstance(checkpoint, Flaw) and checkpoint.origin == origin:
+            return key, checkpoint
+    return b"", None
+
+
+def _conflict(known: Checkpoint | None, *, contradiction: bool) -> Refusal:
+    size = 0 if known is None else known.size
+    text = "it contradicts what was cosigned before, or the order of a log"
+    return Refusal(CONFLICT, text, size, contradiction)

@@ -1,0 +1,110 @@
+"""A log handed to a witness as a file."""
+
+import pytest
+
+from reference.witnessed import Judge, Log
+from rtshcua.evidence.finding import Finding, Flaw
+from rtshcua.evidence.witnessing.survey import Survey, request_of, survey
+from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Refusal
+
+
+def surveyed(log: Log) -> Survey:
+    found = survey(log.lines)
+    assert isinstance(found, Survey), found
+    return found
+
+
+def shown(log: Log, witness: Judge, known: int | None) -> str | Refusal | Flaw:
+    request = request_of(surveyed(log), known, lambda: log.lines)
+    return request if isinstance(request, Flaw) else witness.consider(request)
+
+
+@pytest.fixture
+def log() -> Log:
+    log = Log()
+    for count in (3, 1, 0, 70):
+        log.effects(count)
+        log.seal()
+    return log
+
+
+def test_a_survey_finds_the_notes(log: Log) -> None:
+    found = surveyed(log)
+    assert list(found.notes.values()) == log.notes
+    assert (found.records, found.size, found.origin) == (len(log.lines), 78, log.notes[0].split("\n")[0])
+    torn = survey([*log.lines, b'{"_prev":"'])
+    assert torn == found
+
+
+def test_a_file_is_cosigned_in_one_step_from_wherever_the_witness_is(log: Log) -> None:
+    for known in (None, *log.submission._sizes):
+        witness = Judge()
+        if known is not None:
+            request = log.submission.request(None, known + 1)
+            assert request is not None
+            assert isinstance(witness.consider(request), str)
+        mark = shown(log, witness, known)
+        assert isinstance(mark, str)
+        assert mark.startswith(log.notes[-1])
+
+
+def test_a_log_that_is_not_its_checkpoints(log: Log) -> None:
+    """As with Yeti 2022: everything is signed and consistent, and an entry is not what was signed."""
+    log.lines[10] = log.lines[10].replace(b"said", b"sand")
+    found = survey(log.lines)
+    assert isinstance(found, Finding)
+    assert (found.slug, found.record) == ("seal/root", 78)
+
+
+@pytest.mark.parametrize("more", [b"\n", b"{", b'{"_prev":""}\n'])
+def test_nothing_follows_the_close(more: bytes) -> None:
+    log = Log()
+    log.effects(2)
+    log.close()
+    assert isinstance(survey(log.lines), Survey)
+    found = survey([*log.lines, more])
+    assert isinstance(found, Finding)
+    assert (found.slug, found.record) == ("close/junk-after", len(log.lines))
+
+
+def test_what_is_no_log(log: Log) -> None:
+    for lines, slug in (
+        ([], "genesis/missing"),
+        (log.lines[1:4], "genesis/missing"),
+        (log.lines[1:], "seal/root"),
+        ([b'{"checkpoint":"x"}\n'], "genesis/missing"),
+        ([b'{"a":1,"checkpoint":"x"}\n'], "note/malformed"),
+    ):
+        found = survey(lines)
+        assert isinstance(found, Finding)
+        assert found.slug == slug
+
+
+def test_a_cut_and_another_log(log: Log) -> None:
+    witness = Judge()
+    assert isinstance(shown(log, witness, None), str)
+    whole, log.lines = log.lines, log.lines[:60]
+    found = shown(log, witness, 78)
+    assert isinstance(found, Flaw)
+    assert found.slug == "anchor/beyond"
+    log.lines = whole
+    found = shown(log, witness, 77)
+    assert isinstance(found, Flaw)
+    assert found.slug == "anchor/root"
+
+
+def test_the_holder_of_the_log_key_rewrites_it(log: Log) -> None:
+    witness = Judge()
+    assert isinstance(shown(log, witness, None), str)
+    other = Log()
+    for count in (3, 1, 0, 70):
+        other.effects(count, "landed")
+        other.recover()
+    found = shown(other, witness, 78)
+    assert isinstance(found, Refusal)
+    assert (found.status, found.contradiction) == (CONFLICT, True)
+    other.effects(1)
+    other.recover()
+    found = shown(other, witness, 78)
+    assert isinstance(found, Refusal)
+    assert found.status in (CONFLICT, INCONSISTENT)

@@ -1,0 +1,142 @@
+"""Merkle proofs of RFC 9162: inclusion of a leaf (section 2.1.3), consistency of two trees (section 2.1.4).
+
+A proof is a list of hashes, each the root over one range of leaves; `inclusion_ranges` and `consistency_ranges` say
+which ranges, in the order of the proof. Whoever has the hashes makes the proof of them: `StoredTree`, which keeps
+the nodes, or `proof_of`, which reads all leaves once.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from rtshcua.evidence.merkle import EMPTY, Tree, node_hash
+
+#: leaves from the first number up to, and without, the second
+Range = tuple[int, int]
+
+
+def inclusion_ranges(index: int, size: int) -> list[Range]:
+    """The ranges whose hashes show leaf `index` in the tree of `size` leaves (2.1.3.1): from its sibling upwards.
+
+    Raises ValueError unless 0 <= index < size.
+    """
+    if not 0 <= index < size:
+        raise ValueError(f"leaf {index} is not in a tree of {size}")
+    ranges, start, end = [], 0, size
+    while end - start > 1:
+        middle = start + (1 << (end - start - 1).bit_length() - 1)
+        if index < middle:
+            ranges.append((middle, end))
+            end = middle
+        else:
+            ranges.append((start, middle))
+            start = middle
+    ranges.reverse()
+    return ranges
+
+
+def consistency_ranges(first: int, second: int) -> list[Range]:
+    """The ranges whose hashes show that the tree of `second` leaves begins with that of `first` (2.1.4.1).
+
+    None are needed for the empty tree, nor for two of one size. Raises ValueError unless 0 <= first <= second.
+    """
+    if not 0 <= first <= second:
+        raise ValueError(f"a tree of {second} leaves does not begin with {first}")
+    ranges: list[Range] = []
+    if first == 0:
+        return ranges
+    start, end = 0, second
+    while first < end:
+        middle = start + (1 << (end - start - 1).bit_length() - 1)
+        if first <= middle:
+            ranges.append((middle, end))
+            end = middle
+        else:
+            ranges.append((start, middle))
+            start = middle
+    if start:  # else it is the whole first tree, whose root the verifier has
+        ranges.append((start, end))
+    ranges.reverse()
+    return ranges
+
+
+def proof_of(ranges: Sequence[Range], leaves: Iterable[bytes]) -> list[bytes]:
+    """The hashes over `ranges`, from one pass over all leaf hashes, which holds a few of them at a time.
+
+    Raises ValueError when the leaves end before the last range does.
+    """
+    pairs, found = _numbered(leaves), {}
+    for start, end in sorted(ranges):
+        tree = Tree()
+        for number, leaf in pairs:
+            if number >= start:
+                tree.push(leaf)
+            if number == end - 1:
+                break
+        if tree.size != end - start:
+            raise ValueError(f"there are not {end} leaves")
+        found[start] = tree.root()
+    return [found[start] for start, _ in ranges]
+
+
+def _numbered(leaves: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
+    yield from enumerate(leaves)
+
+
+def root_from_inclusion(leaf: bytes, index: int, size: int, proof: Sequence[bytes]) -> bytes | None:
+    """The root of the tree of `size` leaves whose leaf `index` is `leaf`, by its proof (2.1.3.2); None without one."""
+    if not 0 <= index < size:
+        return None
+    node, last, root = index, size - 1, leaf
+    for sibling in proof:
+        if not last:
+            return None  # longer than any path
+        if node & 1 or node == last:
+            root = node_hash(sibling, root)
+            while not node & 1 and node:  # levels at which this node has no sibling
+                node >>= 1
+                last >>= 1
+        else:
+            root = node_hash(root, sibling)
+        node >>= 1
+        last >>= 1
+    return None if last else root
+
+
+def verify_inclusion(leaf: bytes, index: int, size: int, proof: Sequence[bytes], root: bytes) -> bool:
+    """Whether `proof` shows the leaf hash `leaf` at `index` of the tree of `size` leaves with this root (2.1.3.2)."""
+    return root_from_inclusion(leaf, index, size, proof) == root
+
+
+def verify_consistency(first: int, first_root: bytes, second: int, second_root: bytes, proof: Sequence[bytes]) -> bool:
+    """Whether `proof` shows that the tree of `second` leaves begins with that of `first` (2.1.4.2).
+
+    The empty tree has its own root, and every tree begins with it: that proof is empty, as is one of two equal trees.
+    """
+    if not 0 <= first <= second:
+        return False
+    if first == second:
+        return not proof and first_root == second_root and (first > 0 or first_root == EMPTY)
+    if first == 0:
+        return not proof and first_root == EMPTY
+    path = list(proof)
+    if not first & first - 1:
+        path.insert(0, first_root)  # the first tree is perfect, and so a node of the second
+    if not path:
+        return False
+    node, last = first - 1, second - 1
+    while node & 1:
+        node >>= 1
+        last >>= 1
+    old = new = path[0]
+    for sibling in path[1:]:
+        if not last:
+            return False
+        if node & 1 or node == last:
+            old, new = node_hash(sibling, old), node_hash(sibling, new)
+            while not node & 1 and node:
+                node >>= 1
+                last >>= 1
+        else:
+            new = node_hash(new, sibling)
+        node >>= 1
+        last >>= 1
+    return not last and old == first_root and new == second_root

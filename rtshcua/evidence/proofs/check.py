@@ -1,0 +1,180 @@
+"""What a proof proves, from the file and one pinned root key alone (docs/proofs.md). Total: any octets give an answer.
+
+The steps, as the comments number them:
+
+1. the file, and what it carries, each in its one form
+2. the checkpoint: signed in the chain from the log key that the trust root names (`proof_trust`)
+3. the record that carries the checkpoint: it is the one that the checkpoint vouches for
+4. what is proven: the path from the record, or between two checkpoints, gives the signed root
+"""
+
+from typing import NamedTuple
+
+import msgspec
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.merkle_proofs import verify_consistency, verify_inclusion
+from rtshcua.evidence.note import Checkpoint
+from rtshcua.evidence.proofs.disclosure import FIELDS, combined, field_hash
+from rtshcua.evidence.proofs.extra import Extra, read_extra
+from rtshcua.evidence.proofs.file import Kind, ProofFile, read_proof
+from rtshcua.evidence.proofs.trust import Believed, believe
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import (
+    AnyRecord,
+    Close,
+    Decision,
+    Effect,
+    Genesis,
+    Recover,
+    Signed,
+)
+
+
+class Proven(NamedTuple):
+    """What a proof proves. `checkpoint` is the head of the log that was signed, `signed` the record that carries it;
+    `older` the head that the log went on from (consistency), `record` the record that is in it (inclusion, record).
+    Of a record that is shown in part there are `values` (JSON) by field, and the names of those `withheld`.
+    """
+
+    kind: Kind
+    number: int
+    believed: Believed
+    checkpoint: Checkpoint
+    signed: Signed
+    older: Checkpoint | None = None
+    record: AnyRecord | None = None
+    values: dict[str, bytes] | None = None
+    withheld: tuple[str, ...] = ()
+
+
+def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
+    """What the file proves under the pinned root key (32 bytes) or its name (16), or what is wrong with it."""
+    # 1 the file
+    file = read_proof(data)
+    if isinstance(file, Flaw):
+        return file
+    extra = read_extra(file.extra)
+    if isinstance(extra, Flaw):
+        return extra
+    if bool(extra.record) != (file.kind is Kind.INCLUSION) or bool(extra.fields) != (file.kind is Kind.DISCLOSURE):
+        return Flaw("proof/extra", "it carries other parts than its kind has")
+    signed = _record(extra.signed)
+    record = _record(extra.record) if extra.record else None
+    if isinstance(signed, Flaw):
+        return signed
+    if isinstance(record, Flaw):
+        return record
+    # 2 the checkpoint
+    now_us = signed.utc_us if record is None else record.utc_us
+    believed = believe((*extra.chain, file.note), extra.root, pinned, now_us)
+    if isinstance(believed, Flaw):
+        return believed
+    # 3 its record
+    checkpoint = believed.checkpoints[-1]
+    flaw = _check_signed(signed, extra.signed, believed)
+    if flaw is not None:
+        return flaw
+    assert not isinstance(signed, Decision | Effect)
+    proven = Proven(file.kind, file.number, believed, checkpoint, signed, record=record)
+    # 4 what is proven
+    return _CHECKS[file.kind](proven, file, extra)
+
+
+def _record(line: bytes) -> AnyRecord | Flaw:
+    record = read(line) if line.endswith(b"\n") else Flaw("", "it is not a line")
+    return Flaw("proof/record", f"a record in it is none: {record.text}") if isinstance(record, Flaw) else record
+
+
+def _check_signed(signed: AnyRecord, line: bytes, believed: Believed) -> Flaw | None:
+    checkpoint = believed.checkpoints[-1]
+    if isinstance(signed, Decision | Effect) or signed.checkpoint is not None:
+        return Flaw("proof/signed", "the record that should carry the checkpoint is of a kind that carries none")
+    if leaf_hash(line) != checkpoint.record:
+        text = "the record that should carry the checkpoint is not the one that was signed with it"
+        return Flaw("proof/signed", text, leaf_hash(line).hex(), checkpoint.record.hex())
+    key = None if isinstance(signed, Close) else bytes.fromhex(signed.next_key)
+    certified = isinstance(signed, Genesis | Recover)
+    if signed.seq != checkpoint.size or key != checkpoint.key or certified != believed.certified:
+        return Flaw("proof/signed", "the record that carries the checkpoint and the checkpoint contradict each other")
+    return None
+
+
+def _inclusion(proven: Proven, file: ProofFile, extra: Extra) -> Proven | Flaw:
+    record, checkpoint = proven.record, proven.checkpoint
+    assert record is not None
+    if record.seq != file.number:
+        text = "it shows another record than the one whose place it gives"
+        return Flaw("proof/record", text, str(record.seq), str(file.number))
+    if not verify_inclusion(leaf_hash(extra.record), file.number, checkpoint.size, file.path, checkpoint.root):
+        return Flaw("proof/path", f"this is not record {file.number} of the log that was signed")
+    return proven
+
+
+def _consistency(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
+    older = next((head for head in proven.believed.checkpoints[:-1] if head.size == file.number), None)
+    if older is None:
+        return Flaw("proof/chain", f"it carries no earlier checkpoint of {file.number} records")
+    newer = proven.checkpoint
+    if not verify_consistency(older.size, older.root, newer.size, newer.root, file.path):
+        text = f"the log of {newer.size} records does not begin with the {older.size} that were signed before"
+        return Flaw("proof/consistency", text)
+    return proven._replace(older=older)
+
+
+def _disclosure(proven: Proven, file: ProofFile, extra: Extra) -> Proven | Flaw:
+    close = proven.signed
+    if not isinstance(close, Close) or close.disclosure is None:
+        return Flaw("proof/disclosure", "the record that carries the checkpoint has no root for records shown in part")
+    hashes, values, withheld = [], {}, []
+    for field in extra.fields:
+        match field:
+            case key, (digest,):
+                withheld.append(key)
+                hashes.append(digest)
+            case key, (salt, value) if len(salt) == len(close.disclosure) // 2:
+                values[key] = value
+                hashes.append(field_hash(salt, key, value))
+            case _:
+                return Flaw("proof/fields", "a field is neither a hash, nor salt and value")
+    if any(len(digest) != len(close.disclosure) // 2 for digest in hashes):
+        return Flaw("proof/fields", "the hash of a field has not the length of one")
+    flaw = _check_fields(tuple(key for key, _ in extra.fields), values, file.number)
+    if flaw is not None:
+        return flaw
+    root = bytes.fromhex(close.disclosure)
+    if not verify_inclusion(combined(hashes), file.number, close.seq, file.path, root):
+        return Flaw("proof/path", f"these are not fields of record {file.number} of the log that was signed")
+    return proven._replace(values=values, withheld=tuple(withheld))
+
+
+def _check_fields(keys: tuple[str, ...], values: dict[str, bytes], number: int) -> Flaw | None:
+    decoded = {}
+    for key, value in values.items():
+        try:
+            decoded[key] = msgspec.json.decode(value)
+        except (ValueError, RecursionError):  # msgspec's own errors, UTF-8, and a thousand brackets
+            return Flaw("proof/fields", "the value of a field is not JSON", value[:80].decode("utf-8", "replace"))
+    kind = decoded.get("type")
+    expected = FIELDS.get(kind) if isinstance(kind, str) else None
+    if expected is None or keys != expected:
+        text = "these are not the fields of a record: its type must be shown, and every field be named in its order"
+        return Flaw("proof/fields", text, ", ".join(keys)[:160], "" if expected is None else ", ".join(expected))
+    if type(decoded.get("seq")) is not int or decoded["seq"] != number:
+        return Flaw("proof/fields", "`seq` must be shown, and be the place that the proof gives", expected=str(number))
+    return None
+
+
+def _own(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
+    if file.path or file.number != proven.checkpoint.size:
+        return Flaw("proof/record", "it shows another record than the one whose place it gives")
+    return proven._replace(record=proven.signed)
+
+
+_CHECKS = {
+    Kind.INCLUSION: _inclusion,
+    Kind.CONSISTENCY: _consistency,
+    Kind.DISCLOSURE: _disclosure,
+    Kind.RECORD: _own,
+}

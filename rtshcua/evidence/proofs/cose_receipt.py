@@ -1,0 +1,127 @@
+"""COSE receipts (RFC 9942): that a record is in a log, signed by the log key when it is exported.
+
+COSE_Sign1, tag 18, whose payload is the root of the tree, detached: whoever verifies works it out from the record and
+the path, and then looks whether that was signed. Algorithm Ed25519 (-19), verifiable data structure RFC9162_SHA256
+(395: 1), its inclusion proof in the unprotected header (396: {-1: [[size, index, path]]}). The protected header also
+names the key (4) and, as claims (RFC 9597, 15), the log's origin as the issuer (1) and the size of the tree in decimal
+as the subject (2), for a path alone does not tell some sizes apart. So that it verifies alone the unprotected header
+also has the record's line and the signed trust root, under names of our own.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.merkle_proofs import root_from_inclusion
+from rtshcua.evidence.proofs.file import MAX_PROOF
+from rtshcua.evidence.proofs.trust import Name, name_of, trust
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import AnyRecord
+from rtshcua.wire import cbor
+from rtshcua.wire.cbor import CborError
+from rtshcua.wire.cose import ED25519
+from rtshcua.wire.keys import Duty, VerificationKey
+from rtshcua.wire.trust import TrustRoot, key_refusal
+
+TAG_18: Final = b"\xd2"  # COSE_Sign1
+
+_ALGORITHM, _KID, _CLAIMS, _VDS, _VDP = 1, 4, 15, 395, 396
+_ISSUER, _SUBJECT = 1, 2
+_RFC9162_SHA256: Final = 1
+_INCLUSION: Final = -1
+_RECORD, _ROOT = "rtshcua/record", "rtshcua/root"
+_HASH: Final = 32
+
+
+class Received(NamedTuple):
+    """What a receipt proves: record `number` is in the log of `name`, as the log key signed it at `size` records."""
+
+    name: Name
+    number: int
+    size: int
+    record: AnyRecord
+    log_key: VerificationKey
+    root: TrustRoot
+
+
+def make_receipt(
+    line: bytes, number: int, size: int, path: Sequence[bytes], *, origin: str, root: bytes, kid: bytes,
+    signer: Callable[[bytes], bytes],
+) -> bytes:  # fmt: skip
+    """The receipt of a line. `signer` signs by the log key, whose name is `kid`. Raises ValueError where the path does
+    not fit, or is empty: RFC 9942 has no receipt for the only leaf of a tree.
+    """
+    head = root_from_inclusion(leaf_hash(line), number, size, path)
+    if head is None or not path:
+        raise ValueError(f"this is no path from leaf {number} of {size}")
+    claims = {_ISSUER: origin, _SUBJECT: str(size)}
+    protected = cbor.encode({_ALGORITHM: ED25519, _KID: kid, _CLAIMS: claims, _VDS: _RFC9162_SHA256})
+    proof = cbor.encode((size, number, tuple(path)))
+    unprotected = {_VDP: {_INCLUSION: (proof,)}, _RECORD: line, _ROOT: root}
+    return TAG_18 + cbor.encode((protected, unprotected, None, signer(_signed(protected, head))))
+
+
+def check_receipt(data: bytes, pinned: bytes) -> Received | Flaw:
+    """What the receipt proves under the pinned root key (32 bytes) or its name (16), or what is wrong with it."""
+    try:
+        value = cbor.decode(data[1:], limit=MAX_PROOF) if data.startswith(TAG_18) else None
+        match value:
+            case (bytes(protected), {396: {-1: (bytes(proof),), **no_more}, **others}, None, bytes(signature)):
+                parts = cbor.decode(protected, limit=len(protected)), cbor.decode(proof, limit=len(proof))
+                match others:
+                    case {"rtshcua/record": bytes(line), "rtshcua/root": bytes(root)} if (
+                        len(others) == 2 and not no_more
+                    ):
+                        return _check(protected, parts, line, root, signature, pinned)
+    except CborError as error:
+        return Flaw("proof/malformed", f"it is not a receipt: not canonical CBOR: {error}")
+    return Flaw("proof/malformed", "it is not a receipt of inclusion: COSE_Sign1 with one proof, a record and a root")
+
+
+def _check(
+    protected: bytes, parts: tuple[cbor.Value, cbor.Value], line: bytes, root: bytes, signature: bytes, pinned: bytes
+) -> Received | Flaw:
+    match parts:
+        case (
+            {1: -19, 4: bytes(kid), 15: {1: str(origin), 2: str(subject), **no_claims}, 395: 1, **no_more},
+            (int(size), int(number), (*path,)),
+        ) if not no_claims and not no_more:
+            hashes = [node for node in path if type(node) is bytes and len(node) == _HASH]
+            if len(hashes) == len(path) and path and type(size) is type(number) is int and subject == str(size):
+                return _verify(protected, kid, origin, (size, number, hashes), line, root, signature, pinned)
+    return Flaw("proof/malformed", "the headers of the receipt, or its proof, are not those of RFC 9942")
+
+
+def _verify(
+    protected: bytes, kid: bytes, origin: str, proof: tuple[int, int, list[bytes]], line: bytes, root: bytes,
+    signature: bytes, pinned: bytes,
+) -> Received | Flaw:  # fmt: skip
+    size, number, path = proof
+    record = read(line) if line.endswith(b"\n") else Flaw("", "it is not a line")
+    if isinstance(record, Flaw):
+        return Flaw("proof/record", f"the record in it is none: {record.text}")
+    name = name_of(origin)
+    if isinstance(name, Flaw):
+        return name
+    trusted = trust(root, pinned, record.utc_us)
+    if isinstance(trusted, Flaw):
+        return trusted
+    key = trusted.keys_for(Duty.LOG).get(kid)
+    if key is None:
+        return Flaw("trust/log-key", "the key of the receipt has no duty `log` in the trust root", kid.hex()[:64])
+    refusal = key_refusal(key, vehicle=name.vehicle, now_us=record.utc_us)
+    if refusal is not None:
+        text = f"the log's key might not sign for vehicle `{name.vehicle}` then: {refusal}"
+        return Flaw("trust/log-key", text, kid.hex())
+    head = root_from_inclusion(leaf_hash(line), number, size, path)
+    if head is None or record.seq != number:
+        return Flaw("proof/path", f"the path in it does not lead from record {record.seq} to a root")
+    if not key.verify(signature, _signed(protected, head)):
+        return Flaw("proof/signature", f"the log key did not sign a log in which this is record {number}")
+    return Received(name, number, size, record, key, trusted)
+
+
+def _signed(protected: bytes, root: bytes) -> bytes:
+    """The Sig_structure (RFC 9052, section 4.4), with no external data."""
+    return cbor.encode(("Signature1", protected, b"", root))

@@ -1,0 +1,30 @@
+"""A million proofs that somebody tampered with: none is believed that is not true, and none takes the verifier down."""
+
+from collections import Counter
+from random import Random
+
+import pytest
+
+from reference import proof_mutations
+
+
+def campaign(seed: int, count: int) -> Counter[str]:
+    """How often what was said."""
+    of = Random(seed)
+    return Counter(proof_mutations.check(proof_mutations.mutated(of)) for _ in range(count))
+
+
+def test_every_proof_that_is_begun_with_is_true() -> None:
+    assert {proof_mutations.check(proof) for proof in proof_mutations.proofs()} == {"true"}
+
+
+def test_some_tampered_proofs() -> None:
+    said = campaign(7, 2_500)
+    assert {"proof/malformed", "proof/extra", "proof/record", "proof/path", "proof/signature", "proof/key"} <= set(said)
+    assert said["true"] < 400  # a mutation may hit nothing, or give another proof that is true
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(100))
+def test_a_million_tampered_proofs(seed: int) -> None:
+    campaign(1_000 + seed, 10_000)

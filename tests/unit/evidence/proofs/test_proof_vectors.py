@@ -1,0 +1,53 @@
+"""The proofs in tests/vectors/proof, byte for byte: their form is a promise. `UPDATE_GOLDENS=1` writes them."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from reference.proof_mutations import check, cosigned
+from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log, sign
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.proofs.anchor import with_cosignatures
+from rtshcua.evidence.proofs.make import prove_consistency, prove_disclosure, prove_inclusion, receipt_of
+
+VECTORS = Path(__file__).resolve().parents[3] / "vectors" / "proof"
+LOG = sealed_log(recovers=True)
+LAST = len(LOG.lines) - 1
+
+
+def anchored() -> bytes | Flaw:
+    made = prove_inclusion(lambda: LOG.lines, 3)
+    return made if isinstance(made, Flaw) else with_cosignatures(made, [cosigned(LOG)])
+
+
+MADE: dict[str, Callable[[], bytes | Flaw]] = {
+    "record-3.tlog-proof": lambda: prove_inclusion(lambda: LOG.lines, 3),
+    "record-3-anchored.tlog-proof": anchored,
+    f"record-{LAST}.record-proof": lambda: prove_inclusion(lambda: LOG.lines, LAST),
+    "since-6.consistency-proof": lambda: prove_consistency(lambda: LOG.lines, 6),
+    "record-8.disclosure-proof": lambda: prove_disclosure(lambda: LOG.lines, 8, SECRET, ["state", "clause"]),
+    "record-3.cose": lambda: receipt_of(lambda: LOG.lines, 3, None, kid=LOG_KEY.kid, signer=sign),
+    "log.jsonl": lambda: b"".join(LOG.lines),
+    "root.key": lambda: PIN.hex().encode() + b"\n",
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_proof_is_made_as_it_was(name: str) -> None:
+    made = MADE[name]()
+    assert isinstance(made, bytes)
+    if os.environ.get("UPDATE_GOLDENS") == "1":
+        VECTORS.mkdir(parents=True, exist_ok=True)
+        (VECTORS / name).write_bytes(made)
+    assert made == (VECTORS / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", [name for name in MADE if "." in name and name not in ("log.jsonl", "root.key")])
+def test_a_proof_that_was_made_verifies(name: str) -> None:
+    assert check((VECTORS / name).read_bytes()) == "true"
+
+
+def test_there_are_no_others() -> None:
+    assert {path.name for path in VECTORS.iterdir()} == set(MADE)

@@ -1,0 +1,151 @@
+"""Questions to an archive: SQL over its tables, canned or the caller's own."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import duckdb
+
+from rtshcua.adapters.archive.catalogue import quoted
+from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
+from rtshcua.wire.untrusted import Untrusted
+
+#: what an archive holds, by status of its logs
+STATS: Final = """
+SELECT l.status, COUNT(*) AS logs, COUNT(DISTINCT l.vehicle) AS vehicles, SUM(l.bytes) AS bytes,
+  SUM(l.records) AS records, SUM(l.anchored) AS anchored, SUM(d.decisions) AS decisions, SUM(d.refusals) AS refusals,
+  MIN(l.begun_us) AS first_us, MAX(l.begun_us) AS last_us
+FROM logs l
+LEFT JOIN (
+  SELECT log, COUNT(*) AS decisions, SUM(CASE WHEN outcome <> 'allow' THEN 1 ELSE 0 END) AS refusals
+  FROM decided GROUP BY log
+) d ON d.log = l.log
+GROUP BY l.status
+ORDER BY l.status"""
+
+_HERE: Final = Path(__file__).parent
+VIEWS: Final = ("decided", "happened")
+
+
+class Canned(NamedTuple):
+    """A question that ships: its name, what it tells, its SQL."""
+
+    name: str
+    tells: str
+    sql: str
+
+    @property
+    def filtered(self) -> bool:
+        """Whether conditions on decisions change its answer."""
+        return "FROM decided" in self.sql
+
+
+def canned() -> dict[str, Canned]:
+    """All of them, by name."""
+    found = {}
+    for path in sorted((_HERE / "sql").glob("*.sql")):
+        text = path.read_text(encoding="utf-8")
+        first, _, sql = text.partition("\n")
+        found[path.stem] = Canned(path.stem, first.removeprefix("-- "), sql.strip())
+    return found
+
+
+def view(name: str) -> str:
+    """The portable SELECT of a view."""
+    return (_HERE / "views" / f"{name}.sql").read_text(encoding="utf-8")
+
+
+class Answer(NamedTuple):
+    """Rows under the names of their columns."""
+
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[object, ...]]
+
+
+class Conditions(NamedTuple):
+    """What decisions are asked about; None is any. `since` and `until` are UTC in us, the latter not included."""
+
+    vehicle: str | None = None
+    mission: str | None = None
+    skill: str | None = None
+    outcome: str | None = None
+    reason: str | None = None
+    rule: str | None = None
+    clause: str | None = None
+    policy: str | None = None
+    policy_version: int | None = None
+    since: int | None = None
+    until: int | None = None
+    witness: str | None = None
+
+    def sql(self) -> str:
+        """The condition on `decided`; a reason may be the beginning of one, a clause a part of one."""
+        terms = [
+            f"{name} = {quoted(value)}"
+            for name in ("vehicle", "mission", "skill", "outcome", "rule", "policy", "witness")
+            if (value := getattr(self, name)) is not None
+        ]
+        if self.reason is not None:
+            terms.append(f"(reason = {quoted(self.reason)} OR starts_with(reason, {quoted(self.reason + '/')}))")
+        if self.clause is not None:
+            terms.append(f"contains(clause, {quoted(self.clause)})")
+        if self.policy_version is not None:
+            terms.append(f"policy_version = {self.policy_version}")
+        if self.since is not None:
+            terms.append(f"utc_us >= {self.since}")
+        if self.until is not None:
+            terms.append(f"utc_us < {self.until}")
+        return " AND ".join(terms) or "TRUE"
+
+
+def matching(**values: str | None) -> str:
+    """The condition that columns have these values; None is any."""
+    return " AND ".join(f"{name} = {quoted(value)}" for name, value in values.items() if value is not None) or "TRUE"
+
+
+class Asker:
+    """A connection to an archive that can only read it."""
+
+    def __init__(self, folder: Folder, conditions: Conditions | None = None) -> None:
+        self._engine = duckdb.connect()
+        try:
+            self._begin(folder, conditions or Conditions())
+        except duckdb.Error as error:
+            text = f"the index of `{folder.path}` cannot be read: {' '.join(str(error).split())}"
+            raise Untrusted("archive-index", text) from None
+
+    def _begin(self, folder: Folder, conditions: Conditions) -> None:
+        engine = self._engine
+        if not folder.catalogue.exists():
+            raise Untrusted("no-archive", f"`{folder.path}` is an archive that nothing was ever added to")
+        engine.execute(f"CREATE VIEW logs AS SELECT * FROM read_parquet({quoted(folder.catalogue)})")
+        parts = engine.execute("SELECT DISTINCT part FROM logs WHERE part <> '' ORDER BY part").fetchall()
+        for table in TABLES:
+            files = ", ".join(
+                quoted(folder.table(table) / f"{part}.parquet") for part in (NOTHING, *(p for (p,) in parts))
+            )
+            engine.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet([{files}])")
+        for name in VIEWS:
+            where = conditions.sql() if name == "decided" else "TRUE"
+            engine.execute(f"CREATE VIEW {name} AS SELECT * FROM ({view(name)}) v WHERE {where}")
+        engine.execute(f"SET allowed_directories = [{quoted(folder.path / 'index')}]")
+        engine.execute(f"SET temp_directory = {quoted(folder.scratch)}")
+        engine.execute("SET enable_external_access = false")
+        engine.execute("SET lock_configuration = true")
+
+    def ask(self, sql: str, limit: int | None = None) -> Answer:
+        """The answer to one SELECT. Raises `Untrusted` (`malformed`) for anything else, and where it makes no sense."""
+        try:
+            statements = duckdb.extract_statements(sql)
+            if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
+                raise Untrusted("malformed", "a question to an archive is one SELECT")
+            cursor = self._engine.execute(statements[0])
+            columns = tuple(column[0] for column in cursor.description or ())
+            rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit)
+        except duckdb.Error as error:
+            raise Untrusted("malformed", str(error)) from None
+        return Answer(columns, rows)
+
+    def close(self) -> None:
+        """Lets the connection go."""
+        self._engine.close()

@@ -1,0 +1,164 @@
+"""The folder of an archive.
+
+    archive.json                        what this folder is, and its version
+    logs/ab/<digest>/log.jsonl          a log, octet for octet, under the SHA-256 of its octets; never changed
+    logs/ab/<digest>/*.anchors          what witnesses cosigned of it, under the SHA-256 of theirs
+    index/logs.parquet                  a row a log: all that is known, replaced as a whole by each change
+    index/<table>/<part>.parquet        rows of records; what counts are those of the logs that logs.parquet names
+
+The logs are what is kept; the index is worked out from them and can be thrown away.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from hashlib import file_digest, sha256
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from rtshcua.adapters.files.anchors import SUFFIX, beside
+from rtshcua.adapters.files.durable import make_folder, naming, replace, sync_folder, write_new
+from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.files.runs import LOG
+from rtshcua.wire.untrusted import Untrusted
+
+FORMAT, VERSION = "rtshcua/archive", 1
+#: the tables of records, one folder each
+TABLES: Final = ("decisions", "effects", "seals")
+#: the part of each that has no rows
+NOTHING: Final = "nothing"
+
+_MARK: Final = "archive.json"
+_BLOCK: Final = 1 << 20
+_MOST_ANCHORS: Final = 16 << 20  # octets of a file of anchors
+_PATTERN: Final = frozenset("*?[]{}")  # the engine would take a path with these for a pattern
+
+
+class Folder:
+    """An archive's folder. Raises `Untrusted` (`no-archive`, `archive-version`, `archive-path`) where it is none."""
+
+    def __init__(self, path: Path, *, make: bool = False) -> None:
+        self.path = path.resolve()
+        if _PATTERN & set(str(self.path)):
+            raise Untrusted(
+                "archive-path", f"`{path}`: the path of an archive has none of {' '.join(sorted(_PATTERN))}"
+            )
+        if make and not (self.path / _MARK).exists():
+            self._make()
+        self._check(path)
+        if make:
+            for folder in (self.path / "logs", self.scratch, *map(self.table, TABLES)):
+                make_folder(folder)
+
+    def _make(self) -> None:
+        if self.path.exists() and {path.name for path in self.path.iterdir()} - {f"{_MARK}.new"}:
+            raise Untrusted("no-archive", f"`{self.path}` is a folder with other things in it, not an archive")
+        make_folder(self.path)
+        replace(self.path / _MARK, json.dumps({"format": FORMAT, "version": VERSION}).encode() + b"\n")
+
+    def _check(self, given: Path) -> None:
+        try:
+            said = json.loads((self.path / _MARK).read_bytes()[:_BLOCK])
+        except (OSError, ValueError):
+            raise Untrusted("no-archive", f"`{given}` is not an archive") from None
+        if said != {"format": FORMAT, "version": VERSION}:
+            raise Untrusted("archive-version", f"`{given}` is an archive of another version than {VERSION}")
+
+    @property
+    def catalogue(self) -> Path:
+        """The table of logs."""
+        return self.path / "index" / "logs.parquet"
+
+    @property
+    def scratch(self) -> Path:
+        """Where what is not finished lies."""
+        return self.path / "tmp"
+
+    def table(self, name: str) -> Path:
+        """The folder with the parts of a table."""
+        return self.path / "index" / name
+
+    def log(self, digest: str) -> Path:
+        """The log of that SHA-256."""
+        return self.path / "logs" / digest[:2] / digest / LOG
+
+    def logs(self) -> list[Path]:
+        """All logs that were taken in."""
+        return sorted((self.path / "logs").glob(f"*/*/{LOG}"))
+
+    def parts(self) -> list[Path]:
+        """All files with rows of records."""
+        return [path for name in TABLES for path in self.table(name).glob("*.parquet")]
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Holds off everyone else who wants to change the archive. Raises BlockingIOError if somebody does."""
+        import fcntl  # noqa: PLC0415  not everywhere, and nobody who only asks needs it
+
+        with (self.path / "lock").open("ab") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for left in self.scratch.iterdir():
+                remove(left)
+            yield
+
+    def take_in(self, source: Path) -> tuple[str, int, bool]:
+        """Copies a log in, with the anchors beside it, unless it is there. Its SHA-256, its octets, and whether
+        anything is new.
+        """
+        scratch = self.scratch / f"{os.getpid()}.taken"
+        with open_regular(source) as reader, naming(self.path), scratch.open("wb") as writer:
+            digest, size = _copy(reader, writer)
+            os.fsync(writer.fileno())
+        place = self.log(digest)
+        new = not _holds(place, digest, size)  # a copy that was damaged since is replaced
+        if new:
+            make_folder(place.parent)
+            scratch.chmod(0o444)
+            scratch.replace(place)
+            sync_folder(place.parent)
+        else:
+            scratch.unlink()
+        return digest, size, self._take_anchors(source, digest) or new
+
+    def _take_anchors(self, source: Path, digest: str) -> bool:
+        """Those beside a log that is named as in a run's folder are its own; else those that bear its name."""
+        found = source.parent.glob(f"*{SUFFIX}") if source.name == LOG else [beside(source)]
+        new = False
+        for path in found:
+            if not path.is_file() or path.stat().st_size > _MOST_ANCHORS:
+                continue
+            data = path.read_bytes()
+            with suppress(FileExistsError):
+                write_new(self.log(digest).with_name(sha256(data).hexdigest() + SUFFIX), data)
+                new = True
+        return new
+
+
+def _holds(place: Path, digest: str, size: int) -> bool:
+    """Whether a log lies there with these octets, and not only with this name."""
+    try:
+        with open_regular(place) as file:
+            return os.fstat(file.fileno()).st_size == size and file_digest(file, "sha256").hexdigest() == digest
+    except OSError:
+        return False
+
+
+def remove(path: Path) -> None:
+    """Removes something unfinished, a file or a folder."""
+    if path.is_dir() and not path.is_symlink():
+        for below in path.iterdir():
+            remove(below)
+        path.rmdir()
+    else:
+        path.unlink()
+
+
+def _copy(reader: BinaryIO, writer: BinaryIO) -> tuple[str, int]:
+    hasher, size = sha256(), 0
+    while block := reader.read(_BLOCK):
+        hasher.update(block)
+        writer.write(block)
+        size += len(block)
+    writer.flush()
+    return hasher.hexdigest(), size

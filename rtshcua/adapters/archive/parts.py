@@ -1,0 +1,174 @@
+"""From verified logs to rows: DuckDB reads the lines themselves, and writes a part of each table as Parquet.
+
+Every line was read by the verifier before, in its one canonical form; what is read here is the same octets with
+the same meaning. How many records there are is counted again.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from shutil import copyfile
+from typing import Final
+
+import duckdb
+import msgspec
+from msgspec.structs import replace
+
+from rtshcua.adapters.archive.catalogue import publish, quoted
+from rtshcua.adapters.archive.entry import Entry, Examined
+from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
+from rtshcua.evidence.reading import LONGEST
+
+#: what is read of a line, by its SQL type
+_FIELDS: Final = {
+    "BIGINT": (
+        "at_us", "durability", "epoch", "kind", "link", "records", "rule_step", "seq", "step", "token", "utc_error_us",
+        "utc_us",
+    ),
+    "VARCHAR": ("checkpoint", "clause", "detail", "event", "outcome", "reason", "target", "type"),
+    "STRUCT(policy_version BIGINT)": ("context",),
+    "BIGINT[]": ("clause_at",),
+}  # fmt: skip
+_COLUMNS: Final = ", ".join(f"{name}: '{kind}'" for kind, names in _FIELDS.items() for name in names)
+_OURS: Final = {
+    "entries": {
+        "log": "VARCHAR", "indexed": "BIGINT", "vehicle": "VARCHAR", "boot": "VARCHAR", "mission": "VARCHAR",
+        "policy": "VARCHAR",
+    },
+    "steps": {
+        "log": "VARCHAR", "first": "BIGINT", "until": "BIGINT", "kind": "BIGINT", "step": "BIGINT", "link": "BIGINT",
+        "skill": "VARCHAR", "what": "VARCHAR",
+    },
+}  # fmt: skip
+_LOG: Final = "string_split(filename, '/')[-2]"
+_BLOCK: Final = 1 << 16
+_LONGEST_DETAIL: Final = 1_000  # characters; the log has the rest
+
+_DAY: Final = "strftime(make_timestamp(r.utc_us), '%Y-%m-%d') AS utc_day"
+_SKILL: Final = """
+    LEFT JOIN steps s ON r.log = s.log AND r.kind = s.kind AND r.step = s.step AND r.link = s.link
+         AND r.seq >= s.first AND r.seq < s.until"""
+_ROWS: Final = {
+    "decisions": f"""
+        SELECT r.log, r.seq, e.vehicle, e.mission, e.policy, r.context.policy_version AS policy_version, r.at_us,
+               r.utc_us, r.utc_error_us, {_DAY}, r.kind, r.step, r.link, s.skill, s.what, r.outcome, r.reason,
+               split_part(r.reason, '/', 1) AS rule, r.rule_step, r.clause, r.clause_at[1] AS clause_source,
+               r.clause_at[2] AS clause_start, r.target, r.durability
+        FROM raw r JOIN entries e ON r.log = e.log {_SKILL} WHERE r.type = 'decision' ORDER BY r.log, r.seq""",
+    "effects": f"""
+        SELECT r.log, r.seq, e.vehicle, e.mission, r.at_us, r.utc_us, r.utc_error_us, {_DAY}, r.event,
+               substr(r.detail, 1, {_LONGEST_DETAIL}) AS detail, r.kind, r.step, r.link, s.skill, r.token, r.durability
+        FROM raw r JOIN entries e ON r.log = e.log {_SKILL} WHERE r.type = 'effect' ORDER BY r.log, r.seq""",
+    "seals": f"""
+        SELECT r.log, r.seq, e.vehicle, e.boot, r.type, r.utc_us, {_DAY}, coalesce(r.epoch, -1) AS epoch,
+               coalesce(r.records, 0) AS records, split_part(r.checkpoint, chr(10), 3) AS root,
+               split_part(r.checkpoint, chr(10), 4) AS self
+        FROM raw r JOIN entries e ON r.log = e.log WHERE r.checkpoint IS NOT NULL ORDER BY r.log, r.seq""",
+}  # fmt: skip
+
+
+def ingest(folder: Folder, examined: Sequence[Examined], *, threads: int | None = None) -> list[Entry]:
+    """Writes a part with the rows of these logs, and gives their entries, which name it. The catalogue must follow."""
+    sound = [each for each in examined if each.entry.indexed]
+    if not sound:
+        return [each.entry for each in examined]
+    part = sha256("".join(sorted(each.entry.log for each in sound)).encode()).hexdigest()[:32]
+    with duckdb.connect() as engine:
+        if threads is not None:
+            engine.execute(f"SET threads = {threads}")
+        engine.execute(f"SET temp_directory = {quoted(folder.scratch)}")
+        _load(engine, "entries", [each.entry for each in sound], folder.scratch)
+        _load(engine, "steps", [step for each in sound for step in each.steps], folder.scratch)
+        with _files(folder, sound) as files:
+            _read(engine, files)
+        _count(engine)
+        for table in TABLES:
+            _write(engine, folder, table, part)
+    return [replace(each.entry, part=part) if each.entry.indexed else each.entry for each in examined]
+
+
+def lay_out(folder: Folder) -> None:
+    """A part without rows, so that every table has its columns before there is anything in it."""
+    if all((folder.table(table) / f"{NOTHING}.parquet").exists() for table in TABLES):
+        return
+    with duckdb.connect() as engine:
+        _load(engine, "entries", [], folder.scratch)
+        _load(engine, "steps", [], folder.scratch)
+        types = ", ".join(f"{name} {kind}" for kind, names in _FIELDS.items() for name in names)
+        engine.execute(f"CREATE TEMP TABLE raw (log VARCHAR, {types})")
+        for table in TABLES:
+            _write(engine, folder, table, NOTHING)
+
+
+def _write(engine: duckdb.DuckDBPyConnection, folder: Folder, table: str, part: str) -> None:
+    fresh = folder.scratch / f"{table}.parquet"
+    engine.execute(f"COPY ({_ROWS[table]}) TO {quoted(fresh)} (FORMAT parquet, COMPRESSION zstd)")
+    publish(fresh, folder.table(table) / f"{part}.parquet")
+
+
+def _read(engine: duckdb.DuckDBPyConnection, files: list[str]) -> None:
+    """All that is indexed of the lines, but for the records that no signature covers yet."""
+    engine.execute(
+        f"CREATE TEMP TABLE raw AS SELECT l.* EXCLUDE (filename) FROM (SELECT *, {_LOG} AS log FROM read_ndjson("
+        f"?, columns={{{_COLUMNS}}}, filename=true, maximum_object_size={LONGEST + 1})) l "
+        "JOIN entries e ON l.log = e.log WHERE l.seq < e.indexed",
+        [files],
+    )
+
+
+def _count(engine: duckdb.DuckDBPyConnection) -> None:
+    wrong = engine.execute(
+        "SELECT e.log FROM entries e LEFT JOIN (SELECT log, count(*) AS found, count(DISTINCT seq) AS numbers FROM raw "
+        "GROUP BY log) r ON e.log = r.log WHERE r.found IS DISTINCT FROM e.indexed OR r.numbers <> r.found"
+    ).fetchone()
+    if wrong is not None:
+        raise RuntimeError(f"the engine did not read the records of log {wrong[0]} that were verified")
+
+
+def _load(engine: duckdb.DuckDBPyConnection, name: str, rows: Sequence[msgspec.Struct], scratch: Path) -> None:
+    """A table of ours in the engine."""
+    columns = ", ".join(f"{column}: '{kind}'" for column, kind in _OURS[name].items())
+    path = scratch / f"{name}.jsonl"
+    with path.open("wb") as file:
+        file.writelines(msgspec.json.encode(row) + b"\n" for row in rows)
+    read = f"CREATE TEMP TABLE {name} AS SELECT * FROM read_ndjson(?, columns={{{columns}}})"
+    engine.execute(read, [str(path)])
+    path.unlink()
+
+
+def _cut(path: Path) -> None:
+    """Cuts off what stands after the last newline; there is one."""
+    with path.open("r+b") as file:
+        end = file.seek(0, 2)
+        while end:
+            start = max(0, end - _BLOCK)
+            file.seek(start)
+            found = file.read(end - start).rfind(b"\n")
+            if found >= 0:
+                file.truncate(start + found + 1)
+                return
+            end = start
+
+
+@contextmanager
+def _files(folder: Folder, sound: Sequence[Examined]) -> Iterator[list[str]]:
+    """The logs to read; of one that ends inside a line, a copy of its whole lines."""
+    copies: list[Path] = []
+    files = []
+    for each in sound:
+        path = folder.log(each.entry.log)
+        if each.entry.finding == "tail/torn":
+            copy = folder.scratch / each.entry.log / path.name
+            copy.parent.mkdir()
+            copyfile(path, copy)
+            _cut(copy)
+            copies.append(copy)
+            path = copy
+        files.append(str(path))
+    try:
+        yield files
+    finally:
+        for copy in copies:
+            copy.unlink()
+            copy.parent.rmdir()

@@ -1,0 +1,68 @@
+"""How answers of an archive are told: a table for a person, JSON or CSV for a program."""
+
+import csv
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+
+from rtshcua.cli.outcome import exit_code_of
+from rtshcua.cli.shown import plain, shorten, utc
+from rtshcua.diagnostics.exits import ExitCode
+
+_TIMES = frozenset(
+    {"utc_us", "begun_us", "first_us", "last_us", "added_us", "checked_us", "one_begun_us", "other_begun_us"}
+)
+_NAMES = frozenset({"log", "one", "other", "before", "last_leaf", "missing_leaf", "after_leaf", "boot"})
+_WHOLE = frozenset({"tells"})
+_NAME_SHOWN = 16  # digits of a digest
+_CELL = 48
+
+
+class Shape(StrEnum):
+    """How rows are printed."""
+
+    TABLE = "table"
+    JSON = "json"
+    CSV = "csv"
+
+
+def tell(columns: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape) -> None:
+    """Prints rows on the standard output."""
+    if shape is Shape.JSON:
+        print(json.dumps([dict(zip(columns, row, strict=True)) for row in rows], ensure_ascii=False, default=str))
+    elif shape is Shape.CSV:
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+    else:
+        _table(columns, [[_cell(name, value) for name, value in zip(columns, row, strict=True)] for row in rows])
+
+
+def _table(columns: Sequence[str], cells: list[list[str]]) -> None:
+    widths = [max(len(row[i]) for row in [list(columns), *cells]) for i in range(len(columns))]
+    for row in [list(columns), *cells]:
+        print("  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _cell(name: str, value: object) -> str:
+    if value is None:
+        return "-"
+    if name in _TIMES and isinstance(value, int):
+        return utc(value)
+    if name in _NAMES and isinstance(value, str):
+        return plain(value)[:_NAME_SHOWN]
+    text = plain(str(value))
+    return text if name in _WHOLE else shorten(text, _CELL)
+
+
+def code_of(status: str, finding: str | None) -> ExitCode:
+    """The exit code for a log, as `rtshcua verify-log` has it."""
+    if status != "failed":
+        return ExitCode.OK if status == "verified" else ExitCode.INCOMPLETE
+    return exit_code_of(finding or "")
+
+
+def counted(counts: Mapping[str, int]) -> str:
+    """Counts of logs in one line."""
+    return ", ".join(f"{count} {name}" for name, count in counts.items() if count) or "none"

@@ -1,0 +1,44 @@
+"""A small fleet's logs, an archive of them, and one with nothing in it."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+
+from reference.archived import CHECK, write_fleet
+from rtshcua.adapters.archive.adding import Check, Done, add
+from rtshcua.adapters.archive.folder import Folder
+
+Add = Callable[..., list[Done]]
+
+
+@pytest.fixture(scope="session")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the fleet's logs."""
+    folder = tmp_path_factory.mktemp("fleet")
+    write_fleet(folder)
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    """An archive with nothing in it."""
+    return Folder(tmp_path / "archive", make=True)
+
+
+@pytest.fixture
+def take(folder: Folder) -> Add:
+    """Adds logs to that archive."""
+
+    def take(logs: Iterable[Path], check: Check = CHECK) -> list[Done]:
+        return list(add(folder, logs, check))
+
+    return take
+
+
+@pytest.fixture(scope="session")
+def filled(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    """The archive of the whole fleet, for tests that only ask."""
+    folder = Folder(tmp_path_factory.mktemp("filled") / "archive", make=True)
+    list(add(folder, sorted(fleet.glob("*.jsonl")), CHECK))
+    return folder

@@ -2,12 +2,27 @@
 
 import pytest
 
-from reference.forgery import edit, expect, flight, other_flight, prove, read, rehashed, rewritten, signed
+from reference.forgery import (
+    edit,
+    expect,
+    flight,
+    other_flight,
+    prove,
+    read,
+    rehashed,
+    rewritten,
+    seed_of,
+    signed,
+    signers,
+)
+from reference.resealing import resealed
 from rtshcua.evidence.report import Verdict
 
 LINES = flight()
 FIRST = next(number for number, line in enumerate(LINES) if read(line)["type"] == "decision")
 EFFECT = next(number for number, line in enumerate(LINES) if read(line).get("event") == "succeeded")
+SEAL = next(number for number in signers(LINES) if number > EFFECT)
+FIRST_SEAL = next(number for number in signers(LINES) if number > FIRST)
 
 
 def with_fields(number: int, lines: tuple[bytes, ...] = LINES, **fields: object) -> list[bytes]:
@@ -34,19 +49,22 @@ def test_an_edited_answer(field: str) -> None:
 
 @pytest.mark.parametrize("field", EDITS)
 def test_an_edited_answer_that_was_rehashed(field: str) -> None:
-    """The chain is whole again; that the decision does not follow from its inputs shows before the close does."""
-    changed = rehashed(with_fields(FIRST, **{field: EDITS[field]}))
-    assert expect(changed) == (f"decision/{field.replace('_', '-')}", FIRST)
+    """The chain is whole again; the seal of the epoch is not, whether it counts right or not."""
+    changed = with_fields(FIRST, **{field: EDITS[field]})
+    assert expect(rehashed(changed)) in (("seal/bytes", FIRST_SEAL), ("seal/digest", FIRST_SEAL))
+    assert expect(rewritten(changed)) == ("seal/root", FIRST_SEAL)
 
 
 @pytest.mark.parametrize("field", EDITS)
 def test_an_edited_answer_that_the_key_holder_signed_again(field: str) -> None:
-    assert expect(signed(with_fields(FIRST, **{field: EDITS[field]})))[0].startswith("decision/")
+    """All is sealed; but the decision does not follow from its inputs."""
+    changed = signed(with_fields(FIRST, **{field: EDITS[field]}))
+    assert expect(changed) == (f"decision/{field.replace('_', '-')}", FIRST)
 
 
 def test_an_edited_effect_that_was_rehashed_breaks_the_signature() -> None:
     assert expect(with_fields(EFFECT, event="failed")) == ("chain/broken", EFFECT)
-    assert expect(rewritten(with_fields(EFFECT, event="failed"))) == ("close/root", len(LINES) - 1)
+    assert expect(rewritten(with_fields(EFFECT, event="failed"))) == ("seal/root", SEAL)
 
 
 def test_an_edited_last_record_before_the_close() -> None:
@@ -56,12 +74,23 @@ def test_an_edited_last_record_before_the_close() -> None:
 
 @pytest.mark.parametrize("fields", [{"ending": "aborted"}, {"tlog": "00" * 32}, {"utc_error_us": 7}])
 def test_an_edited_close(fields: dict[str, object]) -> None:
-    assert expect(with_fields(len(LINES) - 1, **fields)) == ("close/root", len(LINES) - 1)
+    assert expect(with_fields(len(LINES) - 1, **fields)) == ("seal/self", len(LINES) - 1)
 
 
-@pytest.mark.parametrize("count", [0, 1, 99])
-def test_a_close_that_counts_otherwise(count: int) -> None:
-    assert expect(with_fields(len(LINES) - 1, count=count)) == ("close/count", len(LINES) - 1)
+MISCOUNTED = [
+    ({"records": 1_000}, "seal/records"),
+    ({"bytes": 1}, "seal/bytes"),
+    ({"epoch": 99}, "seal/epoch"),
+    ({"digest": "00" * 32}, "seal/digest"),
+]
+
+
+@pytest.mark.parametrize(("fields", "slug"), MISCOUNTED)
+def test_a_signed_record_that_counts_otherwise(fields: dict[str, object], slug: str) -> None:
+    for number in (SEAL, len(LINES) - 1):
+        assert expect(with_fields(number, **fields)) == (slug, number)
+        by_the_holder = resealed(with_fields(number, **fields), seed_of, keep=fields)
+        assert expect(by_the_holder) == (slug, number)
 
 
 @pytest.mark.parametrize(
@@ -73,15 +102,18 @@ def test_a_close_that_counts_otherwise(count: int) -> None:
         ({"kind": 1, "link": 99}, "decision/unknown-step"),
         ({"kind": 3}, "decision/unknown-step"),
         ({"link": 0}, "decision/unknown-step"),
-        ({"binding": "zz" * 32}, "decision/inputs"),
-        ({"binding": "AA" * 32}, "decision/inputs"),
+        ({"binding": "zz" * 32}, "record/malformed"),
+        ({"binding": "AA" * 32}, "record/malformed"),
         ({"invocation": "00" * 16}, "decision/invocation"),
         ({"binding": "00" * 32}, "decision/outcome"),
         ({"state": {"ages": [], "values": []}}, "decision/inputs"),
     ],
 )
-def test_an_edited_question_that_was_rehashed(fields: dict[str, object], slug: str) -> None:
-    assert expect(rewritten(with_fields(FIRST, **fields))) == (slug, FIRST)
+def test_an_edited_question(fields: dict[str, object], slug: str) -> None:
+    changed = with_fields(FIRST, **fields)
+    assert expect(signed(changed)) == (slug, FIRST)
+    sealed = ("seal/root", FIRST_SEAL)
+    assert expect(rewritten(changed)) == ((slug, FIRST) if slug.startswith("record/") else sealed)
 
 
 def test_an_edited_state_shows_where_it_matters() -> None:

@@ -2,7 +2,7 @@
 
 from base64 import b64decode, b64encode
 
-from reference.forgery import LOG_KEY, edit, expect, flight, prove, read, rewritten, signed
+from reference.forgery import LOG_KEY, as_log_key, edit, expect, flight, prove, read, rewritten, signed, signers
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify
 from rtshcua.wire.keys import Duty, SigningKey
@@ -13,15 +13,10 @@ LAST = len(LINES) - 1
 STRANGER = SigningKey.from_seed(b"\x77" * 32, duty=Duty.LOG)
 
 
-def as_log_key(key: SigningKey) -> list[bytes]:
-    """The log as if `key` had been its log key from the beginning."""
-    return [edit(LINES[0], log_key=key.public.hex(), log_kid=key.kid.hex()), *LINES[1:]]
-
-
 def test_stripped() -> None:
     note = read(LINES[-1])["checkpoint"]
     for left in (None, "", note.split("\n\n")[0] + "\n", note.split("\n\n")[0] + "\n\n"):
-        assert expect([*LINES[:-1], edit(LINES[-1], checkpoint=left)]) == ("close/unsigned", LAST)
+        assert expect([*LINES[:-1], edit(LINES[-1], checkpoint=left)]) == ("seal/note", LAST)
 
 
 def test_stripped_with_the_whole_close() -> None:
@@ -29,12 +24,12 @@ def test_stripped_with_the_whole_close() -> None:
 
 
 def test_signed_by_another_key() -> None:
-    assert expect(signed(LINES, STRANGER)) == ("close/key", LAST)
+    assert expect(signed(LINES, STRANGER)) == ("seal/key", 0)
 
 
 def test_another_key_named_in_the_genesis() -> None:
     """The chain alone is then sound in itself; only the root under the pinned key tells."""
-    forged = signed(as_log_key(STRANGER), STRANGER)
+    forged = signed(as_log_key(LINES, STRANGER), STRANGER)
     assert verify(forged).verdict is Verdict.VERIFIED
     assert expect(forged) == ("trust/log-key", 0)
 
@@ -43,7 +38,7 @@ def test_a_key_of_another_duty_named_in_the_genesis() -> None:
     public = case.KEYS[Duty.MISSION].public
     stolen = SigningKey(Duty.LOG, True, case.KEYS[Duty.MISSION].private)
     assert stolen.public == public
-    assert expect(signed(as_log_key(stolen), stolen)) == ("trust/log-key", 0)
+    assert expect(signed(as_log_key(LINES, stolen), stolen)) == ("trust/log-key", 0)
 
 
 def test_the_name_of_the_right_key_beside_another() -> None:
@@ -70,7 +65,7 @@ def test_a_root_of_the_forgers_own() -> None:
 def test_a_signature_over_another_log_of_the_same_key() -> None:
     other = signed([edit(LINES[0], boot="11" * 16), *LINES[1:]])
     swapped = edit(LINES[-1], checkpoint=read(other[-1])["checkpoint"])
-    assert expect([*LINES[:-1], swapped]) == ("close/key", LAST)
+    assert expect([*LINES[:-1], swapped]) == ("seal/key", LAST)
 
 
 def test_one_byte_of_the_signature() -> None:
@@ -79,7 +74,7 @@ def test_one_byte_of_the_signature() -> None:
     data = bytearray(b64decode(encoded))
     data[20] ^= 1
     forged = f"{head} {b64encode(bytes(data)).decode()}\n"
-    assert expect([*LINES[:-1], edit(LINES[-1], checkpoint=forged)]) == ("close/signature", LAST)
+    assert expect([*LINES[:-1], edit(LINES[-1], checkpoint=forged)]) == ("seal/signature", LAST)
 
 
 def test_the_key_holder_may_rewrite_and_the_report_says_so() -> None:
@@ -94,4 +89,5 @@ def test_the_key_holder_may_rewrite_and_the_report_says_so() -> None:
 
 def test_rewritten_without_the_key() -> None:
     changed = [edit(line, detail="rewritten") if read(line).get("event") == "succeeded" else line for line in LINES]
-    assert expect(rewritten(changed)) == ("close/root", LAST)
+    first = next(number for number, line in enumerate(changed) if line != LINES[number])
+    assert expect(rewritten(changed)) == ("seal/root", next(n for n in signers(LINES) if n > first))

@@ -66,7 +66,7 @@ def test_junk_in_the_middle(junk: bytes) -> None:
 
 def test_junk_at_the_end_of_a_log_without_close() -> None:
     assert expect([*LINES[:NUMBER], b"x"]) == ("record/malformed", NUMBER)
-    assert expect([*LINES[:NUMBER], b"\x00" * 512]) == ("record/malformed", NUMBER)
+    assert expect([*LINES[:NUMBER], b"\x00" * 512 + b"x"]) == ("record/malformed", NUMBER)
 
 
 def test_a_byte_order_mark() -> None:

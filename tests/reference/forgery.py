@@ -1,24 +1,31 @@
 """A real log, and what an attacker would do to it: lines are forged here without any code of `rtshcua.evidence`.
 
-`expect` gives the slug and the record at which the audit of forged lines ends.
+`expect` gives the slug and the record at which the audit of forged lines ends. Four attackers: without keys (`edit`,
+`rehashed`, `renumbered`), without keys but diligent (`rewritten`), with the key of the epoch in which the vehicle was
+taken (`captured`), and with all keys from the beginning (`signed`).
 """
 
 import json
-from base64 import b64encode
 from collections.abc import Iterable
 from functools import cache
 from hashlib import sha256
+from itertools import count
 from typing import Any
-from urllib.parse import quote
 
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+from reference.resealing import resealed
+from reference.verifiers import ROOT_KEY, agree
 from rtshcua.ground.auditor.audit import Audit, audit
 from rtshcua.simulation.faults import BatteryLevel
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
 from virtual.flight import Flight
 
-ROOT_KEY = case.KEYS[Duty.ROOT].public
 LOG_KEY = case.KEYS[Duty.LOG]
+SIGNED = ("genesis", "seal", "recover", "close")
+#: the secret of a key that nobody was told to trust
+STRANGER = b"\x77" * 32
 
 
 @cache
@@ -36,8 +43,11 @@ def other_flight() -> tuple[bytes, ...]:
 
 
 def prove(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> Audit:
-    """The audit under the right root key."""
-    return audit(lines, pinned)
+    """The audit under the right root key; a verifier written apart must come to the same."""
+    lines = list(lines)
+    found = audit(lines, pinned)
+    agree(b"".join(lines), found, pinned)
+    return found
 
 
 def expect(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> tuple[str, int]:
@@ -69,6 +79,11 @@ def leaf(line: bytes) -> bytes:
     return sha256(b"\x00" + line).digest()
 
 
+def signers(lines: Iterable[bytes]) -> list[int]:
+    """The numbers of the signed records."""
+    return [number for number, line in enumerate(lines) if read(line)["type"] in SIGNED]
+
+
 def rehashed(lines: Iterable[bytes]) -> list[bytes]:
     """Every line linked to the one before it; the numbers stay."""
     done: list[bytes] = []
@@ -83,28 +98,44 @@ def renumbered(lines: Iterable[bytes]) -> list[bytes]:
 
 
 def rewritten(lines: Iterable[bytes]) -> list[bytes]:
-    """Numbered and linked anew, with a close that counts right: all that can be done without the log key."""
-    done = renumbered(lines)
-    if read(done[-1])["type"] == "close":
-        done[-1] = edit(done[-1], count=len(done) - 1)
-    return rehashed(done)
+    """Numbered, linked and counted anew, the checkpoints left: all that can be done without any key."""
+    return resealed(lines, seed_of, keep=("checkpoint",))
 
 
 def signed(lines: Iterable[bytes], key: SigningKey = LOG_KEY) -> list[bytes]:
-    """Rewritten and signed: what a holder of the log key can do."""
-    *body, last = rewritten(lines)
-    genesis = read(body[0])
-    origin = f"rtshcua/log/{quote(genesis['vehicle'], safe='')}/{genesis['boot']}"
-    root = _tree([leaf(line) for line in [*body, edit(last, checkpoint=None)]])
-    text = f"{origin}\n{len(body) + 1}\n{b64encode(root).decode()}\n"
-    key_id = sha256(origin.encode() + b"\n\x01" + key.public).digest()[:4]
-    signature = b64encode(key_id + key.sign(text.encode(), duty=Duty.LOG)).decode()
-    return [*body, edit(last, checkpoint=f"{text}\n\u2014 {origin} {signature}\n")]
+    """Rewritten and signed: what a holder of the log key and of all epoch keys can do."""
+    return resealed(lines, lambda public: seed_of(public, key))
 
 
-def _tree(leaves: list[bytes]) -> bytes:
-    """RFC 9162, section 2.1.1, recursively."""
-    if len(leaves) == 1:
-        return leaves[0]
-    half = 1 << (len(leaves) - 1).bit_length() - 1
-    return sha256(b"\x01" + _tree(leaves[:half]) + _tree(leaves[half:])).digest()
+def captured(lines: Iterable[bytes], *secrets: bytes) -> list[bytes]:
+    """Rewritten, and signed wherever one of these secrets is what should sign: what a holder of some keys can do."""
+    held = {public_of(secret).hex(): secret for secret in secrets}
+    return resealed(lines, lambda public: held.get(public, b""))
+
+
+def by_one_key(lines: Iterable[bytes], secret: bytes) -> list[bytes]:
+    """Rewritten, and signed throughout by the holder of this secret, whosever turn it is."""
+    return resealed(lines, lambda _: secret)
+
+
+def public_of(secret: bytes) -> bytes:
+    """The Ed25519 public key of a secret seed."""
+    return Ed25519PrivateKey.from_private_bytes(secret).public_key().public_bytes_raw()
+
+
+def as_log_key(lines: Iterable[bytes], key: SigningKey) -> list[bytes]:
+    """The lines as if `key` had been the log key from the beginning."""
+    genesis, *rest = lines
+    return [edit(genesis, log_key=key.public.hex(), log_kid=key.kid.hex()), *rest]
+
+
+_seeds: dict[str, bytes] = {}
+_numbers = count(1)
+
+
+def seed_of(public: str, log_key: SigningKey = LOG_KEY) -> bytes:
+    """The secret behind the public key (hexadecimal) of an epoch in these tests; the log key's for any other."""
+    while public not in _seeds and len(_seeds) < 100:
+        seed = next(_numbers).to_bytes(32)  # as `reference.seeds` draws them
+        _seeds[public_of(seed).hex()] = seed
+    return _seeds.get(public) or log_key.private.private_bytes_raw()

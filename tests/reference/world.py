@@ -24,6 +24,8 @@ from reference.flat_case import (
     M,
     S,
 )
+from reference.seeds import epoch_seeds
+from reference.verifiers import agree
 from rtshcua.evidence.chain import Recorder
 from rtshcua.ground.auditor.audit import audit
 from rtshcua.model.flat.contract import MotionKind
@@ -213,7 +215,7 @@ class Run:
         self.loaded = of or loaded()
         self.vehicle = vehicle or FakeVehicle()
         self.clock = ManualClock()
-        recorder = Recorder(lambda data: LOG_KEY.sign(data, duty=Duty.LOG), LOG_KEY.public)
+        recorder = Recorder(lambda data: LOG_KEY.sign(data, duty=Duty.LOG), LOG_KEY.public, epoch_seeds())
         self.lines = [
             recorder.genesis(
                 START,
@@ -303,7 +305,9 @@ def dispatches(actions: Sequence[Action]) -> list[Command]:
 def assert_audited(run: Run) -> None:
     """The closed log verifies with the root's key alone: each decision derives again, each dispatch is covered."""
     close = run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)
-    report = audit([*run.lines, close], ROOT_KEY.public).report
+    found = audit([*run.lines, close], ROOT_KEY.public)
+    agree(b"".join([*run.lines, close]), found, ROOT_KEY.public)
+    report = found.report
     assert report.failure is None, report.failure
     assert report.shortfall is None
 

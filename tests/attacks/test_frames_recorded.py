@@ -1,0 +1,207 @@
+"""Evidence before effect, against the raw frames: what the log's own signers left out, the telemetry still shows.
+
+The attacker holds all keys of the log: whatever is cut from it is signed anew, and so is the digest of the telemetry.
+"""
+
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from reference.flat_case import S
+from reference.forgery import ROOT_KEY, read, signed
+from reference.kept_frames import Entries, kept
+from rtshcua.evidence.finding import Finding
+from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.ground.auditor.frames import OURS, Frames
+from rtshcua.ground.auditor.sent import Nature, nature
+from rtshcua.ground.auditor.sent import read as read_frame
+from rtshcua.mavlink.frames import Codec
+from virtual import case
+from virtual.flight import Flight
+
+NAN = float("nan")
+
+
+@cache
+def flown(kind: str) -> tuple[tuple[bytes, ...], tuple[tuple[int, bytes], ...]]:
+    """A short flight: its lines, and its frames."""
+    flight = Flight(case.seal(case.mission(case.short_steps())), case.simulated(kind))
+    entries = kept(flight)
+    return tuple(flight.fly().lines), tuple(entries)
+
+
+def judged(lines: list[bytes] | tuple[bytes, ...], entries: Entries) -> Finding | None:
+    frames = Frames(iter(entries))
+    auditor = Auditor(ROOT_KEY, frames=frames)
+    for line in lines:
+        auditor.take(line)
+    assert auditor.audit().report.failure is None, auditor.audit().report.failure
+    return frames.over()
+
+
+def moment(lines: tuple[bytes, ...], event: str, step: int) -> int:
+    """When something happened to a step, UTC us."""
+    found = [read(line) for line in lines]
+    return next(each["utc_us"] for each in found if each.get("event") == event and each["step"] == step)
+
+
+def ours(message: object, system: int = 1, component: int = OURS) -> bytes:
+    return Codec(system, component).pack(message)
+
+
+def command(number: int, *parameters: float) -> bytes:
+    filled = [*parameters, *[0.0] * (7 - len(parameters))]
+    return ours(mavlink.MAVLink_command_long_message(1, 1, number, 0, *filled))
+
+
+def beside(kind: str, frame: bytes, when: Callable[[tuple[bytes, ...]], int]) -> str | None:
+    """The slug of what is found where a frame lies among those of a flight."""
+    lines, entries = flown(kind)
+    added = sorted([*entries, (when(lines), frame)], key=lambda entry: entry[0])
+    found = judged(lines, added)
+    return None if found is None else found.slug
+
+
+def before_takeoff(lines: tuple[bytes, ...]) -> int:
+    return moment(lines, "dispatched", 0) - S
+
+
+def on_the_way(lines: tuple[bytes, ...]) -> int:
+    return moment(lines, "dispatched", 1) + S
+
+
+def at_the_end(lines: tuple[bytes, ...]) -> int:
+    return int(read(lines[-1])["utc_us"]) + S
+
+
+COMMANDS = {
+    "arm": command(400, 1),
+    "arm by force": command(400, 1, 21_196),
+    "disarm": command(400, 0),
+    "land": command(176, 1, 4, 6),
+    "return": command(176, 1, 4, 5),
+    "take off": command(22, 0, 0, 0, NAN, NAN, NAN, 900),
+    "a mode of its own": command(176, 1, 2, 0),
+    "terminate the flight": command(185, 1),
+    "elsewhere": ours(
+        mavlink.MAVLink_command_int_message(1, 1, 0, 192, 0, 0, -1, 1, 0, NAN, 473_990_000, 85_460_000, 503)
+    ),
+    "by hand": ours(mavlink.MAVLink_manual_control_message(1, 0, 0, 900, 0, 0)),
+    "attitude": ours(mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 1)),
+    "a mission": ours(mavlink.MAVLink_mission_count_message(1, 1, 4, 0)),
+    "go there now": ours(
+        mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, 473_990_000, 85_460_000, 30, 1)
+    ),
+    "a parameter": ours(mavlink.MAVLink_param_set_message(1, 1, b"WPNAV_SPEED", 2_000, 9)),
+    "no fence in flight": ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_ENABLE", 0, 9)),
+    "a fence in flight": ours(mavlink.MAVLink_mission_clear_all_message(1, 1, 1)),
+}
+BEFORE = [name for name in COMMANDS if "in flight" not in name]
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_what_was_sent_is_what_was_recorded(kind: str) -> None:
+    lines, entries = flown(kind)
+    assert judged(lines, list(entries)) is None
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("name", BEFORE)
+def test_a_command_before_anything_was_permitted(kind: str, name: str) -> None:
+    frame = COMMANDS[name]
+    assert beside(kind, frame, before_takeoff) in ("frames/unrecorded", "frames/early")
+    assert beside(kind, frame, at_the_end) == "frames/unrecorded"
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_another_command_than_the_one_that_is_permitted(kind: str, name: str) -> None:
+    later = name == "return" and kind == "px4"  # which the last step permits, but not yet
+    assert beside(kind, COMMANDS[name], on_the_way) == ("frames/early" if later else "frames/other-command")
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_a_command_just_before_its_record(kind: str) -> None:
+    lines, kept_entries = flown(kind)
+    at_us = moment(lines, "dispatched", 0)
+    moved = [(at_us - 1, frame) if at == at_us and is_command(frame) else (at, frame) for at, frame in kept_entries]
+    assert moved != list(kept_entries)
+    for entries in (moved, sorted(moved, key=lambda entry: entry[0])):
+        found = judged(lines, entries)
+        assert found is not None
+        assert found.slug == "frames/early"
+        assert read(lines[found.record])["event"] == "dispatched"
+
+
+def is_command(octets: bytes) -> bool:
+    frame = read_frame(octets)
+    return frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("what", ["the whole last step", "its dispatch alone"])
+def test_a_dispatch_that_the_log_no_longer_has(kind: str, what: str) -> None:
+    lines, entries = flown(kind)
+    last = [
+        number
+        for number, line in enumerate(lines)
+        if read(line).get("step") == 2 and (what != "its dispatch alone" or read(line).get("event") == "dispatched")
+    ]
+    assert last
+    found = judged(signed([line for number, line in enumerate(lines) if number not in last]), list(entries))
+    assert found is not None
+    assert found.slug == "frames/unrecorded"
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        ours(mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 4, 6, 0, 0, 0, 0), component=190),
+        ours(mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 4, 6, 0, 0, 0, 0), system=255),
+        ours(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 0, 3)),
+        command(511, 33, 100_000),
+        command(401),
+        ours(mavlink.MAVLink_statustext_message(6, b"hello")),
+        b"",
+        b"\xfd\xff\x00",
+        b"\xfe" + bytes(20),
+    ],
+)
+def test_what_others_send_and_what_moves_nothing_does_not_count(frame: bytes) -> None:
+    for when in (before_takeoff, on_the_way, at_the_end):
+        assert beside("px4", frame, when) is None
+
+
+def test_a_fence_may_be_handed_over_before_the_flight_begins() -> None:
+    assert beside("ardupilot", COMMANDS["a fence in flight"], before_takeoff) is None
+    assert beside("ardupilot", COMMANDS["no fence in flight"], before_takeoff) is None
+
+
+def test_before_any_vehicle_was_heard_every_system_counts_as_ours() -> None:
+    lines, entries = flown("px4")
+    found = judged(lines, [(entries[0][0] - 1, COMMANDS["land"]), *entries])
+    assert found is not None
+    assert found.slug == "frames/unrecorded"
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("autopilot", [3, 12])
+def test_the_heartbeat_of_another_system_makes_nobody_blind(kind: str, late: bool, autopilot: int) -> None:
+    """Whoever reaches the link can send one: our frames are still held against the log."""
+    lines, entries = flown(kind)
+    heartbeat = Codec(77, 1).pack(mavlink.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3))
+    home = Codec(77, 1).pack(mavlink.MAVLink_global_position_int_message(1, 473_990_000, 85_460_000, 9, 8, 0, 0, 0, 0))
+    at_us = on_the_way(lines) - S if late else entries[0][0] - 1
+    others = [(at_us, heartbeat), (at_us, home)]
+    honest = sorted([*entries, *others], key=lambda entry: entry[0])
+    assert judged(lines, honest) is None
+    forged = (on_the_way(lines), COMMANDS["disarm"])
+    found = judged(lines, sorted([*honest, forged], key=lambda entry: entry[0]))
+    assert found is not None
+    assert found.slug == "frames/other-command"
+    elsewhere = (on_the_way(lines), ours(mavlink.MAVLink_command_long_message(77, 1, 400, 0, *[0] * 7), system=77))
+    found = judged(lines, sorted([*honest, elsewhere], key=lambda entry: entry[0]))
+    assert found is not None, "the system that was heard first may be the one that we flew"

@@ -1,0 +1,139 @@
+"""Threat: the vehicle is taken in flight, with the key of its present epoch. What was sealed before stays as it is."""
+
+import pytest
+
+from reference.forgery import (
+    LOG_KEY,
+    STRANGER,
+    captured,
+    edit,
+    expect,
+    flight,
+    prove,
+    public_of,
+    read,
+    seed_of,
+    signers,
+    write,
+)
+from reference.resealing import resealed
+from rtshcua.evidence.report import Verdict
+
+LINES = flight()
+SIGNED = signers(LINES)
+#: taken in the epoch that this signed record begins
+TAKEN = SIGNED[2]
+KEY = seed_of(read(LINES[TAKEN])["next_key"])
+BEFORE = [number for number in range(1, TAKEN) if number not in SIGNED]
+AFTER = [number for number in range(TAKEN + 1, len(LINES)) if number not in SIGNED]
+
+
+def by_the_thief(lines: list[bytes]) -> list[bytes]:
+    """All that can be done with the key of the epoch: from then on the thief names keys of its own."""
+    own = public_of(STRANGER).hex()
+    named = [
+        edit(line, next_key=own) if number > TAKEN and read(line)["type"] == "seal" else line
+        for number, line in enumerate(lines)
+    ]
+    return captured(named, KEY, STRANGER)
+
+
+def edited(number: int) -> list[bytes]:
+    return [*LINES[:number], edit(LINES[number], utc_error_us=1_001), *LINES[number + 1 :]]
+
+
+def closed_at(number: int) -> bytes:
+    """The close as it would be right after this record."""
+    return edit(LINES[-1], **{key: read(LINES[number])[key] for key in ("at_us", "utc_us")})
+
+
+def test_the_thief_signs_what_a_verifier_takes() -> None:
+    """Else these attacks would fail for the wrong reason."""
+    assert by_the_thief(list(LINES))[: TAKEN + 1] == list(LINES[: TAKEN + 1])
+    assert prove(by_the_thief(list(LINES))).report.verdict is Verdict.VERIFIED
+
+
+@pytest.mark.parametrize("number", BEFORE)
+def test_earlier_epochs_cannot_be_rewritten(number: int) -> None:
+    """Whatever is changed before, its epoch was sealed by a key that is gone."""
+    seal = next(each for each in SIGNED if each > number)
+    assert expect(by_the_thief(edited(number))) == ("seal/root", seal)
+
+
+@pytest.mark.parametrize("number", BEFORE)
+def test_nothing_can_be_taken_out_of_earlier_epochs(number: int) -> None:
+    seal = next(each for each in SIGNED if each > number)
+    assert expect(by_the_thief([*LINES[:number], *LINES[number + 1 :]])) == ("seal/size", seal - 1)
+
+
+def test_the_seals_of_earlier_epochs_cannot_be_moved() -> None:
+    """Two epochs made one, so that the thief's own key would seal what was sealed already."""
+    for number in SIGNED[1:3]:
+        slug, _ = expect(by_the_thief([*LINES[:number], *LINES[number + 1 :]]))
+        assert slug in ("seal/key", "seal/size")
+
+
+@pytest.mark.parametrize("number", AFTER)
+def test_the_present_epoch_can_be_rewritten_and_the_report_says_so(number: int) -> None:
+    """This is what the key is worth: what comes after the last seal. Only a witness outside tells."""
+    audit = prove(by_the_thief(edited(number)))
+    assert audit.report.verdict is Verdict.VERIFIED
+    assert any("unanchored tail" in claim.text for claim in audit.report.unproven)
+
+
+def test_the_end_cut_off_and_closed_by_the_thief() -> None:
+    """The thief may end the log early, where it was taken. Only a witness that saw more can tell."""
+    forged = by_the_thief([*LINES[: TAKEN + 1], closed_at(TAKEN)])
+    report = prove(forged).report
+    assert report.verdict is Verdict.VERIFIED
+    assert any("unanchored tail" in claim.text for claim in report.unproven)
+
+
+def test_a_rollback_to_an_earlier_checkpoint() -> None:
+    """The log ends at an older seal: nobody has the key to close it there."""
+    for back in SIGNED[:2]:
+        assert expect(by_the_thief([*LINES[: back + 1], closed_at(back)]))[0] == "seal/key"
+        assert expect(LINES[: back + 1]) == ("close/missing", back + 1)
+
+
+def test_a_rollback_that_goes_on_from_an_older_seal() -> None:
+    """What came after an older seal is written anew, and the seals that followed are left out."""
+    later = [line for number, line in enumerate(LINES) if number > SIGNED[1] and number not in SIGNED[2:-1]]
+    assert expect(by_the_thief([*LINES[: SIGNED[1] + 1], *later]))[0] in ("seal/key", "seal/missing")
+
+
+def test_a_recover_by_the_key_of_the_epoch() -> None:
+    """A recovery would let the thief discard what it likes: only the log key signs one."""
+    dropped = ("disclosure", "ending", "tlog")
+    recover = {name: value for name, value in read(closed_at(TAKEN)).items() if name not in dropped}
+    recover |= {"type": "recover", "discarded_bytes": 0, "discarded_digest": "00" * 32}
+    recover |= {"next_key": public_of(STRANGER).hex()}
+    log_key, turns = read(LINES[0])["log_key"], iter([b"", KEY])  # the genesis stays, the recover is the thief's
+    lines = [*LINES[: TAKEN + 1], write(recover | {"checkpoint": None}), closed_at(TAKEN)]
+    forged = resealed(lines, lambda public: next(turns) if public == log_key else b"")
+    assert forged[: TAKEN + 1] == list(LINES[: TAKEN + 1])
+    assert expect(forged) == ("seal/key", TAKEN + 1)
+
+
+def test_the_log_key_alone_writes_all_of_it_anew() -> None:
+    """No epoch key is needed: who holds the log key names them. Where it lies aboard, only a witness tells."""
+    own, secret = public_of(STRANGER).hex(), LOG_KEY.private.private_bytes_raw()
+    named = [edit(line, next_key=own) if "next_key" in read(line) else line for line in edited(1)]
+    forged = captured(named, secret, STRANGER)
+    report = prove(forged).report
+    assert report.verdict is Verdict.VERIFIED
+    assert any(f"unanchored tail: {len(LINES)} records" in claim.text for claim in report.unproven)
+
+
+@pytest.mark.parametrize("number", [AFTER[0], SIGNED[1] + 1])
+def test_the_log_key_alone_cuts_the_log_anywhere_and_calls_it_a_crash(number: int) -> None:
+    own, secret = public_of(STRANGER).hex(), LOG_KEY.private.private_bytes_raw()
+    close = read(closed_at(number - 1))
+    recover = {name: value for name, value in close.items() if name not in ("disclosure", "ending", "tlog")}
+    recover |= {"type": "recover", "discarded_bytes": 0, "discarded_digest": "00" * 32, "next_key": own}
+    forged = captured([*LINES[:number], write(recover), closed_at(number - 1)], secret, STRANGER)
+    assert forged[:number] == list(LINES[:number])
+    report = prove(forged).report
+    assert report.verdict is Verdict.VERIFIED
+    assert "recovered" in [claim.slug for claim in report.unproven]
+    assert any("unanchored tail" in claim.text for claim in report.unproven)

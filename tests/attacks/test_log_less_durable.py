@@ -1,0 +1,37 @@
+"""A runtime that waits for no disk: its log says so, and the audit names the first decision that went out unkept."""
+
+import pytest
+
+from reference.forgery import edit, expect, flight, prove, read, signed
+from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
+
+
+def decisions() -> list[tuple[int, int, str, int]]:
+    """(record, step, outcome, durability) of the decisions about steps."""
+    found = [(number, read(line)) for number, line in enumerate(flight())]
+    return [
+        (number, each["step"], each["outcome"], each["durability"])
+        for number, each in found
+        if each["type"] == "decision" and each["kind"] == 0
+    ]
+
+
+def test_what_arms_is_on_the_disk_first_and_the_rest_soon() -> None:
+    assert [(step, outcome, durability) for _, step, outcome, durability in decisions()] == [
+        (0, "allow", SYNCED_FIRST),
+        (1, "allow", SYNCED),
+        (2, "allow", SYNCED),
+    ]
+    assert prove(flight()).report.failure is None
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize("claimed", [BUFFERED, WRITTEN, SYNCED, SYNCED_FIRST])
+def test_a_decision_that_was_kept_less_well_or_says_so(number: int, claimed: int) -> None:
+    record, _, _, durability = decisions()[number]
+    lines = list(flight())
+    lines[record] = edit(lines[record], durability=claimed)
+    if claimed == durability:
+        assert prove(signed(lines)).report.failure is None
+    else:
+        assert expect(signed(lines)) == ("decision/durability", record)

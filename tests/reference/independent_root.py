@@ -1,0 +1,179 @@
+"""The trust root read a second time: COSE_Sign1 and deterministic CBOR with nothing but the standard library.
+
+Written apart from `rtshcua.wire`, for `independent_verifier`. RFC 9052 section 4.4, RFC 8949 section 4.2.1.
+"""
+
+import hashlib
+from dataclasses import dataclass
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+_CONTENT = "application/vnd.rtshcua.root+cbor"
+_KEY_FIELDS = {"duty", "public", "roles", "sources", "vehicles", "expires_us", "development"}
+_ROOT_FIELDS = {"version", "development", "issued_at_us", "expires_at_us", "keys", "thresholds"}
+
+
+class Untrusted(Exception):
+    """The root is not what the pinned key signed, or says what no root may say."""
+
+
+@dataclass(frozen=True)
+class Root:
+    """What a verifier of logs needs of a root: its keys, and how many witnesses must sign."""
+
+    keys: list[dict]
+    witnesses: int
+
+    def public(self, duty: str, vehicle: str, now_us: int) -> list[bytes]:
+        """The keys of a duty that speak for a vehicle at a UTC time."""
+        return [
+            key["public"]
+            for key in self.keys
+            if key["duty"] == duty
+            and (vehicle in key["vehicles"] or "*" in key["vehicles"])
+            and (key["expires_us"] is None or now_us < key["expires_us"])
+        ]
+
+
+def key_id(duty: str, public: bytes) -> bytes:
+    """The name of a key (section 7)."""
+    return hashlib.sha256(b"rtshcua/key\0rtshcua/duty/" + duty.encode() + b"\0" + public).digest()[:16]
+
+
+def holds(public: bytes, signature: bytes, message: bytes) -> bool:
+    """Whether an Ed25519 signature holds."""
+    try:
+        Ed25519PublicKey.from_public_bytes(public).verify(signature, message)
+    except (InvalidSignature, ValueError):
+        return False
+    return True
+
+
+def open_root(envelope: bytes, pinned: bytes, now_us: int) -> Root:
+    """The root, if the pinned root key (32 octets, or its name of 16) signed it. Raises `Untrusted`."""
+    try:
+        return _open(envelope, pinned, now_us)
+    except (AttributeError, KeyError, TypeError) as error:
+        raise Untrusted("not of the form of a root") from error
+
+
+def _open(envelope: bytes, pinned: bytes, now_us: int) -> Root:
+    if envelope[:1] != b"\xd2":
+        raise Untrusted("no COSE_Sign1")
+    match _whole(envelope[1:]):
+        case [bytes(protected), {**free}, bytes(payload), bytes(signature)] if not free and len(signature) == 64:
+            pass
+        case _:
+            raise Untrusted("not the four parts of a COSE_Sign1")
+    headers = _whole(protected)
+    if not isinstance(headers, dict) or set(headers) != {1, 3, 4} or headers[1] != -19 or headers[3] != _CONTENT:
+        raise Untrusted("other headers")
+    body = _body(payload)
+    keys = body["keys"]
+    signer = next((key for key in keys if key["duty"] == "root" and key_id("root", key["public"]) == headers[4]), None)
+    if signer is None or pinned not in (signer["public"], headers[4]):
+        raise Untrusted("not signed by the pinned key")
+    signed = _head(4, 4) + _text("Signature1") + _bytes(protected) + _bytes(b"rtshcua/duty/root") + _bytes(payload)
+    if not holds(signer["public"], signature, signed):
+        raise Untrusted("the signature does not hold")
+    if now_us >= body["expires_at_us"] or (signer["expires_us"] is not None and now_us >= signer["expires_us"]):
+        raise Untrusted("expired")
+    return Root(keys, body["thresholds"].get("witness", 1))
+
+
+def _body(payload: bytes) -> dict:
+    match _whole(payload):
+        case ["rtshcua/root", 1, {**body}] if set(body) == _ROOT_FIELDS:
+            pass
+        case _:
+            raise Untrusted("not a trust root, version 1")
+    for key in body["keys"]:
+        if set(key) != _KEY_FIELDS or len(key["public"]) != 32:
+            raise Untrusted("not a key")
+        if key["development"] and not body["development"]:
+            raise Untrusted("a development key")
+    if body["version"] < 1 or body["expires_at_us"] <= body["issued_at_us"]:
+        raise Untrusted("contradicts itself")
+    if len({key["public"] for key in body["keys"]}) != len(body["keys"]):
+        raise Untrusted("a key named twice")
+    if any(n != 1 for duty, n in body["thresholds"].items() if duty != "witness"):
+        raise Untrusted("a threshold other than 1")
+    return body
+
+
+def _head(major: int, n: int) -> bytes:
+    if n < 24:
+        return bytes([major << 5 | n])
+    for size, info in ((1, 24), (2, 25), (4, 26), (8, 27)):
+        if n < 1 << 8 * size:
+            return bytes([major << 5 | info]) + n.to_bytes(size)
+    raise Untrusted("too large")
+
+
+def _bytes(data: bytes) -> bytes:
+    return _head(2, len(data)) + data
+
+
+def _text(text: str) -> bytes:
+    return _head(3, len(text.encode())) + text.encode()
+
+
+def _encode(value: object) -> bytes:
+    match value:
+        case None:
+            return b"\xf6"
+        case bool():
+            return b"\xf5" if value else b"\xf4"
+        case int():
+            return _head(0, value) if value >= 0 else _head(1, ~value)
+        case bytes():
+            return _bytes(value)
+        case str():
+            return _text(value)
+        case list():
+            return _head(4, len(value)) + b"".join(map(_encode, value))
+        case dict():
+            pairs = sorted((_encode(key), _encode(item)) for key, item in value.items())
+            return _head(5, len(pairs)) + b"".join(key + item for key, item in pairs)
+    raise Untrusted("no such value")
+
+
+def _whole(data: bytes) -> object:
+    """The one item of `data`; canonical, for it is the encoding of what was read."""
+    try:
+        value, end = _item(data, 0, 0)
+        canonical = end == len(data) and _encode(value) == data
+    except (IndexError, UnicodeError, TypeError) as error:
+        raise Untrusted("no CBOR") from error
+    if not canonical:
+        raise Untrusted("not canonical CBOR")
+    return value
+
+
+def _item(data: bytes, at: int, depth: int) -> tuple[object, int]:
+    if depth > 32:
+        raise Untrusted("nested too deep")
+    major, info = data[at] >> 5, data[at] & 31
+    at += 1
+    if major == 7:
+        if info not in (20, 21, 22):
+            raise Untrusted("no such value")
+        return {20: False, 21: True, 22: None}[info], at
+    if info > 27 or major == 6:
+        raise Untrusted("no such item")
+    size = 0 if info < 24 else 1 << (info - 24)
+    n = info if size == 0 else int.from_bytes(data[at : at + size])
+    at += size
+    if major < 2:
+        return (n if major == 0 else ~n), at
+    if n > len(data) - at:
+        raise Untrusted("longer than what follows")
+    if major < 4:
+        part = data[at : at + n]
+        return (part if major == 2 else part.decode()), at + n
+    items = []
+    for _ in range(n if major == 4 else 2 * n):
+        item, at = _item(data, at, depth + 1)
+        items.append(item)
+    return (items if major == 4 else dict(zip(items[::2], items[1::2], strict=True))), at

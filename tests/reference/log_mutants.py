@@ -1,0 +1,81 @@
+"""Every small change of a log of 200 records, and every verifier's word on each: none may take one for the log."""
+
+import copyreg
+import io
+from copy import deepcopy
+from functools import cache
+from hashlib import sha256
+
+from reference import independent_verifier
+from reference.forgery import flight, read
+from reference.log_vectors import WITNESSES, anchor, close, effect, genesis, log, seal, sealing, times
+from reference.verifiers import ROOT_KEY, careful, independent, quick_accepts
+from rtshcua.adapters.files.logs import lines
+from rtshcua.evidence.verify import Verifier
+
+copyreg.pickle(type(sha256()), lambda hasher: (hasher.copy, ()))
+
+RECORDS = 200
+
+
+@cache
+def whole() -> tuple[bytes, ...]:
+    """A log of 200 records: decisions and effects, seals, an anchor, a recovery, texts that need escapes."""
+    decision = next(read(line) for line in flight() if read(line)["type"] == "decision")
+    records, epoch = [genesis()], 0
+    while len(records) < RECORDS - 1:
+        number = len(records)
+        if number == RECORDS // 2:
+            epoch += 1
+            again = {"discarded_bytes": 7, "discarded_digest": "5a" * 32, "next_key": seal(0, epoch)["next_key"]}
+            records.append(sealing("recover", number, **again) | times(number))
+        elif number % 23 == 0:
+            epoch += 1
+            records.append(seal(number, epoch))
+        elif number == 31:
+            note = anchor(log(*records[:24])[23], [*WITNESSES][:2])
+            records.append(effect(number, event="anchored", detail=note))
+        elif number % 5 == 0:
+            records.append(decision | times(number))
+        else:
+            records.append(effect(number, detail='"\\\n\u00e9\U0001f681' if number % 5 == 0 else "", token=number))
+    return tuple(log(*records, close(RECORDS, disclosure="ab" * 32)))
+
+
+def flipped(data: bytes, at: int) -> bytes:
+    """One bit changed, of each byte another one."""
+    return data[:at] + bytes([data[at] ^ 1 << at % 8]) + data[at + 1 :]
+
+
+class Verifiers:
+    """The careful and the independent verifier, each ready to go on before every line of the log, and the quick one.
+
+    What a change does shows after it: so nobody need read the lines before it again. (Trust is another matter: what is
+    changed in the genesis goes through everything.)
+    """
+
+    def __init__(self) -> None:
+        self.lines = whole()
+        careful, other = Verifier(), independent_verifier.Walk(ROOT_KEY)
+        self._before: list[tuple[Verifier, independent_verifier.Walk]] = []
+        for line in self.lines:
+            self._before.append((careful, other))
+            careful, other = deepcopy(careful), deepcopy(other)
+            assert careful.take(line)
+            other.line(line)
+
+    def judge(self, number: int, rest: bytes) -> tuple[str, str, bool]:
+        """What they say if from a line on there are these octets: two words, and whether the quick one accepts."""
+        data = b"".join(self.lines[:number]) + rest
+        if number == 0:
+            return careful(data).report.verdict.value, independent(data), quick_accepts(data)
+        one, other = deepcopy(self._before[number])
+        for line in lines(io.BytesIO(rest)):
+            one.take(line)
+            if one.failure is not None:
+                break
+        return one.report().verdict.value, other.verdict(rest).kind, quick_accepts(data)
+
+
+#: words for what is no closed log
+REJECTED = {("failed", "broken"), ("failed", "untrusted"), ("failed", "anchor"), ("incomplete", "incomplete")}

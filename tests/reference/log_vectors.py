@@ -1,0 +1,234 @@
+"""The test vectors of docs/log-format.md: logs, keys and what is to come out, made without `rtshcua.evidence`.
+
+`python tests/reference/log_vectors.py` writes them to tests/vectors/log, always the same octets.
+"""
+
+import json
+import sys
+from base64 import b64encode
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+if __package__ in (None, ""):
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+from reference.forgery import LOG_KEY, flight, public_of, read, resealed, seed_of
+from reference.independent_note import read_note
+from reference.independent_verifier import disclosed, leaf, merkle
+from reference.resealing import Fields, line_of
+from rtshcua.wire.keys import ANY, Duty, SigningKey
+from rtshcua.wire.trust import Thresholds, TrustRoot
+from virtual import case
+
+FOLDER = Path(__file__).parents[1] / "vectors" / "log"
+WITNESSES = {f"rtshcua/witness/{n}": bytes([0xA0 + n]) * 32 for n in (1, 2, 3)}
+SECRET = b"\x5e" * 32
+MONOTONIC_US, UTC_US = 7_000_000, case.flat.ISSUED + 60_000_000
+NULL = "0" * 64
+
+
+@cache
+def root() -> bytes:
+    """A trust root with three witnesses, two of which must have cosigned."""
+    made, _ = case.root()
+    witnesses = [SigningKey.from_seed(seed, duty=Duty.WITNESS, development=True) for seed in WITNESSES.values()]
+    keys = [key for key in made.keys if key.duty is not Duty.WITNESS]
+    keys += [key.verification(vehicles=(ANY,)) for key in witnesses]
+    return TrustRoot(
+        version=1, development=True, issued_at_us=made.issued_at_us, expires_at_us=made.expires_at_us,
+        keys=tuple(keys), thresholds=Thresholds(witness=2),
+    ).sign(case.KEYS[Duty.ROOT])  # fmt: skip
+
+
+def times(ms: int, begun_us: int = MONOTONIC_US) -> Fields:
+    """Number and link to be filled in, and the moment some milliseconds after the start."""
+    at_us = begun_us + ms * 1000
+    return {"_prev": NULL, "seq": 0, "at_us": at_us, "utc_us": UTC_US + ms * 1000, "utc_error_us": 1_000}
+
+
+def _epoch(number: int) -> str:
+    """The key of an epoch, as `reference.seeds` draws the secrets."""
+    return public_of((number + 1).to_bytes(32)).hex()
+
+
+def genesis(**fields: object) -> Fields:
+    """A genesis at 0 ms."""
+    first = read(flight()[0]) | times(0)
+    return first | {"root": b64encode(root()).decode(), "next_key": _epoch(0)} | fields
+
+
+def effect(ms: int, **fields: object) -> Fields:
+    """An effect after some milliseconds."""
+    made: Fields = {"type": "effect", "event": "note", "detail": "", "durability": 1}
+    return made | dict.fromkeys(("kind", "link", "step", "token"), -1) | times(ms) | fields
+
+
+def sealing(kind: str, ms: int, **fields: object) -> Fields:
+    """A signed record of a kind, all to be filled in."""
+    made = {"type": kind, "bytes": 0, "checkpoint": None, "digest": NULL, "epoch": 0, "records": 0}
+    return made | times(ms) | fields
+
+
+def seal(ms: int, number: int, **fields: object) -> Fields:
+    """A seal that names the key of epoch `number`."""
+    return sealing("seal", ms, next_key=_epoch(number)) | fields
+
+
+def close(ms: int, **fields: object) -> Fields:
+    """A close."""
+    return sealing("close", ms, disclosure=None, ending="completed", tlog=None) | fields
+
+
+def log(*records: Fields) -> list[bytes]:
+    """The lines of these records, numbered, linked and signed."""
+    return resealed(map(line_of, records), seed_of)
+
+
+def sealed() -> list[bytes]:
+    """Four epochs, one of them empty; texts that JCS is particular about; a disclosure root."""
+    odd = 'quote " backslash \\ tab \t bell \x07 delete \x7f line \u2028 \u00e9 \U0001f681 <&>/'
+    records = [
+        genesis(), effect(10), effect(20, detail=odd), effect(20, event="landed", durability=2), seal(30, 1),
+        seal(40, 2), *(effect(50 + n, token=n) for n in range(5)), seal(9_000, 3), effect(29_000),
+    ]  # fmt: skip
+    lines = log(*records)
+    disclosure = merkle([disclosed(line, n, SECRET) for n, line in enumerate(lines)]).hex()
+    return log(*records, close(29_001, disclosure=disclosure, tlog="ab" * 32))
+
+
+def recovered() -> tuple[list[bytes], bytes]:
+    """A log that was torn, and closed after a restart of the machine; and what was discarded."""
+    records = [genesis(), effect(10), seal(20, 1), effect(30), effect(40)]
+    torn = log(*records, effect(50))[-1][:200]
+    again = {"discarded_bytes": len(torn), "discarded_digest": sha256(torn).hexdigest(), "next_key": _epoch(2)}
+    anew = times(90_000, 1_000_000 - 90_000_000)
+    recover = sealing("recover", 0, **again) | anew
+    return log(*records, recover, close(0, ending="recovered") | anew | {"at_us": 1_000_400}), torn
+
+
+def anchor(line: bytes, names: Sequence[str], time_s: int = UTC_US // 1_000_000 + 3) -> str:
+    """The checkpoint of a signed record with cosignatures of these witnesses."""
+    note = read(line)["checkpoint"]
+    text = note.partition("\n\n")[0] + "\n"
+    for name in names:
+        key = Ed25519PrivateKey.from_private_bytes(WITNESSES[name])
+        ident = sha256(name.encode() + b"\n\x04" + key.public_key().public_bytes_raw()).digest()[:4]
+        signature = key.sign(f"cosignature/v1\ntime {time_s}\n{text}".encode())
+        note += f"\u2014 {name} {b64encode(ident + time_s.to_bytes(8) + signature).decode()}\n"
+    return note
+
+
+def anchored() -> tuple[list[bytes], bytes]:
+    """Two of three witnesses saw the first seal (recorded), one of them the second (beside the log)."""
+    one, two, _ = WITNESSES
+    head = [genesis(), effect(10), seal(20, 1)]
+    note = anchor(log(*head)[-1], [one, two])
+    records = [*head, effect(30, event="anchored", detail=note), seal(40, 2), effect(50), close(60)]
+    lines = log(*records)
+    return lines, (anchor(lines[4], [one]) + "\n").encode()
+
+
+def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
+    """Name, which rule of the page is broken, lines."""
+    good = sealed()
+    text = good[1]
+    yield "chain", "3: a record edited", [*good[:1], text.replace(b'"note"', b'"nose"'), *good[2:]]
+    yield "not_canonical", "1: a space", [*good[:1], text.replace(b",", b", ", 1), *good[2:]]
+    yield "duplicate_key", "1: a key twice", [*good[:1], text.replace(b'"seq":1', b'"seq":1,"seq":1'), *good[2:]]
+    yield "after_close", "6: a record after the close", [*good, good[1]]
+    edited = [*good[:1], line_of(read(text) | {"detail": "edited"}), *good[2:]]
+    yield "rehashed", "5: root", resealed(edited, seed_of, keep=("checkpoint",))
+    yield "later_key", "2: sealed by a later key", _with_key(good, 2)
+    yield "stripped", "2: no signature", [*good[:-1], line_of(read(good[-1]) | {"checkpoint": None})]
+    yield "unsealed", "3: more than 20 s and no seal", log(genesis(), effect(20_001), close(20_002))
+    yield "clock", "4: monotonic time goes back", log(genesis(), effect(10), effect(9), close(20))
+    yield "utc_jump", "4: the clocks part", log(genesis(), effect(10, utc_us=UTC_US + 2_011_000), close(20))
+    yield "origin", "2: the origin of another boot", _with_text(good, lambda _, text: text.replace("00\n", "01\n", 1))
+    larger = _with_text(good, lambda n, text: text.replace(f"\n{n}\n", f"\n{n + 1}\n", 1))
+    yield "size", "2: the size one too large", larger
+    zeros = f"after {'A' * 43}=\n"
+    other = _with_text(good, lambda n, text: text if n != 4 else text.rpartition("after ")[0] + zeros)
+    yield "after", "2: it names another checkpoint than the one before", other
+    left = _with_text(good, lambda n, text: text if n != 4 else text.rpartition("after ")[0])
+    yield "after_none", "2: it names no checkpoint before", left
+    yield "wrong_kid", "5, step 2: the name of another key", log(genesis(log_kid="00" * 16), close(10))
+    yield "second_genesis", "1: a genesis that is not line 0", log(genesis(), genesis(), close(10))
+
+
+def _with_text(lines: list[bytes], text: Callable[[int, str], str]) -> list[bytes]:
+    """Every checkpoint says what `text` makes of it, and is signed."""
+    return resealed(lines, seed_of, text=text)
+
+
+def _with_key(lines: list[bytes], epoch: int) -> list[bytes]:
+    """The first epoch sealed by the key of another."""
+    own = read(lines[0])["next_key"]
+    return resealed(lines, lambda public: (epoch + 1).to_bytes(32) if public == own else seed_of(public))
+
+
+def expected(lines: list[bytes]) -> Fields:
+    """What every reader must find in a log that holds."""
+    leaves = [leaf(line) for line in lines]
+    signed = {}
+    for number, line in enumerate(lines):
+        record = read(line)
+        if "checkpoint" in record:
+            note = read_note(record["checkpoint"])
+            signed[str(number)] = {
+                "root": note.root.hex(), "record": note.record.hex(), "key": note.key.hex() if note.key else None,
+                "after": note.after.hex() if note.after else None, "note": record["checkpoint"],
+            }  # fmt: skip
+    return {
+        "lines": len(lines),
+        "leaves": [each.hex() for each in leaves],
+        "root": merkle(leaves).hex(),
+        "roots": [merkle(leaves[:n]).hex() for n in range(len(leaves) + 1)],
+        "signed": signed,
+    }
+
+
+def made() -> dict[str, bytes]:
+    """All files by name."""
+    whole, torn = recovered()
+    witnessed, beside = anchored()
+    odd = log(genesis(vehicle="M\u00f6we 7/+~%"), effect(10), close(20))
+    logs = {
+        "closed": (list(flight()), "closed", 0),
+        "sealed": (sealed(), "closed", 0),
+        "named": (odd, "closed", 0),
+        "recovered": (whole, "closed", 0),
+        "anchored": (witnessed, "closed", 2),
+        "cut": (sealed()[:-2], "incomplete", 0),
+        "torn": ([*sealed()[:7], sealed()[7][:100]], "incomplete", 0),
+    }
+    files = {f"{name}.jsonl": b"".join(lines) for name, (lines, _, _) in logs.items()}
+    files["anchored.anchors"] = beside
+    files["recovered.discarded"] = torn
+    of: Fields = {
+        name: {"verdict": verdict, "anchored": size} | expected([line for line in lines if line.endswith(b"\n")])
+        for name, (lines, verdict, size) in logs.items()
+    }
+    rejected = {}
+    for name, why, lines in _rejected():
+        rejected[name] = why
+        files[f"rejected/{name}.jsonl"] = b"".join(lines)
+    keys = {
+        "root": {"public": case.KEYS[Duty.ROOT].public.hex(), "kid": case.KEYS[Duty.ROOT].kid.hex()},
+        "log": {"seed": LOG_KEY.private.private_bytes_raw().hex(), "public": LOG_KEY.public.hex()},
+        "epochs": [{"seed": n.to_bytes(32).hex(), "public": public_of(n.to_bytes(32)).hex()} for n in range(1, 13)],
+        "witnesses": {n: {"seed": s.hex(), "public": public_of(s).hex()} for n, s in WITNESSES.items()},
+        "secret": SECRET.hex(),
+    }
+    for name, value in (("keys", keys), ("expected", of), ("rejected", rejected)):
+        files[f"{name}.json"] = json.dumps(value, indent=1, ensure_ascii=False).encode() + b"\n"
+    return files
+
+
+if __name__ == "__main__":
+    (FOLDER / "rejected").mkdir(parents=True, exist_ok=True)
+    for file, data in made().items():
+        (FOLDER / file).write_bytes(data)

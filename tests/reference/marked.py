@@ -1,0 +1,26 @@
+"""What a trusted witness makes of the checkpoints of a log: anchors."""
+
+import json
+from collections.abc import Sequence
+
+from rtshcua.evidence.witnessing.cosign import cosign
+from rtshcua.evidence.witnessing.submission import anchor
+from rtshcua.wire.keys import Duty, SigningKey
+from virtual import case
+
+WITNESS = case.KEYS[Duty.WITNESS]
+
+
+def note_of(lines: Sequence[bytes], number: int) -> str:
+    """The checkpoint of a signed record."""
+    note: str = json.loads(lines[number])["checkpoint"]
+    return note
+
+
+def mark(note: str, key: SigningKey = WITNESS) -> str:
+    """The checkpoint, cosigned."""
+    text = note.rpartition("\n\n")[0] + "\n"
+    line = cosign(text, 1_750_000_000, key.public, lambda data: key.sign(data, duty=Duty.WITNESS))
+    made = anchor(note, line, [key.public])
+    assert made is not None
+    return made

@@ -1,0 +1,77 @@
+"""What the verifiers make of some octets: the careful one, the quick one, and the independent one."""
+
+import io
+from functools import lru_cache
+from itertools import pairwise
+
+from reference import independent_verifier
+from rtshcua.adapters.files.logs import lines
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.quick import outline, quick
+from rtshcua.evidence.records import Genesis
+from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.segments import scan
+from rtshcua.ground.auditor.audit import Audit, Auditor, anchors_of
+from rtshcua.ground.auditor.trust import Basis, establish
+from rtshcua.wire.keys import Duty
+from virtual import case
+
+ROOT_KEY = case.KEYS[Duty.ROOT].public
+#: words of the two for the same thing
+WORDS = {
+    Verdict.VERIFIED: ("closed",),
+    Verdict.INCOMPLETE: ("incomplete",),
+    Verdict.FAILED: ("broken", "untrusted", "anchor"),
+}
+#: findings of things that docs/log-format.md says nothing about: what the records and the bundle mean
+OF_MEANING = ("decision/", "dispatch/", "document/", "frames/", "trust/bundle-", "genesis/mission", "genesis/other")
+
+
+#: findings that only who held the keys can bring about, and that the quick verifier says it did not look for
+OF_FORM = ("record/", "clock/", "chain/sequence", "seal/missing", "genesis/repeated")
+
+
+def careful(data: bytes, pinned: bytes = ROOT_KEY, *, derive: bool = False) -> Audit:
+    """The careful verifier, line by line."""
+    auditor = Auditor(pinned, derive=derive)
+    for line in lines(io.BytesIO(data)):
+        if not auditor.take(line):
+            break
+    return auditor.audit()
+
+
+def quick_accepts(data: bytes, pinned: bytes = ROOT_KEY) -> bool:
+    """Whether the quick verifier says yes, by itself: it asks nobody else where it does not."""
+    log = outline(lambda offset, length: data[offset : offset + length], len(data))
+    if log is None:
+        return False
+    basis = _established(log.genesis, pinned)
+    if isinstance(basis, Flaw):
+        return False
+    parts = [scan(data[start:end]) for start, end in pairwise(log.offsets)]
+    return quick(log, parts, anchors_of(basis, log.genesis)) is not None
+
+
+@lru_cache(maxsize=64)
+def _established(genesis: Genesis, pinned: bytes) -> Basis | Flaw:
+    return establish(genesis, pinned)
+
+
+def independent(data: bytes, pinned: bytes = ROOT_KEY) -> str:
+    """The word of the independent verifier."""
+    return independent_verifier.verify(data, pinned).kind
+
+
+def agree(data: bytes, audit: Audit, pinned: bytes = ROOT_KEY) -> None:
+    """The independent verifier says what the audit does, as far as its page goes; the quick one takes nothing else."""
+    report = audit.report
+    slug = report.failure.slug if report.failure else ""
+    word = independent(data, pinned)
+    if slug.startswith(OF_MEANING):
+        assert word in ("closed", "incomplete"), (word, report.failure)
+    else:
+        assert word in WORDS[report.verdict], (word, report.failure)
+    if quick_accepts(data, pinned):
+        assert report.verdict is Verdict.VERIFIED or slug.startswith((*OF_MEANING, *OF_FORM)), report.failure
+    else:
+        assert report.verdict is not Verdict.VERIFIED

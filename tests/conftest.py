@@ -20,6 +20,8 @@ settings.load_profile("test")
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
 COVERING = ("unit/decision", "unit/wire", "unit/evidence", "unit/onboard", "attacks")
+#: and of those, the ones that take long and cover nothing more: on whole logs and flights
+NOT_COVERING = ("test_log_", "test_link_", "test_frames_", "test_agent_", "test_permit_", "test_tampered_")
 
 
 #: what they cover (`pyproject.toml` names it too)
@@ -66,6 +68,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     folders = tuple(CHECKOUT / "tests" / folder for folder in COVERING)
     for item in items:
         chosen = not getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
+        chosen = chosen and not (item.path.parent.name == "attacks" and item.path.name.startswith(NOT_COVERING))
         if not (chosen and any(item.path.is_relative_to(folder) for folder in folders)):
             item.add_marker("no_cover")
 

@@ -1,10 +1,15 @@
 """What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
 
+import gc
 import os
-from collections.abc import Generator
+import sys
+import sysconfig
+from collections.abc import Generator, Iterator
 from importlib import import_module
+from itertools import count
 from pathlib import Path
 from pkgutil import walk_packages
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -14,15 +19,17 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 
 # Wall time says nothing on a shared machine, so no deadline. `make test` tries the same examples everywhere;
 # `make soak` looks further, with new ones each time.
-# CI, with ten minutes for all, tries half as many.
-settings.register_profile("test", deadline=None, derandomize=True, max_examples=50 if os.environ.get("CI") else 100)
+settings.register_profile("test", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile("soak", deadline=None, max_examples=20_000)
 settings.load_profile("test")
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
-COVERING = ("unit/decision", "unit/wire", "unit/evidence", "unit/onboard", "attacks")
-#: and of those, the ones that take long and cover nothing more: on whole logs and flights
-NOT_COVERING = ("test_log_", "test_link_", "test_frames_", "test_agent_", "test_permit_", "test_tampered_")
+COVERING = ("unit/decision", "unit/wire", "unit/evidence")
+#: and the attacks that reach what these do not: documents in flight, proofs in files, witnesses' heads
+COVERING_ATTACKS = (
+    "test_approval", "test_proof_", "test_recall", "test_receipt_", "test_redacted_", "test_replacement",
+    "test_time_of_day_", "test_witness_",
+)  # fmt: skip
 
 
 #: what they cover (`pyproject.toml` names it too)
@@ -32,6 +39,29 @@ COVERED = ("rtshcua.decision", "rtshcua.evidence", "rtshcua.wire")
 def measuring(config: pytest.Config) -> Any:
     """What starts and stops measuring in pytest-cov; None without `--cov`."""
     return getattr(config.pluginmanager.getplugin("_cov"), "cov_controller", None)
+
+
+#: folders of what is installed that no process imports from
+NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "test", "tests")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Where no byte code may be kept, all processes of a run share theirs, away from the checkout.
+
+    What is installed has its byte code, and is linked to it; the rest is compiled by whoever comes first.
+    """
+    if hasattr(config, "workerinput") or not os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+        return
+    folder = TemporaryDirectory(prefix="rtshcua_byte_code_")
+    config.add_cleanup(folder.cleanup)
+    os.environ["PYTHONPYCACHEPREFIX"] = folder.name
+    for installed in {sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")}:
+        for path, folders, _ in os.walk(installed):
+            folders[:] = [each for each in folders if each not in NOT_IMPORTED]
+            kept = Path(folder.name, path.lstrip("/"))
+            kept.mkdir(parents=True, exist_ok=True)
+            for each in Path(path, "__pycache__").glob(f"*.{sys.implementation.cache_tag}.pyc"):
+                (kept / each.name).symlink_to(each)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -47,7 +77,23 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
-    """Importing is measured for what is covered, not for hundreds of test files."""
+    """Importing is measured for what is covered, not for hundreds of test files.
+
+    What is collected stays for as long as the process: looking for garbage in it, time and again, took a third of
+    collecting. What the tests make is looked through as ever, but for that in it that was there before them.
+    """
+    gc.disable()
+    try:
+        return (yield from collected(session))
+    finally:
+        gc.enable()
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(20_000, 20, 20)
+
+
+def collected(session: pytest.Session) -> Generator[None, object, object]:
+    """Collect, measuring no more than what is covered."""
     controller = measuring(session.config)
     if controller is None:
         return (yield)
@@ -61,16 +107,47 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
         controller.resume()
 
 
+class Turned(pytest.Dir):
+    """A folder of tests, from which each process of xdist takes another part first.
+
+    What pytest compiles of a test file it keeps for the others, so each file is compiled once, not by every process.
+    """
+
+    def collect(self) -> list[pytest.Item | pytest.Collector]:
+        found = list(super().collect())
+        worker = self.config.workerinput
+        first = len(found) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
+        return found[first:] + found[:first]
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    return Turned.from_parent(parent, path=path) if hasattr(parent.config, "workerinput") else None
+
+
+def spread(paths: set[Path], waiting: Path) -> dict[Path, tuple[float, Path]]:
+    """Where each file comes: those that wait much, for processes and for real time, among those that compute."""
+    groups = (
+        sorted(path for path in paths if path.is_relative_to(waiting)),
+        sorted(path for path in paths if not path.is_relative_to(waiting)),
+    )
+    return {path: (at / len(group), path) for group in groups for at, path in enumerate(group)}
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Coverage is measured by the tests that are for it, and among these by the cases that somebody chose.
 
     What only a random example reaches is covered by luck: it gets a case of its own.
     """
-    folders = tuple(CHECKOUT / "tests" / folder for folder in COVERING)
+    tests = CHECKOUT / "tests"
+    places = spread({item.path for item in items}, tests / "integration")
+    items.sort(key=lambda item: places[item.path])  # the same order in every process
+    covering = {
+        path: (path.is_relative_to(tests / "attacks") and path.name.startswith(COVERING_ATTACKS))
+        or any(path.is_relative_to(tests / folder) for folder in COVERING)
+        for path in {item.path for item in items}
+    }  # fmt: skip
     for item in items:
-        chosen = not getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
-        chosen = chosen and not (item.path.parent.name == "attacks" and item.path.name.startswith(NOT_COVERING))
-        if not (chosen and any(item.path.is_relative_to(folder) for folder in folders)):
+        if not covering[item.path] or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
             item.add_marker("no_cover")
 
 
@@ -80,17 +157,19 @@ def checkout() -> Path:
     return CHECKOUT
 
 
-@pytest.fixture(scope="session", autouse=True)
-def byte_code(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Where no byte code may be kept, processes that tests start share what they compile, away from the checkout."""
-    if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
-        os.environ["PYTHONPYCACHEPREFIX"] = str(tmp_path_factory.getbasetemp() / "byte_code")
+@pytest.fixture(scope="session")
+def worlds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A new folder each time, numbered here: pytest looks for a free number through all that there are, every time."""
+    top = tmp_path_factory.mktemp("data")
+    return (top / str(number) for number in count())
 
 
 @pytest.fixture(autouse=True)
-def own_world(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+def own_world(worlds: Iterator[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """No test sees or touches the keys, the replay state or the terminal settings of whoever runs it."""
-    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(tmp_path_factory.mktemp("data")))
+    world = next(worlds)
+    world.mkdir(mode=0o700)
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(world))
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setenv("TZ", "UTC")

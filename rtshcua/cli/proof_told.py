@@ -1,13 +1,11 @@
 """How the verification of a proof is told: to a person, and as JSON."""
 
-import os
-import sys
 from pathlib import Path
-from textwrap import wrap
 from typing import TypeAlias
 
 import msgspec
 
+from rtshcua.cli.claims import WIDTH, listed, write
 from rtshcua.cli.pin import Pin
 from rtshcua.cli.shown import many, plain, shorten, utc
 from rtshcua.diagnostics.exits import ExitCode
@@ -20,7 +18,6 @@ from rtshcua.evidence.records import encode
 
 Told: TypeAlias = Proven | Received | Flaw
 
-_WIDTH = 100
 _SHOWN = 160
 _HELPS = {"trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key"}
 
@@ -80,8 +77,8 @@ def as_text(result: Told, path: Path, pinned: Pin, *, kept: bool, first: bool) -
         proven, unproven = claims(result)
         if kept:
             proven.append(Claim("checkpoint", "the checkpoint that you kept is one of this log"))
-        lines += _claims("Proven", "green", "+", proven) + _claims("Not proven", "yellow", "-", unproven)
-    _print(lines)
+        lines += listed("Proven", "green", "+", proven) + listed("Not proven", "yellow", "-", unproven)
+    write(lines)
 
 
 def claims(result: Proven | Received) -> tuple[list[Claim], list[Claim]]:
@@ -148,27 +145,6 @@ def _fields(result: Proven | Received) -> list[tuple[str, str]]:
     lines = []
     for key, value in (record or {}).items():
         text = value if isinstance(value, str) else msgspec.json.encode(value).decode()
-        shown = utc(value) if key == "utc_us" and isinstance(value, int) else shorten(plain(text), _WIDTH)
+        shown = utc(value) if key == "utc_us" and isinstance(value, int) else shorten(plain(text), WIDTH)
         lines.append(("", f"  {key:<16} {shown}"))
     return [("", ""), ("bold", f"Record {result.number}"), *lines] if lines else []
-
-
-def _claims(title: str, style: str, mark: str, claims: list[Claim]) -> list[tuple[str, str]]:
-    lines = [("", ""), ("bold", title)]
-    for claim in claims:
-        head, *more = wrap(plain(claim.text), _WIDTH)
-        lines += [(style, f"  {mark} {head}"), *((style, f"    {line}") for line in more)]
-    return lines
-
-
-def _print(lines: list[tuple[str, str]]) -> None:
-    if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
-        for _, text in lines:
-            print(text)
-        return
-    from rich.console import Console
-    from rich.text import Text
-
-    console = Console(highlight=False)
-    for style, text in lines:
-        console.print(Text(text, style))

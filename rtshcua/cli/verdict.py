@@ -1,16 +1,15 @@
 """How the audit of a log is told: to a person, and as JSON."""
 
-import os
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from textwrap import wrap
 
+from rtshcua.cli.claims import WIDTH, listed, write
 from rtshcua.cli.flown import lasted_us
 from rtshcua.cli.pin import Pin
 from rtshcua.cli.shown import plain, shorten, utc
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.finding import Claim, Finding
+from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.ground.auditor.audit import Audit
 
@@ -43,7 +42,6 @@ _HELPS = {
     "trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key",
 }
 
-_WIDTH = 100
 _SHOWN = 160
 _TITLES = {
     Verdict.VERIFIED: ("VERIFIED", "bold green"),
@@ -114,8 +112,8 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
         lines.append((style, f"{title}  at record {finding.record}, line {finding.record + 1}: {finding.slug}"))
         lines += _why(finding, failed=report.failure is not None)
     lines += _counts(report)
-    lines += _claims("shown", "green", "+", report.proven) + _claims("not shown", "yellow", "-", report.unproven)
-    _print(lines)
+    lines += listed("shown", "green", "+", report.proven) + listed("not shown", "yellow", "-", report.unproven)
+    write(lines)
 
 
 def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
@@ -130,7 +128,7 @@ def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
 
 def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
     kind = finding.slug.partition("/")[0]
-    yield from (("", f"  {line}") for line in wrap(plain(finding.text), _WIDTH))
+    yield from (("", f"  {line}") for line in wrap(plain(finding.text), WIDTH))
     if finding.offset >= 0:
         yield "", f"  begins    at byte {finding.offset} of the log"
     if finding.expected:
@@ -138,7 +136,7 @@ def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
     if finding.found:
         yield "", f"  found     {shorten(plain(finding.found), _SHOWN)}"
     meaning = (MEANINGS if failed else _SHORT)[kind]
-    yield from (("", f"  {line}") for line in wrap(meaning, _WIDTH))
+    yield from (("", f"  {line}") for line in wrap(meaning, WIDTH))
     if finding.slug in _HELPS:
         yield "", f"  help      {_HELPS[finding.slug]}"
 
@@ -168,26 +166,3 @@ def _counts(report: Report) -> Iterable[tuple[str, str]]:
 
 def _many(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
-
-
-def _claims(title: str, style: str, mark: str, claims: tuple[Claim, ...]) -> list[tuple[str, str]]:
-    if not claims:
-        return []
-    lines = [("", ""), ("bold", title)]
-    for claim in claims:
-        head, *more = wrap(plain(claim.text), _WIDTH)
-        lines += [(style, f"  {mark} {head}"), *((style, f"    {line}") for line in more)]
-    return lines
-
-
-def _print(lines: Iterable[tuple[str, str]]) -> None:
-    if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
-        for _, text in lines:
-            print(text)
-        return
-    from rich.console import Console
-    from rich.text import Text
-
-    console = Console(highlight=False)
-    for style, text in lines:
-        console.print(Text(text, style))

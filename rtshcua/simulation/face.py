@@ -63,6 +63,8 @@ class Face:
 
     def _collect(self) -> list[bytes]:
         a, outbox = self._autopilot, self._autopilot.outbox
+        if not outbox:
+            return []
         frames = [a.signing.seal(self._codec.pack(message), a.now_us) for message in outbox]
         outbox.clear()
         return frames

@@ -62,7 +62,7 @@ class Surroundings:
 
     def is_hit(self, body: Body) -> bool:
         """Whether the vehicle has flown into something."""
-        return any(pillar.is_hit(body) for pillar in self.pillars)
+        return bool(self.pillars) and any(pillar.is_hit(body) for pillar in self.pillars)
 
     def _nearest(self, body: Body, bearing: float, least: float | None) -> float | None:
         for pillar in self.pillars:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from reference.forgery import flight
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.keys import Duty
 from virtual import case
-from virtual.flight import Flight
 
 ROOT = case.KEYS[Duty.ROOT].public.hex()
 PATIENCE_S = 60
@@ -51,7 +51,6 @@ def test_a_pipe_is_refused_and_not_waited_for(words: list[str], tmp_path: Path) 
     [("mission.bundle", ExitCode.INPUT), ("telemetry.tlog", ExitCode.INPUT), ("log.anchors", ExitCode.OK)],
 )
 def test_a_pipe_beside_a_log_keeps_nobody_waiting(name: str, code: ExitCode, tmp_path: Path) -> None:
-    flight = Flight(case.seal(case.mission(case.short_steps())), case.simulated("px4"))
-    (tmp_path / "log.jsonl").write_bytes(b"".join(flight.fly().lines))
+    (tmp_path / "log.jsonl").write_bytes(b"".join(flight()))
     os.mkfifo(tmp_path / name)
     assert said("verify-log", "--root", ROOT, "--audit", tmp_path).returncode == code

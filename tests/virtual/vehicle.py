@@ -24,6 +24,10 @@ class VirtualClock:
         self.elapsed_us = 0
         self._start = start
 
+    @property
+    def monotonic_us(self) -> int:
+        return self._start.monotonic_us + self.elapsed_us
+
     def now(self) -> Now:
         start = self._start
         return Now(start.monotonic_us + self.elapsed_us, start.utc_us + self.elapsed_us, start.utc_error_us)
@@ -56,7 +60,7 @@ class VirtualVehicle:
         events, self._pending = self._pending, []
         end_us = self.clock.elapsed_us + timeout_us
         while True:
-            happened, frames = self.driver.tick(self.clock.now().monotonic_us)
+            happened, frames = self.driver.tick(self.clock.monotonic_us)
             events += happened
             self._send(frames, events)
             if self.clock.elapsed_us >= end_us or any(not isinstance(event, Readings) for event in events):
@@ -86,7 +90,7 @@ class VirtualVehicle:
     def _take(self, datagrams: Sequence[bytes], events: list[Event]) -> None:
         for original in datagrams:
             for datagram in self.hurt(original):
-                heard = self.driver.receive(datagram, self.clock.now().monotonic_us)
+                heard = self.driver.receive(datagram, self.clock.monotonic_us)
                 self.received += len(heard.frames)
                 events += heard.events
                 self._send(heard.answers, events)

@@ -17,6 +17,7 @@ from time import process_time_ns
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.generate import GRAMMAR, lark
 from rtshcua.ground.language.load import load
+from rtshcua.ground.language.parse import parse
 from rtshcua.mavlink import dialect
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import mission_payload, policy_digest, policy_payload
@@ -89,7 +90,7 @@ def compiled(text: str) -> int:
     def read(path: str) -> bytes:
         return data if path == "large.rts" else Path(path).read_bytes()
 
-    program = load(["large.rts"], read, str(ROOT))
+    program = load(["large.rts"], read, str(ROOT), parse=parse)
     found = compile_program(program, dialect.load(), mission="flight_0", issued_at_us=0)
     assert found.policy is not None, found.diagnostics
     assert found.mission is not None

@@ -106,7 +106,7 @@ def start_up() -> None:
     )
     runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, check=True) for _ in range(5)]
     model, parser = (median(float(run.stdout.split()[at]) for run in runs) for at in (0, 1))
-    print(f"parse: importing takes {parser:.0f} ms, after {model:.0f} ms for the IR and pydantic; Lark is not imported")
+    print(f"parse: importing takes {parser:.0f} ms, after {model:.0f} ms for the IR; Lark is not imported")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.sign import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.digest import BUNDLE, digest
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.untrusted import Untrusted
@@ -119,6 +120,7 @@ def _described(
         "digest": digest(BUNDLE, data).hex(),
         "mission": mission.name,
         "policy": f"{policy.name}@{policy.version}",
+        "policy_digest": policy_digest(policy_payload(policy)).hex(),
         "vehicle": policy.vehicle.identity,
         "steps": len(mission.invocations),
         "policy_key": signers[0].kid.hex(),

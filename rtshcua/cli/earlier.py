@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from rtshcua.cli.asked import SOURCE, SPECIFICATION, Unusable, unfolded
 from rtshcua.cli.faults import code_of
-from rtshcua.cli.programs import SOURCE, SPECIFICATION, Unusable, programs, unfolded
-from rtshcua.cli.showing.bundle import claimed
+from rtshcua.cli.programs import programs
 from rtshcua.cli.sources import examine
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
@@ -45,6 +45,8 @@ def _bundled(path: Path) -> Earlier | Unusable:
     except OSError as error:
         why = (error.strerror or "it is unreadable").lower()
         return Unusable(ExitCode.INPUT, "since", f"cannot read `{path}`: {why}")
+    from rtshcua.cli.showing.bundle import claimed  # brings cryptography
+
     try:
         return Earlier(str(path), (claimed(data).policy,))
     except Untrusted as error:

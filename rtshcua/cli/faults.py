@@ -160,10 +160,15 @@ def of_each(paths: Iterable[Path], work: Callable[[Path, bool], ExitCode]) -> Ex
     return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
 
 
-def _words_of(error: OSError) -> str:
-    """What the system says, as our messages are written: "no such file or directory: `x.rts`"."""
+def words_of(error: OSError) -> str:
+    """What the system says, as our messages are written."""
     words = error.strerror or str(error) or "the system gave no reason"
-    words = words[:1].lower() + words[1:]
+    return words[:1].lower() + words[1:]
+
+
+def _words_of(error: OSError) -> str:
+    """What the system says, and of which file: "no such file or directory: `x.rts`"."""
+    words = words_of(error)
     return f"{words}: `{error.filename}`" if error.filename is not None else words
 
 

@@ -27,6 +27,16 @@ class Code:
 REGISTRY: dict[str, Code] = {}
 
 
+def code_named(name: str) -> Code | None:
+    """The code with this id or slug."""
+    return REGISTRY.get(name) or next((code for code in REGISTRY.values() if code.slug == name), None)
+
+
+def can_be_ignored(code: Code) -> bool:
+    """Whether `lint` may be told to ignore findings of a code: never errors, nor what is said of ignores themselves."""
+    return code.severity is not Severity.ERROR and code not in (UNUSED_IGNORE, IGNORE_WITHOUT_REASON, UNKNOWN_IGNORE)
+
+
 def _code(id: str, slug: str, meaning: str, severity: Severity = Severity.ERROR) -> Code:
     assert id not in REGISTRY, id
     code = REGISTRY[id] = Code(id, slug, meaning, severity)
@@ -225,7 +235,7 @@ FLEETING_EVIDENCE = _code(
 )
 TWO_DURABILITIES = _code("E1205", "two-durabilities", "a contract asks for records of more than one durability")
 
-# E13: habits
+# E13: habits, which `lint` looks for
 UNUSED = _code("E1301", "unused", "something is declared and never used", Severity.WARNING)
 NAMING = _code("E1302", "naming", "a name is not written as names are", Severity.WARNING)
 BROAD_AUTHORITY = _code(
@@ -235,3 +245,40 @@ REPEATED_NUMBER = _code(
     "E1304", "repeated-number", "the same number stands for the same thing in several places", Severity.WARNING
 )
 UNUSED_IMPORT = _code("E1305", "unused-import", "a file is imported and nothing of it is used", Severity.WARNING)
+GATES_NOTHING = _code(
+    "E1306", "gates-nothing", "a policy refuses nothing that its skills can be asked for", Severity.WARNING
+)
+IDLE_AIRSPACE = _code(
+    "E1307",
+    "idle-airspace",
+    "a zone of the airspace makes no difference wherever the vehicle can come",
+    Severity.WARNING,
+)
+UNBOUNDED_PLACE = _code(
+    "E1308", "unbounded-place", "a permit lets a skill fly to any place that it is asked to", Severity.WARNING
+)
+UNUSED_IGNORE = _code("E1309", "unused-ignore", "an ignore ignores nothing", Severity.WARNING)
+IGNORE_WITHOUT_REASON = _code("E1310", "ignore-without-reason", "an ignore does not say why", Severity.WARNING)
+UNKNOWN_IGNORE = _code(
+    "E1311", "unknown-ignore", "an ignore names what is no code, or what cannot be ignored", Severity.WARNING
+)
+KEPT_FROM_LANDING = _code(
+    "E1312", "kept-from-landing", "a `degrade` turns a request to land into a flight", Severity.WARNING
+)
+
+# E14: tests and where they start from
+NO_NOMINAL = _code("E1401", "no-nominal", "a test starts from no nominal, or does not say from which")
+INCOMPLETE_TEST = _code("E1402", "incomplete-test", "a test or its nominal does not say enough to decide")
+UNKNOWN_REASON = _code("E1403", "unknown-reason", "no decision has a reason of that name")
+NEVER_DECIDED = _code("E1404", "never-decided", "a test expects what is never decided")
+ROW_CELLS = _code("E1405", "row-cells", "a row of a table has more or fewer cells than the table has columns")
+GIVEN_TWICE = _code("E1406", "given-twice", "a test gives the same signal, condition or argument twice")
+SAME_TEST = _code("E1407", "same-test", "two tests of a file are called the same")
+NOT_GIVEN = _code("E1408", "not-given", "a test asks for what reads a signal that it does not give", Severity.WARNING)
+WITHOUT_EFFECT = _code("E1409", "without-effect", "a test gives what its policy does not read", Severity.WARNING)
+UNKNOWN_CLAUSE = _code("E1410", "unknown-clause", "a test quotes a clause that nothing decides by")
+NOT_MET = _code("E1411", "not-met", "the decision is not the one that a test expects")
+
+# E15: how sources are laid out
+NOT_FORMATTED = _code("E1501", "not-formatted", "a source is not laid out in the one style", Severity.WARNING)
+UNSAFE_FORMAT = _code("E1502", "unsafe-format", "laying a source out anew would change what it says")

@@ -58,3 +58,34 @@ class Reason(StrEnum):
 #: reasons by their number on the wire
 WIRE_REASONS: tuple[Reason, ...] = tuple(Reason)
 REASON_NUMBERS: dict[Reason, int] = {reason: number for number, reason in enumerate(WIRE_REASONS)}
+
+_DEFERS = frozenset(
+    {
+        Reason.CLOCK_UNCERTAIN,
+        Reason.FORBID_UNKNOWN,
+        Reason.AWAITING_APPROVAL,
+        Reason.PHASE_NOT_REACHED,
+        Reason.STATE_UNKNOWN,
+        Reason.SAFETY_UNKNOWN,
+    }
+)
+_FALLS_BACK = frozenset(
+    {
+        Reason.NO_SLACK,
+        Reason.STATE_VIOLATED,
+        Reason.ENVELOPE,
+        Reason.AIRSPACE,
+        Reason.INVARIANT,
+        Reason.ENERGY,
+        Reason.DEGRADED,
+    }
+)
+
+
+def outcome_of(reason: Reason) -> Outcome:
+    """The one outcome that a decision for this reason has (design 4.1)."""
+    if reason is Reason.ADMITTED:
+        return Outcome.ALLOW
+    if reason in _DEFERS:
+        return Outcome.DEFER
+    return Outcome.FALLBACK if reason in _FALLS_BACK else Outcome.DENY

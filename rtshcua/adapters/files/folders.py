@@ -12,6 +12,12 @@ def data_folder() -> Path:
     return Path(chosen) if chosen else platformdirs.user_data_path("rtshcua", appauthor=False)
 
 
+def lint_secret_folder() -> Path:
+    """Where the secret is kept that guards what `lint` remembers."""
+    chosen = os.environ.get("RTSHCUA_DATA_DIR")
+    return Path(chosen) if chosen else platformdirs.user_state_path("rtshcua", appauthor=False)
+
+
 def state_folder() -> Path:
     """Where the replay state is kept, unless `--state-dir` says otherwise."""
     return data_folder() / "state"

@@ -7,7 +7,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.scope import Argument, Entry, Scope
-from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.checker.values import typed
 from rtshcua.model.ir.expression import Coordinates, Reference, Value
@@ -58,6 +58,7 @@ def pair(
                     argument.name.span,
                     f"`{skill.name.text}` has no parameter `{name}`",
                     help=suggestion(name, known) or takes,
+                    fix=correction(report, argument.name.span, name, known),
                     labels=declared,
                 )
                 continue

@@ -6,10 +6,12 @@ from rtshcua.ground.checker.checks import (
     fallbacks,
     missions,
     names,
+    nominals,
     parameters,
     policies,
     records,
     signals,
+    tests,
     times,
     vehicles,
     zones,
@@ -29,6 +31,8 @@ CHECKS = (
     times,
     records,
     durability,
+    nominals,
+    tests,
 )
 
 

@@ -47,10 +47,13 @@ class Context:
     samples: tuple[Rule, ...] = ()
     data: DataFiles = field(default_factory=DataFiles)
     _arguments: dict[int, tuple[Parametric, dict[str, Argument]]] = field(default_factory=dict)
+    _plain: Scope | None = None
 
     def scope(self) -> Scope:
         """Signals and zones, and no argument."""
-        return Scope(self.symbols, self.report)
+        if self._plain is None:
+            self._plain = Scope(self.symbols, self.report)
+        return self._plain
 
     def arguments(self, skill: Parametric) -> dict[str, Argument]:
         """The parameters of a skill, a template or a mission that have a type, by name."""

@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.checker.types import HEIGHT, number
+from rtshcua.ground.checker.symbols import correction, suggestion
+from rtshcua.ground.checker.types import HEIGHT, Type, number
 from rtshcua.ground.checker.values import typed
 from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
 from rtshcua.model.flat.zone import HIGHEST, MAX_COORDINATE
@@ -37,7 +37,7 @@ def quantity(
     context: Context, node: Quantity | None, dimension: Dimension, *, positive: bool = True, most: int | None = None
 ) -> None:
     """Report a field that is no quantity of `dimension`, not above zero where it must be, or larger than fits."""
-    if node is None or typed(context.scope(), node, number(dimension)) is None:
+    if node is None or not _is(context, node, number(dimension)):
         return
     size(context, node, dimension, node.value, most)
     if node.value < 0 or (positive and node.value == 0):
@@ -53,14 +53,19 @@ def quantity(
 def height(context: Context, node: Quantity | None) -> None:
     """Report a field that is no altitude, above home or above sea."""
     expected = HEIGHT if node is None or node.datum is not Datum.SEA else ABOVE_SEA
-    if node is not None and typed(context.scope(), node, expected) is not None:
+    if node is not None and _is(context, node, expected):
         size(context, node, Dimension.ALTITUDE, node.value)
 
 
 def elevation(context: Context, node: Quantity | None) -> None:
     """Report a field that is no altitude above sea."""
-    if node is not None and typed(context.scope(), node, ABOVE_SEA) is not None:
+    if node is not None and _is(context, node, ABOVE_SEA):
         size(context, node, Dimension.ALTITUDE, node.value, MAX_ELEVATION)
+
+
+def _is(context: Context, node: Quantity, expected: Type) -> bool:
+    """Whether a number is of a type; reports it where it is not."""
+    return number(node.dimension, node.datum) is expected or typed(context.scope(), node, expected) is not None
 
 
 def size(context: Context, node: Node, dimension: Dimension, value: int, most: int | None = None) -> bool:
@@ -86,6 +91,7 @@ def one_of(context: Context, code: Code, name: Name, known: Collection[str], wha
         name.span,
         f"there is no {what} `{name.text}`",
         help=suggestion(name.text, known) or "there are " + ", ".join(f"`{each}`" for each in known),
+        fix=correction(context.report, name.span, name.text, known),
     )
     return False
 

@@ -5,12 +5,13 @@ from typing import TypeVar
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.symbols import WORDS, Declaration, suggestion
+from rtshcua.ground.checker.symbols import WORDS, Declaration, correction, suggestion
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.tests import NominalDecl
 
 D = TypeVar("D", bound=Declaration)
 
@@ -33,6 +34,11 @@ def find_policy(context: Context, name: Name) -> PolicyDecl | None:
 def find_template(context: Context, name: Name) -> TemplateDecl | None:
     """The template of that name."""
     return _find(context, name, context.symbols.templates, TemplateDecl)
+
+
+def find_nominal(context: Context, name: Name) -> NominalDecl | None:
+    """The nominal of that name."""
+    return _find(context, name, context.symbols.nominals, NominalDecl)
 
 
 def find_vehicle(context: Context, name: Name) -> VehicleDecl | None:
@@ -67,6 +73,7 @@ def _find(context: Context, name: Name, table: Mapping[str, D], kind: type[D]) -
             name.span,
             f"nothing declares {asked} `{name.text}`",
             help=suggestion(name.text, table),
+            fix=correction(context.report, name.span, name.text, table),
         )
     else:
         context.report.add(
@@ -74,6 +81,7 @@ def _find(context: Context, name: Name, table: Mapping[str, D], kind: type[D]) -
             name.span,
             f"`{name.text}` is {WORDS[type(other)]}, where {asked} is asked",
             help=suggestion(name.text, table),
+            fix=correction(context.report, name.span, name.text, table),
             labels=[(other.name.span, "declared here")],
         )
     return None

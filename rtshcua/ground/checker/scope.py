@@ -8,7 +8,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.dialect import DATUM
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.symbols import Symbols, suggestion
+from rtshcua.ground.checker.symbols import Symbols, correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, ZONE, Enumeration, Kind, Type, number
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
@@ -126,7 +126,13 @@ class Scope:
                 )
                 return
         known = [*self.arguments, *self.symbols.signals, *self.symbols.zones, LOCAL_TIME, PHASE]
-        self.report.add(codes.UNKNOWN_NAME, span, f"nothing declares `{name}`", help=suggestion(name, known))
+        self.report.add(
+            codes.UNKNOWN_NAME,
+            span,
+            f"nothing declares `{name}`",
+            help=suggestion(name, known),
+            fix=correction(self.report, span, name, known),
+        )
 
 
 def enumeration_of(declaration: EnumDecl) -> Enumeration:

@@ -3,15 +3,23 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.checker.report import Report
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
-Declaration = EnumDecl | SignalDecl | ZoneDecl | VehicleDecl | SkillDecl | TemplateDecl | PolicyDecl | MissionDecl
+Declaration = (
+    EnumDecl | SignalDecl | ZoneDecl | VehicleDecl | SkillDecl | TemplateDecl | PolicyDecl | MissionDecl | NominalDecl
+)
+
+#: a fix as `Report.add` takes it: the span, the replacement and a title
+Correction = tuple[Span, str, str]
 
 #: how a kind of declaration is called in a message
 WORDS: Mapping[type, str] = {
@@ -23,6 +31,7 @@ WORDS: Mapping[type, str] = {
     TemplateDecl: "a template",
     PolicyDecl: "a policy",
     MissionDecl: "a mission",
+    NominalDecl: "a nominal",
 }
 
 
@@ -30,6 +39,7 @@ WORDS: Mapping[type, str] = {
 class Symbols:
     """The declarations of a program by name, all kinds in one name space, and once more by kind.
 
+    `tests` are those of the file that was asked for, which has them run; they are called by texts, not by names.
     `broken` are the names whose declarations have a syntax error: nothing is known of them, and nothing is said.
     """
 
@@ -43,6 +53,8 @@ class Symbols:
     templates: dict[str, TemplateDecl] = field(default_factory=dict)
     policies: dict[str, PolicyDecl] = field(default_factory=dict)
     missions: dict[str, MissionDecl] = field(default_factory=dict)
+    nominals: dict[str, NominalDecl] = field(default_factory=dict)
+    tests: tuple[TestDecl, ...] = ()
     broken: frozenset[str] = frozenset()
 
     def _declare(self, declarations: Sequence[Declaration], table: dict[str, Declaration]) -> None:
@@ -66,7 +78,9 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
     Units come in the order in which files are reached, those that were asked for first.
     """
     symbols = Symbols(broken=broken)
-    for unit in units:
+    for number, unit in enumerate(units):
+        if not number:
+            symbols.tests = unit.tests
         for declarations, table in (
             (unit.enums, symbols.enums),
             (unit.signals, symbols.signals),
@@ -76,6 +90,7 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
             (unit.templates, symbols.templates),
             (unit.policies, symbols.policies),
             (unit.missions, symbols.missions),
+            (unit.nominals, symbols.nominals),
         ):
             symbols._declare(declarations, table)  # type: ignore[arg-type]
     return symbols
@@ -85,3 +100,14 @@ def suggestion(word: str, known: Iterable[str], about: str = "") -> str | None:
     """`did you mean ...?` for a word that is not among the known ones; `about` are words that stand around it."""
     near = nearest(word, known, about)
     return None if near is None else f"did you mean `{near}`?"
+
+
+def correction(report: Report, span: Span, word: str, known: Iterable[str], about: str = "") -> Correction | None:
+    """What `suggestion` says as a fix of the text under a span: None where it says nothing, or where the text is not
+    the word itself, bare or in quotation marks, but was brought about elsewhere.
+    """
+    near = nearest(word, known, about)
+    written = report.raw(span)
+    if near is None or written not in (word, f'"{word}"'):
+        return None
+    return span, written.replace(word, near), f"write `{near}`"

@@ -2,13 +2,14 @@
 
 import re
 from fractions import Fraction
+from functools import lru_cache
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.arithmetic import arithmetic, function
 from rtshcua.ground.checker.fitting import fit, stored
 from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, Scope
-from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import MISSION_PHASE, POSITION, TIME_OF_DAY, Enumeration, Type, Typed, number
 from rtshcua.model.ir.expression import (
     Arithmetic,
@@ -39,7 +40,7 @@ def typed(
 def _infer(scope: Scope, node: Value, expected: Type | None) -> Typed | None:
     match node:
         case Quantity():
-            return Typed(number(node.dimension, node.datum), Fraction(node.value))
+            return Typed(number(node.dimension, node.datum), _exactly(node.value))
         case Reference():
             return _reference(scope, node, expected)
         case Arithmetic():
@@ -55,6 +56,11 @@ def _infer(scope: Scope, node: Value, expected: Type | None) -> Typed | None:
             return Typed(TIME_OF_DAY, Fraction(node.value))
         case Coordinates():
             return Typed(POSITION, None)
+
+
+@lru_cache(maxsize=1 << 12)
+def _exactly(value: int) -> Fraction:
+    return Fraction(value)
 
 
 def _parted(scope: Scope, node: Arithmetic) -> bool:
@@ -107,6 +113,7 @@ def unknown_member(scope: Scope, span: Span, name: str, enumeration: Enumeration
         span,
         f"`{name}` is not a value of `{enumeration.name}`",
         help=suggestion(name, enumeration.members) or f"its values are {members}",
+        fix=correction(scope.report, span, name, enumeration.members),
         labels=[(enumeration.declared, f"`{enumeration.name}` is declared here")],
     )
 

@@ -92,6 +92,11 @@ class Conditions:
         text, source, start, end = self._files.place(quoted.span)
         return Clause(text, source, start, end, tuple(code.integers))
 
+    def monitors_of(self, operand: Condition, kind: MonitorKind, window_us: int) -> tuple[int, ...]:
+        """The monitors that an operand which was lowered is kept by: one for each safe side that was asked for."""
+        keys = ((id(operand), kind, window_us, safe) for safe in (True, False))
+        return tuple(sorted({self._monitored[key] for key in keys if key in self._monitored}))
+
     def _condition(self, code: Code, node: Condition, place: Place, safe: bool) -> None:
         match node:
             case Not():

@@ -34,6 +34,10 @@ class Files:
         """The span that a place on board came from."""
         return Span(tuple(self._index)[file], start, end)
 
+    def text(self, span: Span) -> str:
+        """All of the text under a span, on one line."""
+        return self._report.text(span)
+
     @property
     def names(self) -> tuple[str, ...]:
         """The files' names, as they are signed."""

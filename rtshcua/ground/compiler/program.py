@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from rtshcua.decision.prepare import Malformed, prepare
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
@@ -18,11 +19,13 @@ from rtshcua.ground.compiler.bounds import Bounds, bounds_of, most
 from rtshcua.ground.compiler.closure import Imports, beside
 from rtshcua.ground.compiler.mission import lower_mission
 from rtshcua.ground.compiler.policy import LoweredPolicy, lower_policy
-from rtshcua.ground.compiler.proofs.prove import prove_mission, prove_policy
+from rtshcua.ground.compiler.proofs.prove import prove_mission, prove_policy, refused
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.elaborate.elaborate import elaborate
 from rtshcua.ground.elaborate.settings import Settings
 from rtshcua.ground.language.load import Program
+from rtshcua.ground.testing.case import Case, Tested
+from rtshcua.ground.testing.cases import cases_of
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
@@ -57,6 +60,7 @@ class Checked:
     diagnostics: tuple[Diagnostic, ...]
     bounds: Mapping[str, Bounds]
     policies: tuple[LoweredPolicy, ...] = ()
+    grounds: tuple[Ground, ...] = ()  # the same, prepared as on board, with what was asked about them
 
 
 def compile_program(
@@ -70,7 +74,7 @@ def compile_program(
     settings = settings or Settings()
     candidates = _candidates(program)
     name = mission if mission is not None or len(candidates) != 1 else candidates[0].name.text
-    run = _Run(program, dialect, issued_at_us, name, settings)
+    run = Compilation(program, dialect, issued_at_us, name, settings)
     run.check()
     chosen = run.choose(mission)
     compiled = run.lowered(chosen)
@@ -85,14 +89,23 @@ def check_program(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
     return examine_program(program, dialect).diagnostics
 
 
+def check_declared(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
+    """The findings on declarations alone, without lowering or proofs: for an editor, which asks at every keystroke."""
+    run = Compilation(program, dialect, 0)
+    run.check()
+    return run.diagnostics()
+
+
 def examine_program(program: Program, dialect: Dialect) -> Checked:
     """All findings on a program, and the bounds of its missions."""
-    run = _Run(program, dialect, 0)
+    run = Compilation(program, dialect, 0)
     run.check()
     run.lowered(None)
+    run.cases()
     if run.report.failed():
         return Checked(run.diagnostics(), {})
-    return Checked(run.diagnostics(), run.bounds, tuple(each.lowered for each in run.grounds()))
+    grounds = tuple(run.grounds())
+    return Checked(run.diagnostics(), run.bounds, tuple(each.lowered for each in grounds), grounds)
 
 
 def _candidates(program: Program) -> list[MissionDecl]:
@@ -101,8 +114,8 @@ def _candidates(program: Program) -> list[MissionDecl]:
     return first or [mission for unit in program.units for mission in unit.missions]
 
 
-class _Run:
-    """One compilation."""
+class Compilation:
+    """One compilation: `check` first, then what is asked of it, then `diagnostics`."""
 
     def __init__(
         self,
@@ -122,6 +135,7 @@ class _Run:
         self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], Ground | None] = {}
+        self._tested: dict[tuple[str, str], Tested | None] = {}
         data = DataFiles(program.data, program.data_names)
         self.context = Context(collect(program.units, program.broken), self.report, dialect, data=data)
         if self.whole:
@@ -204,18 +218,64 @@ class _Run:
         """Lower a policy that no mission is under, for the first vehicle that it imports."""
         if any(name == policy.name.text for name, _ in self._policies):
             return
-        files = self._imports.closure(policy.span.file)
-        vehicle = next((each for each in self.context.symbols.vehicles.values() if each.span.file in files), None)
+        vehicle = self._imported_vehicle(policy)
         if vehicle is not None:
             self._policy(policy, vehicle)
+
+    def _imported_vehicle(self, policy: PolicyDecl) -> VehicleDecl | None:
+        files = self._imports.closure(policy.span.file)
+        return next((each for each in self.context.symbols.vehicles.values() if each.span.file in files), None)
 
     def _policy(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Ground | None:
         key = (policy.name.text, vehicle.name.text)
         if key not in self._policies:
-            files = self._imports.closure(policy.span.file)
-            stable = self.program.stable
-            own = stable.get(policy.span.file, policy.span.file)
-            names = {file: beside(stable.get(file, file), own) for file in (*files, *self.program.data)}
-            lowered = lower_policy(self.context, policy, vehicle, files, names)
+            lowered = self._unproved(policy, vehicle)
             self._policies[key] = None if lowered is None else prove_policy(self.context, lowered)
         return self._policies[key]
+
+    def unproved(self) -> None:
+        """Lower every mission and every policy, and prove nothing: what is found without waiting for proofs."""
+        if self.report.failed():
+            return
+        symbols = self.context.symbols
+        for mission in self.context.missions():
+            under = self._under_test(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
+            if under is not None:
+                lower_mission(self.context, mission, under.lowered, self.program.stable, self.issued_at_us)
+        for policy in symbols.policies.values():
+            vehicle = self._imported_vehicle(policy)
+            if vehicle is not None and all(name != policy.name.text for name, _ in self._tested):
+                self._under_test(policy, vehicle)
+
+    def cases(self) -> tuple[Case, ...]:
+        """What the tests of the file that was asked for come to, if nothing is wrong with the declarations."""
+        if self.report.failed() or not self.context.symbols.tests:
+            return ()
+        return tuple(cases_of(self.context, self._under_test, self.program.stable))
+
+    def _under_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
+        """A policy as tests need it; None where it has errors. It is not proved for them."""
+        key = (policy.name.text, vehicle.name.text)
+        if key not in self._tested:
+            proved = self._policies.get(key)
+            self._tested[key] = (
+                self._unproved_test(policy, vehicle) if proved is None else Tested(proved.lowered, proved.prepared)
+            )
+        return self._tested[key]
+
+    def _unproved_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
+        lowered = self._unproved(policy, vehicle)
+        prepared = None if lowered is None else prepare(lowered.policy)
+        if lowered is None or prepared is None:
+            return None
+        if isinstance(prepared, Malformed):
+            refused(self.context, lowered, prepared)
+            return None
+        return Tested(lowered, prepared)
+
+    def _unproved(self, policy: PolicyDecl, vehicle: VehicleDecl) -> LoweredPolicy | None:
+        files = self._imports.closure(policy.span.file)
+        stable = self.program.stable
+        own = stable.get(policy.span.file, policy.span.file)
+        names = {file: beside(stable.get(file, file), own) for file in (*files, *self.program.data)}
+        return lower_policy(self.context, policy, vehicle, files, names)

@@ -140,18 +140,18 @@ def _permit(delegation: Delegation, permit: Rule) -> Rule | None:
     if skills is None or through is None:
         return None
     changes = {"skills": skills, "through": through, "when": _both(permit.when, delegation.when)}
-    return _for_grantee(delegation, permit).model_copy(update=changes)
+    return _for_grantee(delegation, permit).copied(**changes)
 
 
 def _forbid(delegation: Delegation, forbid: Rule) -> Rule | None:
     skills = _shared(delegation, forbid)
     if skills is None or _names(forbid.roles, delegation.grantee.text):
         return None
-    return _for_grantee(delegation, forbid).model_copy(update={"skills": skills})
+    return _for_grantee(delegation, forbid).copied(skills=skills)
 
 
 def _for_grantee(delegation: Delegation, rule: Rule) -> Rule:
-    return rule.model_copy(update={"roles": (delegation.grantee,), "origin": (delegation, *rule.origin)})
+    return rule.copied(roles=(delegation.grantee,), origin=(delegation, *rule.origin))
 
 
 def _shared(delegation: Delegation, rule: Rule) -> tuple[Name, ...] | None:

@@ -40,11 +40,9 @@ def elaborate(
     missions = _Missions(context, closure, chosen, settings or Settings())
     seen: set[str] = set()
     found = [
-        unit.model_copy(
-            update={
-                "policies": tuple(_policy(context, policy, seen) for policy in unit.policies),
-                "missions": tuple(missions.elaborated(mission) for mission in unit.missions),
-            }
+        unit.copied(
+            policies=tuple(_policy(context, policy, seen) for policy in unit.policies),
+            missions=tuple(missions.elaborated(mission) for mission in unit.missions),
         )
         if unit.policies or unit.missions
         else unit
@@ -73,7 +71,7 @@ def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
             parts.append((use.span.start, rules))
     parts.sort(key=lambda part: part[0])
     plain = tuple(rule for _, rules in parts for rule in rules)
-    return policy.model_copy(update={"rules": delegated(context, policy, plain, whole=whole)})
+    return policy.copied(rules=delegated(context, policy, plain, whole=whole))
 
 
 class _Missions:

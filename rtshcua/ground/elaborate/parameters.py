@@ -184,7 +184,7 @@ def _instance(mission: MissionDecl, values: Mapping[str, Value]) -> Instance:
     for parameter in mission.parameters:
         value = values[parameter.name.text]
         labels.append((parameter.span, f"with `{parameter.name.text} = {_words(value)}`"))
-    return Instance(mission.model_copy(update={"phases": phases}), tuple(labels))
+    return Instance(mission.copied(phases=phases), tuple(labels))
 
 
 def _words(value: Value) -> str:

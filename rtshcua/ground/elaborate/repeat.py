@@ -25,10 +25,8 @@ def unrolled(report: Report, mission: MissionDecl) -> MissionDecl:
             help="repeat less, or split it into several missions",
             labels=[(most.count.span, f"these are {most.count.value * _total(most.items)} steps")],
         )
-    phases = tuple(
-        phase.model_copy(update={"items": tuple(_steps(phase.items, once=not good))}) for phase in mission.phases
-    )
-    return mission.model_copy(update={"phases": phases})
+    phases = tuple(phase.copied(items=tuple(_steps(phase.items, once=not good))) for phase in mission.phases)
+    return mission.copied(phases=phases)
 
 
 def _repeats(items: Sequence[Item]) -> Iterator[Repeat]:
@@ -61,7 +59,7 @@ def _steps(items: Sequence[Item], *, once: bool) -> Iterator[Step]:
     """The steps in order. Each is a node of its own: what is found out about a step is kept by its identity."""
     for item in items:
         if isinstance(item, Step):
-            yield item.model_copy()
+            yield item.copied()
         else:
             for _ in range(1 if once else item.count.value if _total(item.items) else 0):
                 yield from _steps(item.items, once=once)

@@ -25,7 +25,7 @@ def substitute_roles(rule: Rule, roles: Mapping[str, str]) -> Rule:
     changes: dict[str, Any] = {"roles": tuple(_role(name, roles) for name in rule.roles)}
     if rule.approver is not None:
         changes["approver"] = _role(rule.approver, roles)
-    return rule.model_copy(update=changes)
+    return rule.copied(**changes)
 
 
 def names_in(node: Node) -> frozenset[str]:
@@ -38,7 +38,7 @@ def _names_in(node: Any) -> Iterator[str]:
         yield node.name
         yield node.name.removesuffix(ENTRY)
     elif isinstance(node, Node):
-        for name in type(node).model_fields:
+        for name in type(node).__struct_fields__:
             yield from _names_in(getattr(node, name))
     elif type(node) is tuple:
         for part in node:
@@ -55,12 +55,12 @@ def _substituted(node: Any, values: Mapping[str, Value]) -> Any:
         return _reference(node, values)
     if isinstance(node, Node):
         changes: dict[str, Any] = {}
-        for name in type(node).model_fields:
+        for name in type(node).__struct_fields__:
             old = getattr(node, name)
             new = _substituted(old, values)
             if new is not old:
                 changes[name] = new
-        return node.model_copy(update=changes) if changes else node
+        return node.copied(**changes) if changes else node
     if type(node) is tuple:
         parts = tuple(_substituted(each, values) for each in node)
         return node if all(new is old for new, old in zip(parts, node, strict=True)) else parts
@@ -70,7 +70,7 @@ def _substituted(node: Any, values: Mapping[str, Value]) -> Any:
 def _reference(node: Reference, values: Mapping[str, Value]) -> Value:
     value = values.get(node.name)
     if value is not None:
-        return value.model_copy(update={"span": node.span})
+        return value.copied(span=node.span)
     if node.name.endswith(ENTRY):
         zone = values.get(node.name.removesuffix(ENTRY))
         if isinstance(zone, Reference):

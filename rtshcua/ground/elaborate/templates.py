@@ -113,4 +113,4 @@ def _role(context: Context, parameter: Parameter, written: Value) -> str | None:
 def _rules(template: TemplateDecl, given: Given, origin: tuple[Node, ...]) -> Iterator[Rule]:
     for rule in template.rules:
         put = substitute_roles(substitute(rule, given.values), given.roles)
-        yield put.model_copy(update={"origin": origin})
+        yield put.copied(origin=origin)

@@ -15,7 +15,7 @@ def value_of(bound: Bound, argument: Argument, span: Span) -> Value:
     if isinstance(bound, ZoneDecl):
         return Reference(span=span, name=bound.name.text)
     if isinstance(bound, Coordinates):
-        return bound.model_copy(update={"span": span})
+        return bound.copied(span=span)
     if argument.type.kind is Kind.ENUMERATION:
         return Reference(span=span, name=argument.declaration.choices[bound].text)
     assert argument.type.dimension is not None

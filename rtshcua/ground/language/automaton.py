@@ -90,7 +90,7 @@ class Automaton:
 
     def _failure(self, start: int) -> Failure:
         """No token that fits begins at `start`; perhaps one of another kind does."""
-        lexer = self.table.any
+        lexer = self.table.lexers.any
         token = lexer.match(self.source.text, start)
         if token and token.start(token.lastindex or 0) == start:
             group = token.lastindex or 0

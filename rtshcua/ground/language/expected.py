@@ -27,6 +27,9 @@ WORDS = {
     "<_FALLING>": "`falling`",
     "<_ONE_OF>": "`one of`",
     "<_ON_INADMISSIBLE>": "`on inadmissible`",
+    "<_AT_CLAUSE>": "`at` a clause",
+    "<REASON>": "a reason",
+    "<LINK_NAME>": "a name",
     END: "the end of the file",
 }
 

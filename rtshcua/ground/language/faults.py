@@ -6,12 +6,11 @@ from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_L
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import LIBRARY, is_direct, pack_of
+from rtshcua.ground.language.size import MAX_SIZE as MAX_SIZE
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 
 Wanted = Import | GeoJson  # what names a file: its `path` as written, and the `span` of all that it is written with
-
-MAX_SIZE = 8 << 20  # bytes or characters of one file
 
 
 def not_portable(by: Wanted) -> Diagnostic:

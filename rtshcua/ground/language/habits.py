@@ -12,10 +12,19 @@ from rtshcua.ground.language.expected import words
 WORDS = {
     "allow": "permit", "grant": "permit", "accept": "permit", "deny": "forbid", "prohibit": "forbid", "block": "forbid",
     "reject": "forbid", "disallow": "forbid", "if": "when", "where": "when", "is": "==", "equals": "==",
+    "assert": "expect", "then": "expect", "should": "expect", "set": "given", "let": "given", "do": "when",
+    "cases": "table", "permit": "allow", "forbid": "deny", "setup": "nominal",
 }  # fmt: skip
 
 #: What charts call the datum of an altitude.
 DATUMS = {"agl": "above home", "ahl": "above home", "amsl": "above sea", "msl": "above sea", "asl": "above sea"}
+
+#: what the texts are that stand behind these words
+TEXTS = {
+    "test": 'a test is called by a text, as in `test "low battery" { ... }`',
+    "at": 'a moment is written as in `at "2026-06-01T08:00:00Z"`',
+}
+_TOLD = re.compile(r"\b(test|at)\s+\Z")
 
 _EXPONENT = re.compile(r"(?<![A-Za-z0-9_.])[0-9][0-9_.]*[eE][0-9]*\s*\Z")
 _SIGNED = re.compile(r"-\s*([0-9][0-9_.]*)\s*([NSEW])\b")
@@ -41,6 +50,10 @@ def habit(automaton: Automaton, failure: Failure, symbols: set[str]) -> Habit | 
     before = source.text[max(0, failure.start - LOOK_BACK) : failure.start]
     if symbols == {"<STRING>"} and re.search(r"\bimport\s+\Z", before):
         return _import(automaton, failure)
+    if symbols == {"<STRING>"} and (told := _TOLD.search(before)):
+        return Habit(TEXTS[told[1]])
+    if found == "=" and before[-1:] == "=" and "<NUMBER>" in symbols:
+        return Habit("a value is given with one `=`", Fix(span, "", "write one `=`"))
     meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)
     if meant is not None and (
         meant in words(symbols) or meant in symbols or (meant == "==" and "<COMPARE>" in symbols)

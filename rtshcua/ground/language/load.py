@@ -8,6 +8,7 @@ Declarations have no order, so files may import each other in a circle, which is
 import posixpath
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
@@ -58,6 +59,12 @@ class Program:
     whole: bool = True
 
 
+@lru_cache(maxsize=64)
+def remembered(source: Source) -> Parsed:
+    """What `parse` makes of a text, which never changes: a process that loads often reads the library once."""
+    return parse(source)
+
+
 def no_packs(_name: str) -> str | None:
     """Nothing is installed but the library."""
     return None
@@ -68,14 +75,14 @@ def load(
     read: Read,
     library: str | None = None,
     listing: Listing | None = None,
-    parse: Callable[[Source], Parsed] = parse,
+    parse: Callable[[Source], Parsed] = remembered,
     packs: Packs = no_packs,
 ) -> Program:
     """Reads `paths` and all they import, each file once.
 
     `read(path)` gives a file's bytes or raises OSError; `library` is the folder that `lib:` stands for, and `packs`
     finds those of other packs; `listing(path)` gives the names in a folder, for suggestions, and may raise OSError;
-    `parse` is `parse.parse`, or one that remembers. Every fault of a file is a finding, never an exception; one of a
+    `parse` is `parse.parse`, or one that remembers it. Every fault of a file is a finding, never an exception; one of a
     file in `paths` itself has no span.
     """
     folders = {} if library is None else {LIBRARY.removesuffix(":"): library}

@@ -14,12 +14,13 @@ from rtshcua.ground.language.faults import MAX_SIZE, too_large
 from rtshcua.ground.language.recovery import file_level, misread, pending, resume
 from rtshcua.ground.language.table import table
 from rtshcua.model.ir.missions import MissionDecl
-from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 T = TypeVar("T", bound=Node)
 
@@ -41,22 +42,29 @@ class Parsed:
 def parse(source: Source) -> Parsed:
     """Parses `source`; a text that is too large, or no text, is one finding and no declarations."""
     builder = Builder(source)
-    refused = _refused(source)
-    whole = True
-    if refused is not None:
-        builder.note(refused)
+    found = refused(source)
+    if found is not None:
+        builder.note(found)
     else:
         try:
-            whole = _run(Automaton(table(), source, builder), builder)
+            run(Automaton(table(), source, builder), builder, beginning(source))
         except Enough:
             help = f"correct the first {MAX_FINDINGS}, then look again"
             last = builder.diagnostics[-1].span
             builder.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "there are more findings than these", last, help))
-    found = tuple(sorted(builder.diagnostics, key=lambda d: d.span.start if d.span else 0))
-    return Parsed(_unit(source, builder.declarations), found, frozenset(builder.broken), whole)
+    return parsed(source, builder.declarations, builder.diagnostics, frozenset(builder.broken), whole=builder.whole)
 
 
-def _refused(source: Source) -> Diagnostic | None:
+def parsed(
+    source: Source, declarations: list[Node], found: list[Diagnostic], broken: frozenset[str], *, whole: bool
+) -> Parsed:
+    """What was read of a text, its findings in the order of the text."""
+    ordered = tuple(sorted(found, key=lambda d: d.span.start if d.span else 0))
+    return Parsed(_unit(source, declarations), ordered, broken, whole)
+
+
+def refused(source: Source) -> Diagnostic | None:
+    """The finding on a text that is not looked at further."""
     if len(source.text) > MAX_SIZE:
         return too_large(source.file, len(source.text))
     nul = source.text.find("\0")
@@ -67,24 +75,27 @@ def _refused(source: Source) -> Diagnostic | None:
     return None
 
 
-def _run(automaton: Automaton, builder: Builder) -> bool:
-    """Whether every import was understood."""
-    whole = True
-    offset: int | None = 1 if automaton.source.text.startswith("\ufeff") else 0
+def beginning(source: Source) -> int:
+    """Where the text begins, after a byte order mark."""
+    return 1 if source.text.startswith("\ufeff") else 0
+
+
+def run(automaton: Automaton, builder: Builder, start: int) -> None:
+    """Parses from `start` to the end of the text, and goes on after every failure."""
+    offset: int | None = start
     while offset is not None:
         failure = automaton.run(offset)
         if failure is None:
-            return whole
+            return
         failure = misread(automaton, failure)
         builder.note(explain(automaton, failure))
         begun = pending(automaton)
-        whole = whole and (begun is None or begun[0] != "import")
+        builder.whole = builder.whole and (begun is None or begun[0] != "import")
         offset = resume(automaton, failure.start)
         if offset is None or len(automaton.states) == file_level(automaton):
-            if begun is not None and begun[1] is not None:
+            if begun is not None and isinstance(begun[1], Name):
                 builder.broken.add(begun[1].text)
             builder.settle()
-    return whole
 
 
 def _unit(source: Source, declarations: list[Node]) -> Unit:
@@ -103,4 +114,6 @@ def _unit(source: Source, declarations: list[Node]) -> Unit:
         policies=of(PolicyDecl),
         missions=of(MissionDecl),
         templates=of(TemplateDecl),
+        nominals=of(NominalDecl),
+        tests=of(TestDecl),
     )

@@ -3,7 +3,8 @@
 import posixpath
 import re
 from collections.abc import Callable, Mapping
-from os.path import normpath
+from os import getcwd, sep
+from os.path import join, normpath
 from pathlib import Path
 
 LIBRARY = "lib:"
@@ -18,9 +19,17 @@ SHELVES = ("skills", "policies", "missions")
 
 def shown(path: str) -> str:
     """The file's name for people: absolute, or relative to the working folder where it lies in it."""
-    place = _absolute(path)
-    here = _absolute(".")
-    return (place.relative_to(here) if place.is_relative_to(here) else place).as_posix()
+    here = getcwd()  # noqa: PTH109  # thousands of times in a run: a Path costs ten times as much
+    place = normpath(join(here, path))  # noqa: PTH118
+    if place == here:
+        return "."
+    below = here if here.endswith(sep) else here + sep
+    return place.removeprefix(below).replace(sep, "/")
+
+
+def from_here(path: str) -> str:
+    """The file's name as seen from the working folder, whether it lies in it or not: never an absolute one."""
+    return posixpath.relpath(path.replace(sep, "/"), getcwd().replace(sep, "/"))  # noqa: PTH109  # as in `shown`
 
 
 def stable(path: str, folders: Mapping[str, str], first: str) -> str:

@@ -11,10 +11,12 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.automaton import Automaton, Failure
 from rtshcua.ground.language.table import Row
 from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.tests import Quoted
 
 _SCAN = re.compile(
     r"""(?P<line>\n[ \t\r\f]*+) | //[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | "(?:[^"\\\n]|\\.)*+"?
-      | (?P<word>[A-Za-z_][A-Za-z0-9_.]*+) | (?P<open>\{) | (?P<close>\}) | (?s:.)""",
+      | (?P<word>[A-Za-z_][A-Za-z0-9_.]*+) | (?P<open>\{) | (?P<close>\})
+      | [^\n/"A-Za-z_{}]++ | (?s:.)""",
     re.VERBOSE,
 )
 _NOT_BEGUN = re.compile(r"\s*[:=,(){]")  # what follows a parameter or an argument, not the first word of a declaration
@@ -39,12 +41,12 @@ def file_level(automaton: Automaton) -> int:
     return 2 if len(states) > 1 and shifts(rows[states[1]], "import") else 1
 
 
-def pending(automaton: Automaton) -> tuple[str, Name | None] | None:
+def pending(automaton: Automaton) -> tuple[str, Name | Quoted | None] | None:
     """The first word and the name, if it was read, of the declaration that is not complete yet."""
     begun = automaton.values[file_level(automaton) - 1 :]
     if not begun:
         return None
-    name = begun[1] if len(begun) > 1 and isinstance(begun[1], Name) else None
+    name = begun[1] if len(begun) > 1 and isinstance(begun[1], Name | Quoted) else None
     return str(begun[0]), name
 
 
@@ -59,15 +61,15 @@ def open_braces(automaton: Automaton) -> list[int]:
     return found
 
 
-def owner(automaton: Automaton) -> tuple[str, Name | None] | None:
+def owner(automaton: Automaton) -> tuple[str, Name | Quoted | None] | None:
     """What the innermost open block belongs to, and its name: a phase, a step, or else the pending declaration."""
     values, braces = automaton.values, open_braces(automaton)
     inner = values[braces[0] + 1 : braces[-1]] if len(braces) > 1 else []
     while inner:
         if isinstance(inner[-1], Name):
             return ("phase" if "phase" in inner[-2:-1] else "step"), inner[-1]
-        if inner[-1] == "repeat":
-            return "repeat", None
+        if inner[-1] in ("repeat", "table"):
+            return inner[-1], None
         if inner[-1] == "in":
             break
         inner.pop()

@@ -47,21 +47,48 @@ class Lexer(NamedTuple):
     kinds: tuple[str, ...]
 
 
+class Lexers(dict[int, Lexer]):
+    """The lexer of each state, compiled when the parser first stands there: most texts never reach most of them, and to
+    compile them all took as long as to read a small policy.
+    """
+
+    def __init__(self, raw: dict[str, Any]) -> None:
+        super().__init__()
+        self._raw = raw
+        self._kinds = tuple(kind for kind, _ in raw["patterns"])
+        self._known: dict[tuple[str, ...], Lexer] = {}
+
+    def __missing__(self, state: int) -> Lexer:
+        row = self._raw["states"][state]
+        found = self[state] = self.accepting(tuple(kind for kind in self._kinds if kind in row))
+        return found
+
+    @property
+    def any(self) -> Lexer:
+        """Reads every kind of token."""
+        return self.accepting(self._kinds)
+
+    def accepting(self, kinds: tuple[str, ...]) -> Lexer:
+        """Reads words, marks, and tokens of these kinds; states that accept the same share it."""
+        if kinds not in self._known:
+            self._known[kinds] = _lexer(self._raw, kinds)
+        return self._known[kinds]
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """One row a state: from a symbol to the next state (0 or more) or to the rule `~n` to reduce by (negative).
 
     A symbol is a word or mark as it is written (`deadline`, `{`), a kind of token (`<NAME>`), or a rule (`<skill>`).
-    `words` says of each word of the language whether it may also be a name. `lexers` has one entry a state,
-    `any` reads every kind of token, `skip` matches what is ignored.
+    `words` says of each word of the language whether it may also be a name. `lexers` has one entry a state, `skip`
+    matches what is ignored.
     """
 
     rows: tuple[Row, ...]
     rules: tuple[Rule, ...]
-    lexers: tuple[Lexer, ...]
+    lexers: Lexers
     end: int
     words: dict[str, bool]
-    any: Lexer
     skip: re.Pattern[str]
 
 
@@ -69,21 +96,12 @@ class Table:
 def table() -> Table:
     """The committed table. Read once in a process, in a few milliseconds."""
     raw = json.loads(PATH.read_text(encoding="utf-8"))
-    kinds = [kind for kind, _ in raw["patterns"]]
-    known: dict[tuple[str, ...], Lexer] = {}
-    lexers: list[Lexer] = []
-    for row in raw["states"]:
-        accepted = tuple(kind for kind in kinds if kind in row)
-        if accepted not in known:
-            known[accepted] = _lexer(raw, accepted)
-        lexers.append(known[accepted])
     return Table(
         rows=tuple(raw["states"]),
         rules=tuple(Rule(origin, action, length, tuple(kept)) for origin, action, length, kept in raw["rules"]),
-        lexers=tuple(lexers),
+        lexers=Lexers(raw),
         end=raw["end"],
         words=raw["words"],
-        any=_lexer(raw, tuple(kinds)),
         skip=re.compile(_ignored(raw)),
     )
 

@@ -8,7 +8,7 @@ from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.limits import FULL, MAX_GAP, MAX_WINDOW
+from rtshcua.model.flat.limits import FULL, MAX_GAP
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Now, State
@@ -35,7 +35,8 @@ def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: Prepar
 def lasting(state: State, policy: PreparedPolicy, now: Now) -> State:
     """The state with what conditions over time say when it has been so for longer than any of them looks back."""
     memory, monitors = initial(policy), state.monitors
-    for at_us in range(0, 2 * MAX_WINDOW + 1, MAX_GAP) if policy.monitors else ():
+    looked_back = sum(monitor.window_us for monitor in policy.monitors)  # one may look at what another looks back at
+    for at_us in range(0, looked_back + 3 * MAX_GAP, MAX_GAP) if policy.monitors else ():
         memory, monitors = observe(memory, policy, state, Now(at_us, now.utc_us, now.utc_error_us))
     return State(state.values, state.ages, monitors)
 

@@ -1,14 +1,12 @@
 """Values and conditions. Values have a dimension; conditions have one of three truth values (Kleene)."""
 
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.quantity import Datum, Dimension
 
 
-class Quantity(Node):
+class Quantity(Node, kw_only=True):
     """A number with its unit, as an integer in the canonical unit of `dimension`; `datum` only where one is written."""
 
     kind: Literal["quantity"] = "quantity"
@@ -17,7 +15,7 @@ class Quantity(Node):
     datum: Datum | None = None
 
 
-class Coordinates(Node):
+class Coordinates(Node, kw_only=True):
     """A place on the ground, WGS 84, in 1e-7 degree: `47.3977 N, 8.5456 E`."""
 
     kind: Literal["coordinates"] = "coordinates"
@@ -25,21 +23,21 @@ class Coordinates(Node):
     longitude: int
 
 
-class TimeOfDay(Node):
+class TimeOfDay(Node, kw_only=True):
     """A local time of day in us since midnight: `08:00`."""
 
     kind: Literal["time-of-day"] = "time-of-day"
     value: int
 
 
-class Reference(Node):
+class Reference(Node, kw_only=True):
     """A signal, an argument, a zone, a zone's entry, an enumerator, `local time` or the mission's `phase`, by name."""
 
     kind: Literal["reference"] = "reference"
     name: str
 
 
-class Arithmetic(Node):
+class Arithmetic(Node, kw_only=True):
     """`left operator right`. `+` and `-` take values of one dimension; of `*` one side, of `/` the right side is known
     at compile time, and dimensions multiply: `speed * 3 s` is a length, `length / 4 m/s` a duration.
     """
@@ -50,7 +48,7 @@ class Arithmetic(Node):
     right: "Value"
 
 
-class Function(Node):
+class Function(Node, kw_only=True):
     """`abs(a)`, `min(a, b, ...)`, `max(a, b, ...)` over numbers of one dimension and datum."""
 
     kind: Literal["function"] = "function"
@@ -58,7 +56,7 @@ class Function(Node):
     operands: tuple["Value", ...]
 
 
-class Grow(Node):
+class Grow(Node, kw_only=True):
     """`grow(zone, margin)`: all points nearer to the zone than `margin`; a negative margin shrinks."""
 
     kind: Literal["grow"] = "grow"
@@ -66,7 +64,7 @@ class Grow(Node):
     margin: "Value"  # known at compile time: a length, or a parameter of a template or a mission
 
 
-class Range(Node):
+class Range(Node, kw_only=True):
     """`low .. high`, both ends belong to it."""
 
     kind: Literal["range"] = "range"
@@ -74,12 +72,11 @@ class Range(Node):
     high: "Value"
 
 
-Value = Annotated[
-    Quantity | Coordinates | TimeOfDay | Reference | Arithmetic | Function, Field(discriminator="kind")
-]  # the values a comparison or an argument may have
+#: the values a comparison or an argument may have
+Value = Quantity | Coordinates | TimeOfDay | Reference | Arithmetic | Function
 
 
-class Comparison(Node):
+class Comparison(Node, kw_only=True):
     """`left operator right`: both of one dimension and datum, or both of one enumeration."""
 
     kind: Literal["comparison"] = "comparison"
@@ -88,7 +85,7 @@ class Comparison(Node):
     right: Value
 
 
-class Within(Node):
+class Within(Node, kw_only=True):
     """`subject in low .. high`, or `local time in 22:00 .. 06:00` (wraps over midnight)."""
 
     kind: Literal["within"] = "within"
@@ -96,7 +93,7 @@ class Within(Node):
     range: Range
 
 
-class OneOf(Node):
+class OneOf(Node, kw_only=True):
     """`subject in {a, b}`: an enumeration's value is among the names."""
 
     kind: Literal["one-of"] = "one-of"
@@ -104,23 +101,23 @@ class OneOf(Node):
     names: tuple[Name, ...]
 
 
-class Inside(Node):
+class Inside(Node, kw_only=True):
     """`subject inside region` or, negated, `subject outside region`. The boundary counts as outside of `inside`."""
 
     kind: Literal["inside"] = "inside"
     subject: Value
-    region: Annotated[Reference | Grow, Field(discriminator="kind")]
+    region: Reference | Grow
     negated: bool
 
 
-class Not(Node):
+class Not(Node, kw_only=True):
     """Kleene negation."""
 
     kind: Literal["not"] = "not"
     operand: "Condition"
 
 
-class Junction(Node):
+class Junction(Node, kw_only=True):
     """Kleene conjunction (`and`) or disjunction (`or`) of two or more operands, in source order."""
 
     kind: Literal["junction"] = "junction"
@@ -128,7 +125,7 @@ class Junction(Node):
     operands: tuple["Condition", ...]
 
 
-class ForLast(Node):
+class ForLast(Node, kw_only=True):
     """`condition for the last 3 s`: bounded-past *historically*, true while the condition was true all along."""
 
     kind: Literal["for-last"] = "for-last"
@@ -136,7 +133,7 @@ class ForLast(Node):
     window: Quantity
 
 
-class WithinLast(Node):
+class WithinLast(Node, kw_only=True):
     """`condition within the last 5 s`: bounded-past *once*, true if the condition was true at some moment of it."""
 
     kind: Literal["within-last"] = "within-last"
@@ -144,7 +141,7 @@ class WithinLast(Node):
     window: Quantity
 
 
-class Near(Node):
+class Near(Node, kw_only=True):
     """`a within 5 s of b`: one of them is true now, and the other was within that time; the same as
     `(a and b within the last 5 s) or (b and a within the last 5 s)`.
     """
@@ -155,7 +152,7 @@ class Near(Node):
     window: Quantity
 
 
-class Edge(Node):
+class Edge(Node, kw_only=True):
     """`rising condition`: true now and false at the observation before; `falling` the other way round."""
 
     kind: Literal["edge"] = "edge"
@@ -163,25 +160,4 @@ class Edge(Node):
     operand: "Condition"
 
 
-Condition = Annotated[
-    Comparison | Within | OneOf | Inside | Not | Junction | ForLast | WithinLast | Near | Edge,
-    Field(discriminator="kind"),
-]
-
-for _node in (
-    Arithmetic,
-    Function,
-    Grow,
-    Range,
-    Comparison,
-    Within,
-    OneOf,
-    Inside,
-    Not,
-    Junction,
-    ForLast,
-    WithinLast,
-    Near,
-    Edge,
-):
-    _node.model_rebuild()
+Condition = Comparison | Within | OneOf | Inside | Not | Junction | ForLast | WithinLast | Near | Edge

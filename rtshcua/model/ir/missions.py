@@ -1,8 +1,6 @@
 """Missions: phases of steps, proposed by someone under a policy for a vehicle."""
 
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name, Node
@@ -26,7 +24,7 @@ class Overrides(Node):
     record: tuple[Name, ...] = ()
 
 
-class Step(Node):
+class Step(Node, kw_only=True):
     """`goto(bridge_a.entry, altitude = 20 m) on inadmissible abort { deadline 2 s }`."""
 
     kind: Literal["step"] = "step"
@@ -36,7 +34,7 @@ class Step(Node):
     overrides: Overrides | None = None
 
 
-class Repeat(Node):
+class Repeat(Node, kw_only=True):
     """`repeat 3 { ... }`: its items in order, so many times. Elaboration unrolls it."""
 
     kind: Literal["repeat"] = "repeat"
@@ -44,8 +42,7 @@ class Repeat(Node):
     items: tuple["Item", ...]
 
 
-Item = Annotated[Step | Repeat, Field(discriminator="kind")]
-Repeat.model_rebuild()
+Item = Step | Repeat
 
 
 class Phase(Node):

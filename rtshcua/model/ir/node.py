@@ -1,16 +1,25 @@
 """The base of all IR nodes, and names with the place where they stand."""
 
-from pydantic import BaseModel, ConfigDict, InstanceOf
+from typing import Any, Self, dataclass_transform
+
+import msgspec
 
 from rtshcua.diagnostics.span import Span
 
 
-class Node(BaseModel):
-    """A frozen piece of what a source says; `span` is the exact text it came from."""
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Node(msgspec.Struct, frozen=True, kw_only=True):
+    """A frozen piece of what a source says, its parts given by name; `span` is the exact text it came from.
 
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", arbitrary_types_allowed=True)
+    Types are held by mypy, and by a test over everything that is parsed (`tests/unit/model`); ADR 29 says why not at
+    every construction. A node that has a part with a default before one without says `kw_only=True` again.
+    """
 
-    span: InstanceOf[Span]
+    span: Span
+
+    def copied(self, **changes: Any) -> Self:
+        """The same with some parts changed."""
+        return msgspec.structs.replace(self, **changes)
 
 
 class Name(Node):

@@ -1,14 +1,12 @@
 """Zones and vehicles."""
 
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, TimeOfDay
 from rtshcua.model.ir.node import Name, Node
 
 
-class Circle(Node):
+class Circle(Node, kw_only=True):
     """All points nearer to `center` than `radius`."""
 
     kind: Literal["circle"] = "circle"
@@ -16,7 +14,7 @@ class Circle(Node):
     radius: Quantity
 
 
-class Polygon(Node):
+class Polygon(Node, kw_only=True):
     """A simple polygon by its corners, WGS 84, in either direction, not closed by a repeated corner. `holes` are simple
     polygons inside of it that do not belong to it, nor do their edges.
     """
@@ -26,7 +24,7 @@ class Polygon(Node):
     holes: tuple[tuple[Coordinates, ...], ...] = ()
 
 
-class Corridor(Node):
+class Corridor(Node, kw_only=True):
     """`corridor(a, b, c, width 40 m)`: all points nearer to the line through the places than half the width."""
 
     kind: Literal["corridor"] = "corridor"
@@ -34,7 +32,7 @@ class Corridor(Node):
     width: Quantity
 
 
-class GeoJson(Node):
+class GeoJson(Node, kw_only=True):
     """`from "zones/bridge.geojson"`, `from "..." feature "name"`: a Polygon or MultiPolygon of RFC 7946. `path` is as
     written, relative to the source; `feature` is a Feature's `id`, or its `name` property.
     """
@@ -44,7 +42,7 @@ class GeoJson(Node):
     feature: str | None
 
 
-class Combination(Node):
+class Combination(Node, kw_only=True):
     """`union(a, b, ...)`, or `difference(a, b, ...)`: what is in the first and in none of the others."""
 
     kind: Literal["combination"] = "combination"
@@ -53,10 +51,7 @@ class Combination(Node):
 
 
 #: a reference names another zone, of which the ground plan counts
-Shape = Annotated[
-    Circle | Polygon | Corridor | GeoJson | Combination | Reference,
-    Field(discriminator="kind"),
-]
+Shape = Circle | Polygon | Corridor | GeoJson | Combination | Reference
 
 
 class Daily(Node):
@@ -115,7 +110,3 @@ class VehicleDecl(Node):
     elevation_within: Quantity | None = None  # how far the real elevation of the ground at home may differ
     return_altitude: Quantity | None = None  # `return at 30 m`: the autopilot's return climbs to it before it flies
     braking: Braking | None = None
-
-
-Combination.model_rebuild()
-ZoneDecl.model_rebuild()

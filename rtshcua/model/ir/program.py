@@ -6,6 +6,7 @@ from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 
 class Import(Node):
@@ -27,3 +28,5 @@ class Unit(Node):
     policies: tuple[PolicyDecl, ...]
     missions: tuple[MissionDecl, ...]
     templates: tuple[TemplateDecl, ...] = ()
+    nominals: tuple[NominalDecl, ...] = ()
+    tests: tuple[TestDecl, ...] = ()

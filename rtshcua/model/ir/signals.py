@@ -1,7 +1,5 @@
 """Enumerations and signals: what the vehicle is known to report, and in which MAVLink field."""
 
-from pydantic import Field
-
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name, Node
 
@@ -31,7 +29,7 @@ class SignalSource(Node):
     """
 
     message: Name
-    fields: tuple[Name, ...] = Field(min_length=1, max_length=2)
+    fields: tuple[Name, ...]
 
 
 class SignalDecl(Node):
@@ -43,6 +41,6 @@ class SignalDecl(Node):
 
     name: Name
     type: Name
-    sources: tuple[SignalSource, ...] = Field(min_length=1)
+    sources: tuple[SignalSource, ...]
     unknown_at: tuple[Name, ...]
     stale_after: Quantity

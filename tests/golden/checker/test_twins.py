@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from reference.linted import linted
+from reference.unmet import unmet
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render
@@ -17,7 +19,6 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lint.lint import lint
 from rtshcua.mavlink import dialect
 
 HERE = Path(__file__).resolve().parent
@@ -40,6 +41,8 @@ WITHOUT_TWINS = {
     codes.REFUSED_ON_BOARD,
     codes.NOT_ALWAYS_PERMITTED,
     codes.VERSION_NOT_RAISED,
+    codes.NOT_FORMATTED,  # tests/golden/format has pairs
+    codes.UNSAFE_FORMAT,
 }
 
 
@@ -59,8 +62,10 @@ def findings(side: str, name: str) -> tuple[tuple[Diagnostic, ...], dict[str, So
         found = compile_program(program, dialect.load(), mission=None, issued_at_us=0).diagnostics
     else:
         found = check_program(program, dialect.load())
+    if name.startswith(codes.NOT_MET.id.lower()):
+        found += unmet(program)
     if name.startswith(HABITS):
-        found += lint(program)
+        found += linted(program)
     return found, program.sources
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from reference.linted import linted
+from reference.unmet import unmet
 from rtshcua.cli.pages import HEADINGS, example, read_page
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import REGISTRY, Code
@@ -12,7 +14,6 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import Program, load
-from rtshcua.ground.lint.lint import lint
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[3]
@@ -37,6 +38,8 @@ TOLD = {
     codes.SPECIFICATION_SIZE,
     codes.TOO_MANY,
     codes.UNDECIDED,
+    codes.NOT_FORMATTED,
+    codes.UNSAFE_FORMAT,
 }
 #: 12:00 of some day where the shipped site is, which has 10:00 UTC then
 NOON = 1_777_629_600_000_000
@@ -57,7 +60,9 @@ def findings(text: str, code: Code) -> tuple[tuple[Diagnostic, ...], Program]:
         found = compile_program(program, dialect.load(), mission=None, issued_at_us=NOON).diagnostics
     else:
         found = check_program(program, dialect.load())
-    return found + (lint(program) if code.id.startswith("E13") else ()), program
+    if code is codes.NOT_MET:
+        found += unmet(program)
+    return found + (linted(program) if code.id.startswith("E13") else ()), program
 
 
 def test_there_is_a_page_for_each_code_and_none_besides() -> None:

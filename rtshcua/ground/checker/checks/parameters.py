@@ -7,7 +7,7 @@ from rtshcua.ground.checker.fields import size
 from rtshcua.ground.checker.fitting import declaration_labels
 from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.checker.scope import Scope
-from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
 from rtshcua.ground.checker.values import whole_range
 from rtshcua.model.ir.expression import Range, Reference
@@ -35,6 +35,7 @@ def check(context: Context) -> None:
                     parameter.type.span,
                     f"no parameter can be of the type `{parameter.type.text}`",
                     help=suggestion(parameter.type.text, NAMED) or "the types of parameters are " + _types(type(owner)),
+                    fix=correction(context.report, parameter.type.span, parameter.type.text, NAMED),
                 )
                 continue
             if argument.declaration is not parameter:

@@ -8,7 +8,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.dialect import DATUM, UNITS, Field, Message
 from rtshcua.ground.checker.fields import quantity, size
 from rtshcua.ground.checker.scope import signal_type
-from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
 from rtshcua.model.flat.limits import MAX_STALE
 from rtshcua.model.ir.node import Name
@@ -55,6 +55,7 @@ def _enum(context: Context, enum: EnumDecl) -> None:
             enum.dialect.span,
             f"the dialect has no enumeration `{enum.dialect.text}`",
             help=suggestion(enum.dialect.text, context.dialect.enums),
+            fix=correction(report, enum.dialect.span, enum.dialect.text, context.dialect.enums),
         )
         return
     known = set(entries.values())
@@ -80,6 +81,7 @@ def _signal(context: Context, signal: SignalDecl) -> None:
             signal.type.span,
             f"no signal can be of the type `{name}`",
             help=suggestion(name, types) or "the types of signals are " + ", ".join(f"`{each}`" for each in types),
+            fix=correction(context.report, signal.type.span, name, types),
         )
         return
     type = signal_type(context.symbols, signal)
@@ -96,6 +98,7 @@ def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Ty
             source.message.span,
             f"the dialect has no message `{source.message.text}`",
             help=suggestion(source.message.text, dialect.messages),
+            fix=correction(report, source.message.span, source.message.text, dialect.messages),
         )
         return
     if not _count(context, signal, source, type):
@@ -110,6 +113,7 @@ def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Ty
                 help=" ".join(
                     filter(None, (suggestion(name.text, message.fields, source.message.text), _fields(message)))
                 ),
+                fix=correction(report, name.span, name.text, message.fields, source.message.text),
             )
         elif field.length or field.type == "char":
             report.add(

@@ -1,7 +1,9 @@
 """All proofs, of a policy and of the missions under it."""
 
+from functools import lru_cache
+
 from rtshcua.decision.prepare import Malformed, prepare
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.space import signals
@@ -24,19 +26,30 @@ from rtshcua.ground.compiler.proofs import (
 )
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
 
 
 def prove_policy(context: Context, lowered: LoweredPolicy) -> Ground | None:
     """The policy prepared as on board, after its proofs; None where it would be refused there."""
-    prepared = prepare(lowered.policy)
-    if isinstance(prepared, Malformed):
-        _refused(context, lowered, prepared)
+    asked = _asked(lowered.policy)
+    if isinstance(asked, Malformed):
+        refused(context, lowered, asked)
         return None
-    ground = Ground(context, lowered, prepared, tuple(signals(lowered.policy)), Questions(prepared))
+    prepared, questions = asked
+    ground = Ground(context, lowered, prepared, tuple(signals(lowered.policy)), questions.again())
     for proof in (chains, last_link, deferral, observation, contradiction, delegations, rules):
         proof.prove(ground)
     return ground
+
+
+@lru_cache(maxsize=32)
+def _asked(policy: Policy) -> tuple[PreparedPolicy, Questions] | Malformed:
+    """A policy prepared, and what is asked about it: missions in several files are often under the same one, and each
+    is a program of its own, in which the same questions come up.
+    """
+    prepared = prepare(policy)
+    return prepared if isinstance(prepared, Malformed) else (prepared, Questions(prepared))
 
 
 def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> None:
@@ -45,7 +58,7 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     for invocation in mission.invocations:
         found = ground.prepare(invocation, mission.phases)
         if isinstance(found, Malformed):
-            _refused(ground.context, ground.lowered, found)
+            refused(ground.context, ground.lowered, found)
             return
         prepared.append(found)
     steps = [step for phase in declared.phases for step in phase.steps]
@@ -69,7 +82,8 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     deferral.prove_mission(ground, steps, prepared)
 
 
-def _refused(context: Context, lowered: LoweredPolicy, malformed: Malformed) -> None:
+def refused(context: Context, lowered: LoweredPolicy, malformed: Malformed) -> None:
+    """Report what would not be loaded on board."""
     context.report.add(
         codes.REFUSED_ON_BOARD,
         lowered.declaration.name.span,

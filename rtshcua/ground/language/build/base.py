@@ -8,6 +8,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.tests import Quoted
 
 MAX_DEPTH = 64  # of what stands within its like; far above what a person writes, far below what Python can walk
 
@@ -36,6 +37,7 @@ class Base:
         self.diagnostics: list[Diagnostic] = []
         self.declarations: list[Node] = []
         self.broken: set[str] = set()
+        self.whole = True  # whether every import was understood
         self._settled = 0  # how many findings there were when the last declaration ended
         self._depths: dict[int, int] = {}
 
@@ -103,7 +105,9 @@ class Base:
         self._depths[id(node)] = depth
         return node
 
-    def parts(self, owner: str, name: Name, given: Sequence[Part], required: Sequence[str] = ()) -> dict[str, Part]:
+    def parts(
+        self, owner: str, name: Name | Quoted, given: Sequence[Part], required: Sequence[str] = ()
+    ) -> dict[str, Part]:
         """The parts by their key: each at most once, the required ones present."""
         found: dict[str, Part] = {}
         for part in given:

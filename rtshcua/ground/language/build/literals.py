@@ -9,7 +9,9 @@ from rtshcua.diagnostics.codes import (
     DATUM_NOT_ALLOWED,
     NOT_EXACT,
     OUT_OF_BOUNDS,
+    SYNTAX,
     UNKNOWN_UNIT,
+    Code,
 )
 from rtshcua.diagnostics.diagnostic import Fix
 from rtshcua.diagnostics.span import Span
@@ -133,11 +135,18 @@ class Literals(Base):
 
     def moment(self, span: Span, raw: str) -> int:
         """A moment, `"2026-05-01T08:00Z"`, in us since the epoch."""
+        return self._moment(span, raw, BAD_PERIOD)
+
+    def utc(self, span: Span, raw: str) -> int:
+        """The moment of a decision, in us since the epoch."""
+        return self._moment(span, raw, SYNTAX)
+
+    def _moment(self, span: Span, raw: str, code: Code) -> int:
         try:
             return moment(raw[1:-1])
         except ValueError as error:
             help = "write it as in `2026-05-01T08:00Z` or `2026-05-01T10:00:00+02:00`"
-            self.report(BAD_PERIOD, f"`{short(raw[1:-1])}` is not a moment: {error}", span, help)
+            self.report(code, f"`{short(raw[1:-1])}` is not a moment: {error}", span, help)
             return 0
 
     def _degrees(self, span: Span, number: str, what: str, negative: bool) -> int:

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from pydantic import BaseModel
 
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.parse import parse
+from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.program import Unit
 
 
@@ -22,7 +22,7 @@ def flat(node: Any) -> Any:
     """A node as nested tuples and dicts: names as their text, quantities as `value dimension datum`, no spans."""
     if isinstance(node, tuple):
         return [flat(item) for item in node]
-    if not isinstance(node, BaseModel):
+    if not isinstance(node, Node):
         return node
     kind = type(node).__name__
     if kind == "Name":
@@ -35,7 +35,7 @@ def flat(node: Any) -> Any:
         return (node.latitude, node.longitude)
     if kind == "TimeOfDay":
         return f"{node.value // 60_000_000} min"
-    found = {name: flat(getattr(node, name)) for name in type(node).model_fields if name != "span"}
+    found = {name: flat(getattr(node, name)) for name in type(node).__struct_fields__ if name != "span"}
     return {name: value for name, value in found.items() if value not in (None, [])}
 
 

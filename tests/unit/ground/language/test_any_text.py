@@ -1,12 +1,13 @@
 """Whatever the text, parsing ends with findings, never with an exception; and it agrees with Lark on what fits."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lark import UnexpectedInput
+from lark import Lark, UnexpectedInput
 
 from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.span import Source
@@ -22,7 +23,12 @@ SHIPPED = [
     for folder in ("skills", "policies", "missions")
     for path in sorted((CHECKOUT / folder).glob("*.rts"))
 ] + [Path(__file__).with_name("forms.rts").read_text(encoding="utf-8")]
-LARK = generate.lark((CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8"))
+
+
+@cache
+def lark() -> Lark:
+    return generate.lark((CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8"))
+
 
 LED = [
     "abs(",
@@ -70,7 +76,7 @@ def fits(text: str) -> bool:
 
 def as_lark_reads_it(text: str) -> str | None:
     """The tokens that Lark finds, with spaces between them; None where Lark finds an error."""
-    parser = LARK.parse_interactive(text)
+    parser = lark().parse_interactive(text)
     try:
         tokens = parser.exhaust_lexer()
         parser.feed_eof()

@@ -50,4 +50,4 @@ def test_builder_has_exactly_the_actions_of_the_grammar() -> None:
 
 
 def test_every_kind_of_token_has_words_for_a_person() -> None:
-    assert set(WORDS) == {kind for kind in table().any.kinds if kind} | {END}
+    assert set(WORDS) == {kind for kind in table().lexers.any.kinds if kind} | {END}

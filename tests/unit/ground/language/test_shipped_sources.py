@@ -20,7 +20,7 @@ def program(checkout: Path, *paths: str) -> Program:
 
 def references(node: Node) -> list[str]:
     found = [node.name] if isinstance(node, Reference) else []
-    for field in type(node).model_fields:
+    for field in type(node).__struct_fields__:
         value = getattr(node, field)
         for child in value if isinstance(value, tuple) else (value,):
             if isinstance(child, Node):

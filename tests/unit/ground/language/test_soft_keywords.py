@@ -51,6 +51,15 @@ mission §(§: zone = §, §: § in § .. § = §) under §@1 on § {
   phase § { repeat 3 { §() } §() { deadline 2 s valid for 3 s during § require § > § record § } §() repeat 1 { } }
   phase § { §() §(§, § = §) on inadmissible skip §() on inadmissible hold }
 }
+nominal § {
+  under § on § by role § through §
+  phase § of §, § given § = §, §.§ = § measured 3 s ago, (§ > § for the last 3 s) = §
+  approved by role § given § = § refused by role another 2 s ago
+}
+test "x" from § {
+  when §(§, § = §) by role § through §
+  table §, §.§ { §, § expect fallback hover because § §, § expect allow because x § measured 1 s ago, § expect deny }
+}
 """
 
 

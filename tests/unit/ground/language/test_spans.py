@@ -48,7 +48,7 @@ mission m under p@1 on v { proposed by agent o for role r phase q{ c( d ) on
 
 def nodes(node: Node) -> Iterator[tuple[Node, Node]]:
     """Every node with its parent."""
-    for field in type(node).model_fields:
+    for field in type(node).__struct_fields__:
         for child in within(getattr(node, field)):
             yield child, node
             yield from nodes(child)
@@ -86,7 +86,7 @@ def same(one: Node, other: Node) -> bool:
 
 def without_spans(value: object) -> object:
     if isinstance(value, Node):
-        fields = [field for field in type(value).model_fields if field != "span"]
+        fields = [field for field in type(value).__struct_fields__ if field != "span"]
         return (type(value).__name__, *(without_spans(getattr(value, field)) for field in fields))
     if isinstance(value, tuple):
         return tuple(map(without_spans, value))

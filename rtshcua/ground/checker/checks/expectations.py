@@ -1,0 +1,75 @@
+"""E1403, E1404: what a test expects can be decided."""
+
+from collections.abc import Iterator
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed, nearest
+from rtshcua.ground.checker.context import Context
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.tests import Expectation
+from rtshcua.model.outcome import Outcome, Reason, outcome_of
+
+_REASONS = {str(reason.value): reason for reason in Reason}
+
+
+def check_expectation(
+    context: Context, expected: Expectation, skill: SkillDecl | None, policy: PolicyDecl | None
+) -> None:
+    """Report a reason that there is not, one that another outcome has, and a target that never flies."""
+    if expected.reason is not None:
+        _reason(context, expected, expected.reason)
+    if expected.target is not None and skill is not None and policy is not None:
+        _target(context, expected.target, skill, policy)
+
+
+def _reason(context: Context, expected: Expectation, name: Name) -> None:
+    reason = _REASONS.get(name.text)
+    if reason is None:
+        fitting = [slug for slug, each in _REASONS.items() if outcome_of(each) is Outcome[expected.outcome.upper()]]
+        near = nearest(name.text, _REASONS)
+        context.report.add(
+            codes.UNKNOWN_REASON,
+            name.span,
+            f"there is no reason `{name.text}`",
+            help=f"did you mean `{near}`?" if near else f"the reasons of `{expected.outcome}` are {listed(fitting)}",
+            fix=None if near is None else (name.span, near, f"write `{near}`"),
+        )
+        return
+    outcome = outcome_of(reason).name.lower()
+    if outcome != expected.outcome:
+        context.report.add(
+            codes.NEVER_DECIDED,
+            name.span,
+            f"`{name.text}` is a reason of `{outcome}`, never of `{expected.outcome}`",
+            help=f"write `expect {outcome}`, or another reason",
+            labels=[(expected.span, "expected here")],
+        )
+
+
+def _target(context: Context, target: Name, skill: SkillDecl, policy: PolicyDecl) -> None:
+    places = list(_targets(skill, policy))
+    names = list(dict.fromkeys(name for name, _ in places))
+    if target.text in names or target.text in context.symbols.broken:
+        return
+    near = nearest(target.text, names)
+    context.report.add(
+        codes.NEVER_DECIDED,
+        target.span,
+        f"`{target.text}` never flies in the place of `{skill.name.text}`",
+        help=f"did you mean `{near}`?" if near else f"what may fly is {listed(names)}" if names else None,
+        labels=[(span, f"`{name}` may fly") for name, span in places[:3]],
+        fix=None if near is None else (target.span, near, f"write `{near}`"),
+    )
+
+
+def _targets(skill: SkillDecl, policy: PolicyDecl) -> Iterator[tuple[str, Span]]:
+    """What may fly instead of a skill: the links of its chain, and what degrades it."""
+    for link in skill.fallback:
+        yield link.skill.text, link.span
+    for rule in policy.rules:
+        named = [name.text for name in rule.skills]
+        if rule.target is not None and (not named or skill.name.text in named):
+            yield rule.target.skill.text, rule.span

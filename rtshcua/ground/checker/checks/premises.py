@@ -1,0 +1,156 @@
+"""E1406: what nominals and tests hold for given is well typed, and said once."""
+
+from collections.abc import Iterable
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.arguments import bind_value
+from rtshcua.ground.checker.conditions import check_condition
+from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.fields import on_globe, one_of, quantity, size
+from rtshcua.ground.checker.scope import Argument, signal_type
+from rtshcua.ground.checker.symbols import correction, suggestion
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.limits import MAX_PHASES
+from rtshcua.model.ir.expression import Coordinates, Edge, ForLast, Reference, WithinLast
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.signals import SignalDecl
+from rtshcua.model.ir.skills import Parameter
+from rtshcua.model.ir.tests import Asker, Cell, Named, OverTime, Premises, Subject
+from rtshcua.model.quantity import Dimension
+
+#: the truths of a condition over time, as they are written; `unknown` is a word of the grammar
+TRUTHS = ("true", "false")
+SOURCES = tuple(kind.name.lower() for kind in SourceKind)
+
+
+def check_premises(context: Context, premises: Premises) -> None:
+    """Report what a nominal or a test gives that nothing can have."""
+    for assignment in premises.given:
+        check_subject(context, assignment.subject)
+        check_cell(context, assignment.subject, assignment.cell)
+    once(context, ((each.subject, each.span) for each in premises.given))
+    instant, phase, issued = premises.instant, premises.phase, premises.issued
+    quantity(context, None if instant is None else instant.within, Dimension.DURATION, positive=False)
+    quantity(context, premises.released, Dimension.DURATION, positive=False)
+    quantity(context, None if issued is None else issued.distance, Dimension.DURATION, positive=False)
+    for answer in premises.answers:
+        quantity(context, answer.ago, Dimension.DURATION, positive=False)
+    if phase is not None:
+        _order(context, phase.order)
+
+
+def check_asker(context: Context, asker: Asker | None) -> None:
+    """Report a source that there is not; roles are those of the policy, which is looked at when it is lowered."""
+    if asker is not None and asker.source is not None:
+        one_of(context, codes.UNKNOWN_SOURCE, asker.source, SOURCES, "source of requests")
+
+
+def check_subject(context: Context, subject: Subject) -> None:
+    """Report what is no signal, and what is no condition over time."""
+    scope = context.scope()
+    if isinstance(subject, Named):
+        if signal_of(context, subject) is None:
+            scope.unknown(subject.span, subject.name.text)
+        return
+    before = len(context.report.found)
+    check_condition(scope, subject.condition)
+    if len(context.report.found) == before and not isinstance(subject.condition, ForLast | WithinLast | Edge):
+        written = context.report.text(subject.condition.span)
+        context.report.add(
+            codes.WRONG_TYPE,
+            subject.condition.span,
+            f"a condition over time is asked, and `{written}` is about the moment",
+            help="give the signals that it reads; set by hand is what is written with `for the last`, `within the "
+            "last`, `rising` or `falling`",
+        )
+
+
+def check_cell(context: Context, subject: Subject, cell: Cell) -> None:
+    """Report a value that the subject cannot have, and keep the one that it has, in `Context.bound`."""
+    quantity(context, cell.measured, Dimension.DURATION, positive=False)
+    if isinstance(subject, OverTime):
+        _truth(context, cell)
+        return
+    signal = signal_of(context, subject)
+    if signal is None or cell.value is None:
+        return
+    type = signal_type(context.symbols, signal)
+    if type is None:  # reported where the signal is declared
+        return
+    seen = Parameter(span=signal.name.span, name=signal.name, type=signal.type, range=None, choices=(), default=None)
+    keep(context, cell, bind_value(context.scope(), Argument(seen, type), cell.value), type.dimension)
+
+
+def keep(context: Context, cell: Cell, bound: Bound | None, dimension: Dimension | None) -> None:
+    """Keep the value of a cell, if it is one that fits."""
+    if bound is None:
+        return
+    assert cell.value is not None
+    if isinstance(bound, Coordinates):
+        fits = on_globe(context, bound)
+    elif isinstance(bound, int) and dimension is not None:
+        fits = size(context, cell.value, dimension, bound)
+    else:
+        fits = True
+    if fits:
+        context.bound[id(cell)] = (bound,)
+
+
+def signal_of(context: Context, subject: Named) -> SignalDecl | None:
+    """The signal of that name."""
+    return context.symbols.signals.get(subject.name.text)
+
+
+def once(context: Context, subjects: Iterable[tuple[Subject, Span]], first_words: str = "first given here") -> None:
+    """Report what is given twice."""
+    seen: dict[str, Span] = {}
+    for subject, span in subjects:
+        words = context.report.text(subject.span)
+        first = seen.setdefault(words, span)
+        if first is not span:
+            context.report.add(
+                codes.GIVEN_TWICE,
+                subject.span,
+                f"`{words}` is given twice",
+                help="keep one of them",
+                labels=[(first, first_words)],
+            )
+
+
+def _truth(context: Context, cell: Cell) -> None:
+    if cell.value is not None and not (isinstance(cell.value, Reference) and cell.value.name in TRUTHS):
+        near = suggestion(cell.value.name, TRUTHS) if isinstance(cell.value, Reference) else None
+        context.report.add(
+            codes.WRONG_TYPE,
+            cell.value.span,
+            f"`{context.report.text(cell.value.span)}` is no truth, and a condition over time has one",
+            help=near or "write `true`, `false` or `unknown`",
+            fix=correction(context.report, cell.value.span, context.report.raw(cell.value.span), TRUTHS),
+        )
+    elif cell.measured is not None:
+        context.report.add(
+            codes.WITHOUT_EFFECT,
+            cell.measured.span,
+            "the truth of a condition over time has no age",
+            help="leave `measured ... ago` out",
+        )
+
+
+def _order(context: Context, order: tuple[Name, ...]) -> None:
+    if len(order) > MAX_PHASES:
+        context.report.add(
+            codes.TOO_MANY,
+            order[0].span.to(order[-1].span),
+            f"there are {len(order)} phases, and at most {MAX_PHASES} fit on board",
+        )
+    seen: dict[str, Name] = {}
+    for name in order:
+        first = seen.setdefault(name.text, name)
+        if first is not name:
+            context.report.add(
+                codes.DUPLICATE_NAME,
+                name.span,
+                f"the phase `{name.text}` is named twice",
+                labels=[(first.span, "first named here")],
+            )

@@ -1,0 +1,173 @@
+"""Nominals and tests: a state to begin from, what is asked in it, what must be decided. Neither reaches a bundle."""
+
+from typing import ClassVar, Literal
+
+from rtshcua.model.ir.expression import Condition, Quantity, Value
+from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.skills import ArgumentValue
+
+
+class Quoted(Node):
+    """A text: what a test is called, or a clause as it is written. The span has the quotes, `text` has not."""
+
+    text: str
+
+
+class OverTime(Node, kw_only=True):
+    """`(battery < 30 % for the last 5 s)`: a condition over time whose truth is set by hand."""
+
+    kind: Literal["over-time"] = "over-time"
+    condition: Condition
+
+
+class Named(Node, kw_only=True):
+    """`battery`: a signal, or in a table a parameter of the skill that is asked for."""
+
+    kind: Literal["named"] = "named"
+    name: Name
+
+
+Subject = Named | OverTime
+
+
+class Cell(Node):
+    """`20 %`, `unknown` (`value` is None), `fix_3d measured 3 s ago`; `true` or `false` of a condition over time."""
+
+    value: Value | None
+    measured: Quantity | None = None  # how long ago
+
+
+class Assignment(Node):
+    """`battery = 20 %`."""
+
+    subject: Subject
+    cell: Cell
+
+
+class Instant(Node):
+    """`at "2026-06-01T08:00:00Z" within 2 s`: UTC of the decision in us since the epoch, and how wrong it may be."""
+
+    utc_us: int
+    within: Quantity | None
+
+
+class InPhase(Node):
+    """`phase departure of departure, inspection, recovery`: the mission's phase, and all of its phases in order (none
+    written: this one alone, or as the nominal says).
+    """
+
+    phase: Name
+    order: tuple[Name, ...]
+
+
+class Answer(Node):
+    """`approved by role supervisor 2 s ago`, `refused by role supervisor`."""
+
+    granted: bool
+    role: Name
+    ago: Quantity | None
+
+
+class Issue(Node):
+    """`issued 11 min ago`; `issued in 5 s`, which is ahead of the decision."""
+
+    distance: Quantity
+    ahead: bool
+
+
+class InForce(Node):
+    """`version 8 in force`: of the policy aboard, where it is not the one that the request was made under."""
+
+    version: int
+
+
+class Identity(Node):
+    """`identity "quad-08"`: of the vehicle that the request came to, where it is not the one that it was made for."""
+
+    text: str
+
+
+class Deed(Node):
+    """`replayed`: the request's id was used before. `tampered`: what was presented is not what was signed."""
+
+    kind: Literal["replayed", "tampered"]
+
+
+class Premises(Node):
+    """What holds when the request is decided on; None or an empty tuple: not written. Times are how long ago."""
+
+    given: tuple[Assignment, ...] = ()
+    instant: Instant | None = None
+    phase: InPhase | None = None
+    answers: tuple[Answer, ...] = ()
+    released: Quantity | None = None
+    issued: Issue | None = None
+    in_force: InForce | None = None
+    identity: Identity | None = None
+    replayed: Deed | None = None
+    tampered: Deed | None = None
+
+
+class Asker(Node):
+    """`by role operator through agent`: who asks, and the source that speaks for the role. Each may be left out."""
+
+    role: Name | None
+    source: Name | None
+
+
+class NominalDecl(Node):
+    """`nominal morning { under bridge_inspection on quad by role operator at "..." phase inspection given ... }`: where
+    tests start from.
+    """
+
+    name: Name
+    policy: Name
+    vehicle: Name
+    asker: Asker | None
+    premises: Premises
+
+
+class Request(Node):
+    """`when inspect_area(area = bridge_a, altitude = 20 m) by operator through agent`."""
+
+    skill: Name
+    arguments: tuple[ArgumentValue, ...]
+    asker: Asker | None
+
+
+class Expectation(Node):
+    """`expect fallback return_home because state/violated at "battery > 35 %"`. What is not written may be anything;
+    `clause` is the text of the clause that must have decided.
+    """
+
+    outcome: Literal["allow", "deny", "defer", "fallback"]
+    target: Name | None
+    reason: Name | None
+    clause: Quoted | None
+
+
+class Row(Node):
+    """`20 %, 3 m/s expect fallback return_home`."""
+
+    cells: tuple[Cell, ...]
+    expectation: Expectation
+
+
+class Table(Node):
+    """`table battery, wind.speed { ... }`: a case a row."""
+
+    columns: tuple[Subject, ...]
+    rows: tuple[Row, ...]
+
+
+class TestDecl(Node):
+    """`test "low battery turns an inspection into a return" from morning { given ... when ... expect ... }`."""
+
+    __test__: ClassVar[bool] = False  # for pytest: this is no test of ours
+
+    name: Quoted
+    nominal: Name | None
+    premises: Premises
+    request: Request | None
+    expectation: Expectation | None
+    table: Table | None

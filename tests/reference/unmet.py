@@ -1,0 +1,13 @@
+"""What the tests of a program find when they are run."""
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.language.load import Program
+from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.suite import suite
+from rtshcua.mavlink import dialect
+
+
+def unmet(program: Program) -> tuple[Diagnostic, ...]:
+    """The findings on expectations that are not met."""
+    ran = (run_case(case) for case in suite(program, dialect.load()).cases)
+    return tuple(each.finding for each in ran if each.finding is not None)

@@ -21,6 +21,7 @@ def test_codes_and_slugs_never_change() -> None:
         10: "incomplete",
         11: "decision",
         12: "anchor",
+        13: "tests",
         70: "fault",
         74: "io",
         130: "interrupted",

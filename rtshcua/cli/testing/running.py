@@ -1,0 +1,111 @@
+"""Runs the tests of files: each file is a program of its own with what it imports, and its own tests run."""
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.cli.progress import watched
+from rtshcua.cli.sources import Reading, examine, read_sources
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language.parse import parse
+from rtshcua.ground.language.paths import shown
+from rtshcua.ground.testing.case import Case, Suite, Tested
+from rtshcua.ground.testing.coverage.tally import Covered, Tally
+from rtshcua.ground.testing.run import Ran, run_case
+from rtshcua.ground.testing.suite import suite
+from rtshcua.mavlink import dialect
+
+
+class Results(NamedTuple):
+    """What was run, in the order of the files and their text; what is wrong with sources, each finding once; the texts;
+    the coverage, where it was asked for; and how many cases there are that were not chosen.
+    """
+
+    ran: tuple[Ran, ...]
+    diagnostics: tuple[Diagnostic, ...]
+    sources: dict[str, Source]
+    covered: tuple[Covered, ...] | None
+    left_out: int
+
+
+class _Work(NamedTuple):
+    """A file, by its name, and its program."""
+
+    name: str
+    reading: Reading
+
+
+def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool) -> Results:
+    """Run the cases whose name has `chosen` in it, in whatever case; empty: all."""
+    remembering = lru_cache(maxsize=None)(parse)
+    work = [_Work(shown(str(path)), read_sources([path], remembering)) for path in files]
+    found: dict[tuple[object, ...], Diagnostic] = {}
+    sources: dict[str, Source] = {}
+    ran: list[Ran] = []
+    tally = Tally() if with_coverage else None
+    left_out = 0
+    tested: set[tuple[str, int]] = set()  # where policies are declared that some test is under
+    for each in watched(work):
+        made = _suite(each.reading)
+        sources |= {**each.reading.program.sources, **made.sources}
+        for diagnostic in made.diagnostics:  # a file that two programs share has its findings once
+            found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        cases = [case for case in made.cases if chosen.casefold() in case.name.casefold()]
+        left_out += len(made.cases) - len(cases)
+        tested |= {_declared(one) for one in made.policies}
+        _count_policies(tally, made.policies, each.reading)
+        ran += [_run(case, tally) for case in cases]
+    if tally is not None:
+        for each in work:
+            policies, wrong = _untested(each, tested)
+            _count_policies(tally, policies, each.reading)
+            for diagnostic in wrong:
+                found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        sources |= tally.sources
+    covered = None if tally is None else tally.all()
+    return Results(tuple(ran), tuple(found.values()), sources, covered, left_out)
+
+
+def _suite(reading: Reading) -> Suite:
+    """The cases of a program's first file. One that declares no tests is not looked at any closer: that is for `check`;
+    but tests in what cannot be read would not be seen.
+    """
+    program = reading.program
+    if not program.units or not program.units[0].tests:
+        return Suite((), program.diagnostics if has_errors(program.diagnostics) else (), sources=program.sources)
+    return suite(program, dialect.load())
+
+
+def _run(case: Case, tally: Tally | None) -> Ran:
+    ran = run_case(case)
+    if tally is not None:
+        tally.case(ran)
+    return ran
+
+
+def _count_policies(tally: Tally | None, policies: Iterable[Tested], reading: Reading) -> None:
+    if tally is not None:
+        for policy in policies:
+            tally.policy(policy, reading.program.units, reading.program.sources)
+
+
+def _untested(work: _Work, tested: set[tuple[str, int]]) -> tuple[list[Tested], list[Diagnostic]]:
+    """The policies that a file declares and no test is under, of which nothing is covered; and the errors for which
+    there are none.
+    """
+    units = work.reading.program.units
+    declared = units[0].policies if units and units[0].file == work.name else ()
+    if all((policy.name.span.file, policy.name.span.start) in tested for policy in declared):
+        return [], []
+    checked = examine(work.reading)
+    each = [Tested(ground.lowered, ground.prepared) for ground in checked.grounds]
+    wrong = [found for found in checked.diagnostics if found.severity is Severity.ERROR]
+    return [one for one in each if _declared(one)[0] == work.name and _declared(one) not in tested], wrong
+
+
+def _declared(tested: Tested) -> tuple[str, int]:
+    span = tested.lowered.declaration.name.span
+    return span.file, span.start

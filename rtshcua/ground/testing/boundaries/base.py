@@ -1,0 +1,219 @@
+"""A situation to begin from: who asks for a skill, with which arguments, in which state, so that it is allowed.
+
+As much as can be is as a given state has it. What is looked for are values for which every rule and every clause of the
+contract is content, as the analysis of `ground.analysis` finds them; where the vehicle should be for its planned path
+to be content too is tried (`starts`).
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from rtshcua.decision import tree
+from rtshcua.decision.authority import CLASSES
+from rtshcua.decision.prepare import Malformed, prepare_invocation
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.solve import Goal
+from rtshcua.ground.analysis.witness import plainest
+from rtshcua.ground.testing.boundaries.parts import parts
+from rtshcua.ground.testing.boundaries.pivot import permitted, settled
+from rtshcua.ground.testing.boundaries.scene import Made, Scene, Value, Variable
+from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, MotionKind, SourceKind
+from rtshcua.model.flat.mission import Invocation, OnInadmissible, Plan
+from rtshcua.model.flat.policy import Policy, Rule, RuleKind
+from rtshcua.model.flat.situation import Context, Now, State
+
+#: the truth that each kind of condition should have; of permits one is enough
+_WANTED = {"forbid": FALSE, "confirm": FALSE, "degrade": FALSE}
+#: a height to begin from that is low and in the air, mm
+_ALOFT = 20_000
+#: a height that most skills may fly at, and a way that most may go, mm
+_LOW = 10_000
+
+
+class Asker(NamedTuple):
+    """A skill, and the role and the source that ask for it, by their numbers; `rule` is the permit that names them."""
+
+    skill: int
+    role: int
+    source: int
+    rule: Rule
+
+
+class Wish(NamedTuple):
+    """What to ask for, and what to change of the state; it remains to be tried whether it is allowed."""
+
+    asker: Asker
+    scene: Scene
+    made: Made
+
+
+def askers(policy: Policy) -> Iterator[Asker]:
+    """For each permit and skill someone whom it names, and for each other rule someone permitted on whom it bears where
+    it bears on none of these; nobody twice for one skill.
+    """
+    permits = [rule for rule in policy.rules if rule.kind == RuleKind.PERMIT]
+    seen: dict[tuple[int, int, int], Asker] = {}
+    for rule in permits:
+        for skill in rule.skills or range(len(policy.contracts)):
+            found = next(_askers(policy, rule, skill), None)
+            if found is not None:
+                seen.setdefault(found[:3], found)
+    for rule in policy.rules:
+        for skill in rule.skills or range(len(policy.contracts)):
+            if rule.kind == RuleKind.PERMIT or any(
+                each.skill == skill and _bears(rule, each) for each in seen.values()
+            ):
+                continue
+            able = (
+                each
+                for permit in permits
+                if skill in (permit.skills or (skill,))
+                for each in _askers(policy, permit, skill)
+            )
+            found = next((each for each in able if _bears(rule, each)), None)
+            if found is not None:
+                seen.setdefault(found[:3], found)
+    yield from seen.values()
+
+
+def _askers(policy: Policy, rule: Rule, skill: int) -> Iterator[Asker]:
+    """Everybody who may ask for a skill by a permit, the likeliest first."""
+    timing_class = policy.contracts[skill].timing_class
+    usual = policy.roles.index("operator")
+    for role in rule.roles or (usual, *(number for number in range(len(policy.roles)) if number != usual)):
+        for source in rule.sources or tuple(SourceKind):
+            if timing_class in CLASSES[source]:
+                yield Asker(skill, role, source, rule)
+
+
+def _bears(rule: Rule, asker: Asker) -> bool:
+    """Whether a rule is about someone's requests."""
+    return asker.role in (rule.roles or (asker.role,)) and asker.source in (rule.sources or (asker.source,))
+
+
+def wish(
+    asker: Asker, prepared: PreparedPolicy, asked: Questions, state: State, now: Now, entries: Sequence[tuple[int, int]]
+) -> Wish | None:
+    """Values for which nothing refuses; `entries` are places that a vehicle may be sent to, the likeliest first. None
+    where the analysis finds none.
+    """
+    best: Wish | None = None
+    for place in (*entries, (0, 0)):
+        scene = _sketch(asker, prepared, state, now, place, asked)
+        if scene is None:
+            continue
+        made = _content(scene, asked)
+        if made is not None and (best is None or len(made) < len(best.made)):
+            best = Wish(asker, scene, made)
+        if best is not None and not any(variable.argument for variable in best.made):
+            break
+        if not any(parameter.kind == PLACE for parameter in prepared.policy.contracts[asker.skill].parameters):
+            break
+    return best
+
+
+def _content(scene: Scene, asked: Questions) -> Made | None:
+    """What is changed so that each condition is content; if need be, but for those that a person is to confirm."""
+    every = list(parts(scene.invocation))
+    space = asked.space(scene.invocation.invocation.skill)
+    for without in ((), ("confirm",)):
+        goals: list[Goal] = [
+            (part.node, _WANTED.get(part.role, TRUE))
+            for part in every
+            if part.node is not None and part.role != "permit" and part.role not in without
+        ]
+        goals += [*permitted(every, scene), *_in_airspace(scene.invocation)]
+        found = settled(goals, space, scene)
+        if found is not None:
+            return found
+    return None
+
+
+def _in_airspace(invocation: PreparedInvocation) -> Iterator[Goal]:
+    airspace = invocation.policy.policy.airspace
+    if airspace is not None:
+        yield from ((tree.Inside(zone), TRUE) for zone in airspace.inside)
+        yield from ((tree.Inside(zone), FALSE) for zone in airspace.outside)
+
+
+def _sketch(
+    asker: Asker, prepared: PreparedPolicy, state: State, now: Now, place: tuple[int, int], asked: Questions
+) -> Scene | None:
+    """A scene with some arguments; the survey of an area is one place of it."""
+    policy = prepared.policy
+    contract = policy.contracts[asker.skill]
+    arguments: list[int] = []
+    zone = 0
+    for parameter in contract.parameters:
+        if parameter.kind == PLACE:
+            arguments += place
+        elif parameter.kind == QUANTITY:
+            arguments.append(plainest((parameter.low, parameter.high, 0, None)))
+        else:
+            zone = parameter.low if parameter.kind == ZONE else zone
+            arguments.append(parameter.low)
+    motion = contract.motion
+    path: tuple[int, ...] = ()
+    if motion.kind == MotionKind.FLY:
+        path = place
+    elif motion.kind == MotionKind.COVER:
+        path = asked.space(asker.skill).plane.place({zone: True}, lambda _: True) or (0, 0)
+    altitude = 0 if motion.altitude == -1 else arguments[motion.altitude]
+    speed = 0 if motion.speed == -1 else arguments[motion.speed]
+    flat = Invocation(
+        invocation_id=b"",
+        step=0,
+        phase=0,
+        skill=asker.skill,
+        source=asker.source,
+        role=asker.role,
+        arguments=tuple(arguments),
+        issued_at_us=now.utc_us,
+        phases=1,
+        on_inadmissible=int(OnInadmissible.ABORT),
+        contract=contract,
+        plan=Plan(motion.kind, path, altitude, speed),
+        text="",
+        file=0,
+        start=0,
+        end=0,
+        binding=b"",
+    )
+    phases = contract.phases[:1] or ("flight",)
+    invocation = prepare_invocation(flat, prepared, phases)
+    if isinstance(invocation, Malformed):
+        return None
+    context = Context(b"", policy.vehicle.identity, policy.version, 0, 0, 0, 0, ())
+    return Scene(invocation, state, context, now)
+
+
+def starts(scene: Scene) -> Iterator[tuple[int, int, int]]:
+    """Places and heights (local mm) from where the planned path may well be content: where the scene is, where the
+    path begins, and home; as high as the scene, as the plan, low over the ground, and on it.
+    """
+    invocation, vehicle = scene.invocation.invocation, scene.invocation.policy.policy.vehicle
+    x, y, height = (scene.state.values[slot] for slot in (vehicle.position, vehicle.position + 1, vehicle.height))
+    places = [*([] if x is None or y is None else [(x, y)]), invocation.plan.path[:2], (0, 0)]
+    heights = [*([] if height is None else [height]), invocation.plan.altitude, _ALOFT, 0]
+    for place in dict.fromkeys(tuple(each) for each in places if each):
+        for high in dict.fromkeys(heights):
+            yield place[0], place[1], high
+
+
+def others(scene: Scene, entries: Sequence[tuple[int, int]]) -> Iterator[Made]:
+    """The same arguments, and then one that the planned path depends on otherwise: as low as can be, another area, a
+    place nearer to home.
+    """
+    flat, policy = scene.invocation.invocation, scene.invocation.policy.policy
+    yield {}
+    for parameter in flat.contract.parameters:
+        values: list[Value] = []
+        if parameter.cell == flat.contract.motion.altitude:
+            values += dict.fromkeys((max(_LOW, parameter.low), parameter.low))
+        elif parameter.kind == ZONE:
+            values += (zone for zone in range(policy.declared) if zone != flat.arguments[parameter.cell])
+        elif parameter.kind == PLACE:
+            values += (*entries, (0, 0), (_LOW, 0))
+        yield from ({Variable(True, parameter.cell): value} for value in values)

@@ -1,0 +1,241 @@
+"""From a scene and the limits around it to blocks of cases."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from rtshcua.decision import tree
+from rtshcua.ground.testing.boundaries import written
+from rtshcua.ground.testing.boundaries.limits import Limit
+from rtshcua.ground.testing.boundaries.parts import Part, atoms
+from rtshcua.ground.testing.boundaries.scene import TIME, Made, Scene, Value, Variable
+from rtshcua.ground.testing.boundaries.suite import Block, Row
+from rtshcua.ground.testing.boundaries.values import (
+    always,
+    around,
+    ordered,
+    parameter_of,
+    signal_of,
+    variables,
+    writable,
+)
+from rtshcua.model.flat.contract import PLACE, SourceKind
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+
+#: how wrong the clock is in the case that asks what then; us
+_CLOCK_ERROR = 1_000_000
+
+
+class Frame(NamedTuple):
+    """What the blocks about one skill and one who asks have in common: the scene, what it changes of the nominal, the
+    nominal's name, and the phase where that is not the nominal's; `label` tells it from others.
+    """
+
+    label: str
+    scene: Scene
+    made: Made
+    nominal: str
+    phase: str | None = None
+
+    @property
+    def policy(self) -> Policy:
+        """The policy."""
+        return self.scene.invocation.policy.policy
+
+
+def tables(
+    frame: Frame, parts: Sequence[Part], limits: Iterable[Limit], bounds: Sequence[tuple[int, int]]
+) -> Iterator[Block]:
+    """A table for each variable, and for each other situation in which it decides something. `bounds` are what each
+    slot may be.
+    """
+    invocation = frame.scene.invocation
+    grouped: dict[tuple[Variable, tuple[tuple[Variable, Value], ...]], list[Limit]] = {
+        (variable, ()): [] for variable in variables(parts, invocation)
+    }
+    for limit in limits:
+        if limit.variable != TIME:
+            grouped.setdefault((limit.variable, limit.made), []).append(limit)
+    for (variable, made), found in grouped.items():
+        here = frame.made | dict(made)
+        values = [value for limit in found for value in around(limit)]
+        if not made:
+            values += always(variable, invocation)
+            values += [_present(frame, variable)]
+        cells = [
+            _cell(frame, variable, value) for value in ordered(values) if writable(value, variable, invocation, bounds)
+        ]
+        cells += [] if made else _ages(frame, variable)
+        rows = [Row((cell,)) for cell in dict.fromkeys(cells) if cell is not None]
+        name = name_of(frame, variable)
+        if rows:
+            yield block(frame, name, here, without=variable, comments=_comments(found), columns=(name,), rows=rows)
+
+
+def _ages(frame: Frame, variable: Variable) -> list[str]:
+    """What a signal is now, measured as long ago as it may be, and too long ago."""
+    if variable.argument or variable.at is None:
+        return []
+    signal, value = signal_of(frame.policy, variable.at), _present(frame, variable)
+    cell = None if value is None else written.signal(frame.policy, signal, value)
+    ages = (signal.stale_us, signal.stale_us + 1)
+    return [] if cell is None else [f"{cell} measured {written.duration(age)} ago" for age in ages]
+
+
+def _present(frame: Frame, variable: Variable) -> Value:
+    return frame.scene.place(variable) if _is_place(variable, frame) else frame.scene.value(variable)
+
+
+def times(frame: Frame, limits: Iterable[Limit]) -> Iterator[Block]:
+    """A test for each side of each moment at which something turns, and one at which the clock may be wrong."""
+    for limit in limits:
+        if limit.variable == TIME:
+            for value in (limit.holds, limit.fails):
+                assert isinstance(value, int)
+                here = frame.made | dict(limit.made) | {TIME: value}
+                yield block(frame, f"at {written.moment(value)}", here, comments=_comments([limit]))
+            here = frame.made | dict(limit.made) | {TIME: limit.holds}
+            within = f" within {written.duration(_CLOCK_ERROR)}"
+            yield block(frame, "on a clock that may be wrong", here, comments=_comments([limit]), clock=within)
+
+
+def stretches(frame: Frame) -> Iterator[Block]:
+    """A test on each side of what the contract says of time: its deadline since the release, its validity since the
+    issue.
+    """
+    flat = frame.scene.invocation.invocation
+    contract, remaining = flat.contract, frame.scene.context.remaining_us
+    spare = contract.deadline_us - remaining
+    for us in (spare, spare + 1) if spare >= 0 else (0,):
+        ago = written.duration(us)
+        said = f"released {ago} ago"
+        comment = f"deadline {written.duration(contract.deadline_us)}"
+        yield block(frame, said, frame.made, comments=(comment,), premises=(said,))
+    for us in (contract.validity_us, contract.validity_us + 1):
+        said, comment = f"issued {written.duration(us)} ago", f"valid for {written.duration(contract.validity_us)}"
+        yield block(frame, said, frame.made, comments=(comment,), premises=(said,))
+
+
+def phases(frame: Frame) -> Iterator[Block]:
+    """A test before the phases in which the skill means something, and one after them; one for each phase that rules
+    ask for.
+    """
+    valid = frame.scene.invocation.invocation.contract.phases
+    if valid:
+        first = valid[0]
+        yield block(frame, "in an earlier phase", frame.made, phase=f"phase earlier of earlier, {first}")
+        yield block(frame, "in a later phase", frame.made, phase=f"phase later of {first}, later")
+    for name in frame.policy.phases:
+        if not valid or name in valid:
+            yield block(frame, f"in the phase {name}", frame.made, phase=f"phase {name} of {name}")
+
+
+def over_time(frame: Frame, parts: Sequence[Part]) -> Iterator[Block]:
+    """A table for each condition over time that some part reads: each truth, whatever the signals are."""
+    read = {
+        atom.monitor for part in parts if part.node for atom in atoms(part.node) if isinstance(atom, tree.Monitored)
+    }
+    for number in sorted(read):
+        column = f"({written.over_time(frame.policy.monitors[number])})"
+        rows = [Row((truth,)) for truth in written.TRUTHS.values()]
+        yield block(frame, f"over time {number + 1}", frame.made, columns=(column,), rows=rows)
+
+
+def answers(frame: Frame, limits: Iterable[Limit]) -> Iterator[Block]:
+    """What becomes of a request that a person must confirm: approved, refused, and not answered in time."""
+    policy = frame.policy
+    for limit in limits:
+        if limit.part.role != "confirm" or limit.variable == TIME:
+            continue
+        rule = next(each.rule for each in frame.scene.invocation.candidates.confirms if each.rule is limit.part.clause)
+        here = frame.made | dict(limit.made) | {limit.variable: limit.holds}
+        role, comments = policy.roles[rule.approver], _comments([limit])
+        for word in ("approved", "refused"):
+            said = f"{word} by role {role}"
+            yield block(frame, said, here, comments=comments, premises=(said,))
+        for us in (rule.within_us, rule.within_us + 1):
+            ago = f"released {written.duration(us)} ago"
+            yield block(frame, f"not answered, {ago}", here, comments=comments, premises=(ago,))
+        return
+
+
+def block(
+    frame: Frame,
+    about: str,
+    made: Made,
+    *,
+    without: Variable | None = None,
+    comments: tuple[str, ...] = (),
+    premises: tuple[str, ...] = (),
+    columns: tuple[str, ...] = (),
+    rows: list[Row] | None = None,
+    clock: str = "",
+    phase: str | None = None,
+) -> Block:
+    """A block in the frame's scene, with some values changed of the nominal."""
+    where = phase or frame.phase
+    scene = frame.scene.with_all({key: value for key, value in made.items() if key != without and key != TIME})
+    given: list[str] = []
+    for variable, value in made.items():
+        if not variable.argument and variable not in (TIME, without):
+            cell = _cell(frame, variable, value)
+            given += [] if cell is None else [f"{name_of(frame, variable)} = {cell}"]
+    lines = [f"given {', '.join(given)}"] if given else []
+    if TIME in made:
+        moment = made[TIME]
+        assert isinstance(moment, int)
+        lines.append(f'at "{written.moment(moment)}"{clock}')
+    return Block(
+        title=f"{frame.label}: {about}",
+        nominal=frame.nominal,
+        request=request(scene.invocation.invocation, frame, without),
+        comments=comments,
+        premises=(*([where] if where else []), *lines, *premises),
+        columns=columns,
+        rows=rows or [Row()],
+    )
+
+
+def request(flat: Invocation, frame: Frame, without: Variable | None = None) -> str:
+    """The request as it stands after `when`."""
+    policy, contract = frame.policy, flat.contract
+    arguments: list[str] = []
+    for parameter in contract.parameters:
+        if without != Variable(True, parameter.cell):
+            cells = flat.arguments[parameter.cell : parameter.cell + 2]
+            value: Value = (cells[0], cells[1]) if _is_place(Variable(True, parameter.cell), frame) else cells[0]
+            arguments.append(f"{parameter.name} = {written.argument(policy, parameter, value)}")
+    source = SourceKind(flat.source).name.lower()
+    return f"{contract.name}({', '.join(arguments)}) by role {policy.roles[flat.role]} through {source}"
+
+
+def name_of(frame: Frame, variable: Variable) -> str:
+    """What a variable is called."""
+    assert variable.at is not None
+    if variable.argument:
+        return parameter_of(frame.scene.invocation, variable.at).name
+    return signal_of(frame.policy, variable.at).name
+
+
+def _is_place(variable: Variable, frame: Frame) -> bool:
+    assert variable.at is not None
+    if variable.argument:
+        return _wide(frame, variable.at)
+    return variable.at == frame.policy.vehicle.position
+
+
+def _wide(frame: Frame, cell: int) -> bool:
+    """Whether the parameter at a cell takes two."""
+    return parameter_of(frame.scene.invocation, cell).kind == PLACE
+
+
+def _cell(frame: Frame, variable: Variable, value: Value) -> str | None:
+    assert variable.at is not None
+    if variable.argument:
+        return written.argument(frame.policy, parameter_of(frame.scene.invocation, variable.at), value)
+    return written.signal(frame.policy, signal_of(frame.policy, variable.at), value)
+
+
+def _comments(limits: Iterable[Limit]) -> tuple[str, ...]:
+    """The clauses that turn here, each once."""
+    return tuple(dict.fromkeys(f"{limit.part.role}: {limit.part.text}" for limit in limits))

@@ -1,0 +1,200 @@
+"""What else must be so, that one comparison of a condition decides the condition, and the condition the decision.
+
+Of `(area inside bridge_a or area inside bridge_b) and altitude <= 30 m` the height only matters over a bridge. The
+question is put to the analysis that proves policies: the condition with the comparison taken as true must be true, with
+it taken as false must be false; no other rule may decide before. As much as possible stays as the scene has it.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from rtshcua.decision import tree
+from rtshcua.decision.evaluate import build
+from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.values import MISSING, Value, point
+from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
+from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.witness import Witness
+from rtshcua.ground.testing.boundaries.parts import Part
+from rtshcua.ground.testing.boundaries.scene import Made, Scene, Variable
+from rtshcua.model.flat.contract import PLACE
+from rtshcua.model.flat.limits import DAY
+
+#: conditions that are always, and never, true
+ALWAYS, NEVER = tree.AtMost((), 0), tree.AtMost((), -1)
+#: boxes that are looked at for one answer
+_BUDGET = 400
+#: 100 m, 100 m/s: the largest number of a signal that is written without need
+_LARGEST = 100_000
+#: the truth that a part must have for the steps after it to be reached
+_PASSED = {"forbid": FALSE, "permit": TRUE, "confirm": FALSE, "degrade": FALSE}
+
+
+def put(node: tree.Node, atom: tree.Atom, value: tree.Node) -> tree.Node:
+    """The condition with another in the place of an atom of it (that very one, not what is equal to it)."""
+    match node:
+        case tree.Both(left, right):
+            return tree.Both(put(left, atom, value), put(right, atom, value))
+        case tree.Either(left, right):
+            return tree.Either(put(left, atom, value), put(right, atom, value))
+        case tree.Not(operand):
+            return tree.Not(put(operand, atom, value))
+        case _:
+            return value if node is atom else node
+
+
+def matters(part: Part, atom: tree.Atom) -> list[Goal]:
+    """What makes an atom decide its condition: true when it is taken as true (false under a `not`), and the reverse."""
+    assert part.node is not None
+    up, down = put(part.node, atom, ALWAYS), put(part.node, atom, NEVER)
+    return [(up, FALSE), (down, TRUE)] if _denied(part.node, atom) else [(up, TRUE), (down, FALSE)]
+
+
+def _denied(node: tree.Node, atom: tree.Atom) -> bool:
+    """Whether an odd number of `not` stands before an atom."""
+    match node:
+        case tree.Both(left, right) | tree.Either(left, right):
+            return _denied(left, atom) or _denied(right, atom)
+        case tree.Not(operand):
+            inner = _denied(operand, atom)
+            return not inner if _holds(operand, atom) else inner
+        case _:
+            return False
+
+
+def _holds(node: tree.Node, atom: tree.Atom) -> bool:
+    match node:
+        case tree.Both(left, right) | tree.Either(left, right):
+            return _holds(left, atom) or _holds(right, atom)
+        case tree.Not(operand):
+            return _holds(operand, atom)
+        case _:
+            return node is atom
+
+
+def before(part: Part, parts: Sequence[Part], scene: Scene) -> list[Goal]:
+    """What the other conditions must be, so that this one decides: those of its step and of the steps before."""
+    goals: list[Goal] = []
+    for other in parts:
+        if other.node is None or (other.role == part.role and other.clause is part.clause):
+            continue
+        if other.role == "permit" and part.role == "permit":
+            goals.append((other.node, FALSE | UNKNOWN))
+        elif other.role in ("forbid", "confirm", "degrade") or other.role not in _PASSED:
+            goals.append((other.node, _PASSED.get(other.role, TRUE)))
+    if part.role != "permit":
+        goals += permitted(parts, scene)
+    return goals
+
+
+def permitted(parts: Sequence[Part], scene: Scene) -> Iterator[Goal]:
+    """Some permit is true; one without a condition, which is no part, permits whatever the others say."""
+    permits = [part.node for part in parts if part.role == "permit" and part.node is not None]
+    if permits and all(rule.rule.when is not None for rule in scene.invocation.candidates.permits):
+        some = permits[0]
+        for other in permits[1:]:
+            some = tree.Either(some, other)
+        yield some, TRUE
+
+
+def pivots(part: Part, atom: tree.Atom, parts: Sequence[Part], scene: Scene, space: Space) -> Iterator[Made]:
+    """What is changed in a scene so that an atom decides, the nearest first: empty where it does already, nothing where
+    no situation was found. What has several limits, as a zone has, shows each where it is so, and some where it is not.
+    """
+    goals, tables, at = matters(part, atom), scene.invocation.policy.tables, scene.environment()
+    others = before(part, parts, scene)
+    if all(build(node, tables)(at) & truths for node, truths in (*goals, *others)):
+        yield {}
+    holding: list[list[Goal]] = [[], [(atom, TRUE)], [(atom, FALSE)]]
+    for so in holding:
+        for wanted in ([*goals, *others], goals):
+            found = settled([*wanted, *so], space, scene)
+            if found is not None:
+                yield found
+                break
+
+
+def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> Made | None:
+    """The changes of a scene that reach goals, of variables as few as one after the other can be kept."""
+    invocation = scene.invocation
+    preferred = dict(_present(scene))
+    kept: dict[Variable, Value | tuple[Value, Value]] = {}
+    space = space._replace(phases=frozenset({invocation.phase}), monitors=scene.state.monitors or space.monitors)
+    plain = _plain(space)
+    answer = satisfiable(goals, plain, _BUDGET)
+    if isinstance(answer, Yes):
+        space = plain
+    else:
+        answer = satisfiable(goals, space, _BUDGET)
+    if not isinstance(answer, Yes):
+        return None
+    for variable, value in preferred.items():
+        narrowed = satisfiable(goals, _narrowed(space, {**kept, variable: value}, scene), _BUDGET)
+        if isinstance(narrowed, Yes):
+            kept[variable], answer = value, narrowed
+    return {
+        variable: value
+        for variable in preferred
+        if variable not in kept
+        for value in [_of(answer.witness, variable, scene)]
+        if value is not None
+    }
+
+
+def _plain(space: Space) -> Space:
+    """The same without numbers that no vehicle reports."""
+    slots = (
+        (max(low, -_LARGEST), min(high, _LARGEST), gap, members) if members is None and high > _LARGEST else value
+        for value in space.slots
+        for low, high, gap, members in (value,)
+    )
+    where = {space.tables.known.x, space.tables.known.y}
+    return space._replace(
+        slots=tuple(space.slots[slot] if slot in where else value for slot, value in enumerate(slots))
+    )
+
+
+def _present(scene: Scene) -> Iterator[tuple[Variable, Value | tuple[Value, Value]]]:
+    """What each variable is now: arguments first, then the time, then signals."""
+    invocation, at = scene.invocation, scene.environment()
+    policy, contract = invocation.policy.policy, invocation.invocation.contract
+    for parameter in contract.parameters:
+        cell = parameter.cell
+        one = at.arguments[cell]
+        yield Variable(True, cell), ((one, at.arguments[cell + 1]) if parameter.kind == PLACE else one)
+    yield Variable(False, None), point(scene.now.utc_us)
+    for signal in policy.signals:
+        slot = signal.slot
+        one = at.slots[slot]
+        yield Variable(False, slot), ((one, at.slots[slot + 1]) if slot == policy.vehicle.position else one)
+
+
+def _narrowed(space: Space, kept: dict[Variable, Value | tuple[Value, Value]], scene: Scene) -> Space:
+    arguments, slots = list(space.arguments), list(space.slots)
+    utc = space.utc
+    for variable, value in kept.items():
+        if variable.at is None:
+            utc = ((scene.now.utc_us, scene.now.utc_us),)
+            continue
+        cells = arguments if variable.argument else slots
+        values: tuple[Value, ...] = (value[0], value[1]) if isinstance(value[0], tuple) else (value,)
+        cells[variable.at : variable.at + len(values)] = values
+    return space._replace(arguments=tuple(arguments), slots=tuple(slots), utc=utc)
+
+
+def _of(witness: Witness, variable: Variable, scene: Scene) -> int | tuple[int, int] | None:
+    """The value that a witness has for a variable; None where it is missing. Where no zone has dates, any day will do,
+    so that it is the scene's.
+    """
+    invocation, policy = scene.invocation, scene.invocation.policy.policy
+    if variable.at is None:
+        moment, now = witness.at.utc[0][0], scene.now.utc_us
+        return moment if any(zone.dates for zone in policy.zones) else now - now % DAY + moment % DAY
+    cells = witness.at.arguments if variable.argument else witness.at.slots
+    one = cells[variable.at]
+    if one == MISSING:
+        return None
+    place = any(each.kind == PLACE and each.cell == variable.at for each in invocation.invocation.contract.parameters)
+    if (place and variable.argument) or (not variable.argument and variable.at == policy.vehicle.position):
+        other = cells[variable.at + 1]
+        return None if other == MISSING else (one[0], other[0])
+    return one[0]

@@ -1,0 +1,115 @@
+"""E1410: the clause that a test expects to decide, one of those that can."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.verdict import Decisive
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.compiler.files import shortened
+from rtshcua.ground.testing.case import Tested
+from rtshcua.model.flat.policy import RuleKind
+from rtshcua.model.ir.tests import Expectation
+
+#: what stands for the rest of a clause, so that a long one need not be quoted whole
+REST = "..."
+MAX_SHOWN = 6
+
+
+class _Candidate(NamedTuple):
+    """A clause that can decide: the word for its role, and all of its text, on one line."""
+
+    role: str
+    text: str
+    clause: Decisive
+
+
+def quotes(quoted: str, text: str) -> bool:
+    """Whether a text quotes a clause: whole, or up to `...`, of which something must stand before; how it is spaced
+    does not count.
+    """
+    words = _spaced(quoted)
+    if words.endswith(REST):
+        start = words.removesuffix(REST).rstrip()
+        return start != "" and text.startswith(start)
+    return text == words
+
+
+def quoted_clauses(
+    context: Context, expected: Expectation, invocation: PreparedInvocation, policy: Tested
+) -> tuple[Decisive, ...]:
+    """The clause that an expectation quotes, in all its flat forms; none where it quotes none, or after a finding: that
+    it quotes what no decision on this request can name, or what could be several.
+    """
+    quoted = expected.clause
+    if quoted is None:
+        return ()
+    every = list(_decisive(invocation, policy))
+    fitting = [each for each in every if quotes(quoted.text, each.text)]
+    if not fitting:
+        _unknown(context, expected, invocation, every)
+        return ()
+    several = {each.text for each in fitting} if expected.reason is not None else {each[:2] for each in fitting}
+    if len(several) > 1:
+        _ambiguous(context, expected, fitting)
+        return ()
+    return tuple(each.clause for each in fitting)
+
+
+def _unknown(
+    context: Context, expected: Expectation, invocation: PreparedInvocation, every: Sequence[_Candidate]
+) -> None:
+    quoted = expected.clause
+    assert quoted is not None
+    texts = list(dict.fromkeys(shortened(each.text) for each in every))
+    near = nearest(quoted.text, texts)
+    message = "nothing of a clause is quoted"
+    if quoted.text.strip(". "):
+        skill = invocation.invocation.contract.name
+        message = f"no decision on `{skill}` here is made by a clause `{shortened(quoted.text)}`"
+    context.report.add(
+        codes.UNKNOWN_CLAUSE,
+        quoted.span,
+        message,
+        help=f"did you mean `{near}`?" if near is not None else f"there are {_shown(texts)}",
+        fix=None if near is None or '"' in near else (quoted.span, f'"{near}"', "quote this clause"),
+    )
+
+
+def _ambiguous(context: Context, expected: Expectation, fitting: Sequence[_Candidate]) -> None:
+    quoted = expected.clause
+    assert quoted is not None
+    texts = list(dict.fromkeys(shortened(each.text) for each in fitting))
+    alike = len(texts) == 1
+    roles = list(dict.fromkeys(each.role for each in fitting))
+    context.report.add(
+        codes.UNKNOWN_CLAUSE,
+        quoted.span,
+        f"`{shortened(quoted.text)}` quotes {'more than one clause' if alike else 'the beginning of several clauses'}"
+        f" that can decide here",
+        help=f"say `because`: it stands in {_shown(roles)}" if alike else f"quote more of one: {_shown(texts)}",
+    )
+
+
+def _shown(texts: Sequence[str]) -> str:
+    return ", ".join(f"`{text}`" for text in texts[:MAX_SHOWN]) + (", ..." if len(texts) > MAX_SHOWN else "")
+
+
+def _decisive(invocation: PreparedInvocation, policy: Tested) -> Iterator[_Candidate]:
+    """All clauses that a decision on a request can name."""
+    contract = invocation.invocation.contract
+    for role, clauses in (("require", contract.require), ("assume", contract.assume), ("maintain", contract.maintain)):
+        for clause in clauses:
+            yield _Candidate(role, _spaced(policy.text(clause)), clause)
+    for rules in invocation.candidates:
+        for rule in rules:
+            yield _Candidate(RuleKind(rule.rule.kind).name.lower(), _spaced(policy.text(rule.rule)), rule.rule)
+    airspace = policy.prepared.policy.airspace
+    if airspace is not None:
+        yield _Candidate("airspace", _spaced(policy.text(airspace)), airspace)
+
+
+def _spaced(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,147 @@
+"""The situation of a case: what its nominal gives, what its test gives instead, and then its row."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.testing.case import Tested
+from rtshcua.ground.testing.monitored import monitored
+from rtshcua.ground.why.nominal import lasting
+from rtshcua.model.flat.policy import RuleKind
+from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
+from rtshcua.model.flat.situation import Approval, Now, State
+from rtshcua.model.ir.expression import Coordinates, Reference
+from rtshcua.model.ir.tests import Answer, Cell, Named, OverTime, Subject
+
+TRUTHS = {"true": TRUE, "false": FALSE}
+
+
+class Said(NamedTuple):
+    """A subject, its cell, and where both are said."""
+
+    subject: Subject
+    cell: Cell
+    span: Span
+
+
+class Situations:
+    """Makes the states of the cases under one policy; what it does not read is reported, once each."""
+
+    def __init__(self, context: Context, policy: Tested) -> None:
+        self._context = context
+        self._policy = policy
+        self._signals = {signal.name: signal for signal in policy.lowered.policy.signals}
+        self._monitors = monitored(context, policy.lowered)
+
+    def state(self, said: Iterable[Said], now: Now) -> State:
+        """The state in which all that is said holds, the last word on each, and nothing else is known.
+
+        Conditions over time are as if the state had been so for longer than any of them looks back, but for those that
+        are set by hand.
+        """
+        flat = self._policy.lowered.policy
+        values: list[int | None] = [None] * flat.slots
+        ages = [0] * flat.slots
+        truths: list[tuple[Sequence[int], int]] = []
+        for subject, cell, span in said:
+            if isinstance(subject, OverTime):
+                truths.append((self._numbers(subject), _truth(cell)))
+                continue
+            signal = self._signals.get(subject.name.text)
+            if signal is None:
+                self._unread(subject, span)
+                continue
+            for offset, value in enumerate(self._cells(signal, cell)):
+                values[signal.slot + offset] = value
+                ages[signal.slot + offset] = 0 if cell.measured is None else cell.measured.value
+        state = lasting(State(tuple(values), tuple(ages)), self._policy.prepared, now)
+        monitors = list(state.monitors)
+        for numbers, truth in truths:
+            for number in numbers:
+                monitors[number] = truth
+        return State(state.values, state.ages, tuple(monitors))
+
+    def approvals(self, answers: Iterable[Answer], at_us: int) -> tuple[Approval, ...]:
+        """What people answered to the `confirm` rules that wait for them, at monotonic times before `at_us`."""
+        under = self._policy.lowered
+        found: list[Approval] = []
+        for answer in answers:
+            role = under.roles.get(answer.role.text)
+            rules = [
+                number
+                for number, rule in enumerate(under.policy.rules)
+                if rule.kind == RuleKind.CONFIRM and rule.approver == role
+            ]
+            if role is None or not rules:
+                self._unasked(answer)
+                continue
+            moment = at_us - (0 if answer.ago is None else answer.ago.value)
+            found += [Approval(number, role, int(answer.granted), moment) for number in rules]
+        return tuple(found)
+
+    def missing(self, reads: Iterable[int], said: Iterable[Said]) -> list[str]:
+        """The signals in these slots of which nothing is said."""
+        given = {each.subject.name.text for each in said if isinstance(each.subject, Named)}
+        slots = set(reads)
+        return [name for name, signal in self._signals.items() if signal.slot in slots and name not in given]
+
+    def _cells(self, signal: Signal, cell: Cell) -> tuple[int | None, ...]:
+        bound = self._context.bound.get(id(cell))
+        if cell.value is None or bound is None:
+            return (None, None) if signal.kind == POSITION else (None,)
+        (value,) = bound
+        if isinstance(value, Coordinates):
+            place = self._policy.lowered.zones.place(value)
+            return (None, None) if place is None else (place[0], place[1])
+        assert isinstance(value, int)
+        return (None,) if _means_unknown(signal, value) else (value,)
+
+    def _numbers(self, subject: OverTime) -> Sequence[int]:
+        numbers = self._monitors.numbers(subject.condition)
+        if not numbers:
+            words = self._context.report.text(subject.condition.span)
+            near = suggestion(words, self._monitors.texts)
+            self._context.report.add(
+                codes.WITHOUT_EFFECT,
+                subject.span,
+                f"nothing in `{self._policy.name}` observes `{words}`, so its truth changes nothing",
+                help=near or (f"it observes {listed(self._monitors.texts)}" if self._monitors.texts else None),
+                labels=[(self._policy.lowered.declaration.name.span, "the policy is declared here")],
+            )
+        return numbers
+
+    def _unread(self, subject: Named, span: Span) -> None:
+        self._context.report.add(
+            codes.WITHOUT_EFFECT,
+            span,
+            f"nothing in `{self._policy.name}` reads `{subject.name.text}`, so its value changes nothing",
+            help=f"it reads {listed(self._signals)}",
+            labels=[(self._policy.lowered.declaration.name.span, "the policy is declared here")],
+        )
+
+    def _unasked(self, answer: Answer) -> None:
+        under = self._policy.lowered
+        approvers = dict.fromkeys(rule.approver for rule in under.policy.rules if rule.kind == RuleKind.CONFIRM)
+        names = [under.policy.roles[role] for role in approvers]
+        waits = f"its rules wait for {listed(names)}" if names else "it has no `confirm`"
+        self._context.report.add(
+            codes.WITHOUT_EFFECT,
+            answer.span,
+            f"no `confirm` of `{self._policy.name}` waits for the role `{answer.role.text}`",
+            help=suggestion(answer.role.text, names) or waits,
+            labels=[(under.declaration.name.span, "the policy is declared here")],
+        )
+
+
+def _means_unknown(signal: Signal, value: int) -> bool:
+    """Whether the value of an enumeration is one that whoever reads the signal takes for "not known"."""
+    return signal.kind == ENUMERATION and all(value in source.unknown for source in signal.sources)
+
+
+def _truth(cell: Cell) -> int:
+    return TRUTHS.get(cell.value.name, UNKNOWN) if isinstance(cell.value, Reference) else UNKNOWN

@@ -1,0 +1,53 @@
+"""Tests that are generated of a policy in a text, and what they notice when it changes."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.ground.compiler.program import examine_program
+from rtshcua.ground.language.load import load
+from rtshcua.ground.language.parse import parse
+from rtshcua.ground.testing import case as cases
+from rtshcua.ground.testing.boundaries.generate import Generated, generate
+from rtshcua.ground.testing.boundaries.plan import Plan
+from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.suite import suite
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+DIALECT = dialect.load()
+PARSE = lru_cache(maxsize=None)(parse)
+ENTRY = ((104_967, 113_402),)  # of bridge_a, local mm
+
+
+def play(text: str, others: Mapping[str, str]) -> cases.Suite:
+    """The cases of a text; `others` are files beside it."""
+
+    def read(path: str) -> bytes:
+        name = Path(path).name
+        if name == "tests.rts":
+            return text.encode()
+        return others[name].encode() if name in others else (CHECKOUT / path).read_bytes()
+
+    return suite(load(["tests.rts"], read, str(CHECKOUT), None, PARSE), DIALECT)
+
+
+def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) -> Generated:
+    """What is generated of the one policy in a text, which is in the file `name`, and imported as `imports`."""
+
+    def read(path: str) -> bytes:
+        return text.encode() if Path(path).name == name else (CHECKOUT / path).read_bytes()
+
+    checked = examine_program(load([name], read, str(CHECKOUT), None, PARSE), DIALECT)
+    (ground,) = checked.grounds
+    plan = Plan(skills, (imports,), None, None, ENTRY)
+    return generate(cases.Tested(ground.lowered, ground.prepared), plan, lambda draft: play(draft, {name: text}))
+
+
+def failures(of: Generated, others: Mapping[str, str]) -> list[str]:
+    """The cases that are not met, or that the language refuses."""
+    assert of.text is not None
+    played = play(of.text, others)
+    wrong = [each.code.id for each in played.diagnostics if each.severity is Severity.ERROR]
+    return wrong + [case.name for case in played.cases if not run_case(case).met]

@@ -1,0 +1,40 @@
+"""docs/testing.md: its examples are sources, and its commands end as it says."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rtshcua.cli import app
+from rtshcua.diagnostics.exits import ExitCode
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "testing.md"
+TEXT = PAGE.read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+
+
+def test_its_commands_are_true(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    policy, tests = blocks("rts")
+    Path("yard.rts").write_text(policy, encoding="utf-8")
+    Path("tests").mkdir()
+    Path("tests/yard.rts").write_text(tests, encoding="utf-8")
+    (settings,) = blocks("toml")
+    Path("rtshcua.toml").write_text(settings, encoding="utf-8")
+    commands = [shlex.split(line, comments=True) for block in blocks("sh") for line in block.splitlines()]
+    assert len(commands) == 8
+    for program, *words in commands:
+        assert program == "rtshcua"
+        assert app.main(words) == ExitCode.OK, words
+        assert "error" not in capsys.readouterr().err
+    assert Path("report.xml").read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_the_page_fits_its_width() -> None:
+    assert max(len(line) for line in TEXT.splitlines() if not line.startswith("|")) <= 130

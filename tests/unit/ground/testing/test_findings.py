@@ -1,0 +1,224 @@
+"""What is wrong with nominals and tests is said in the words that are used elsewhere."""
+
+import pytest
+
+from reference.deciding import IMPORT, NOMINAL, WHEN, found
+
+WRONG = [
+    ("given batery = 20 %", "E0201", "nothing declares `batery`", "did you mean `battery`?"),
+    ("given city = 20 %", "E0204", "`city` is a zone, not a value", None),
+    ("given battery = 20 m", "E0310", "a ratio is asked, and `20 m` is a length", None),
+    (
+        "given height = 20 m above sea",
+        "E0311",
+        "`20 m above sea` is above sea, where an altitude above home is asked",
+        None,
+    ),
+    ("given gps.fix = fix_4d", "E0313", "`fix_4d` is not a value of `gps_fix`", None),
+    ("given position = city", "E0312", "", None),
+    ("given battery = link.quality", "E0318", "`link.quality` is not known before the flight", None),
+    ("given battery = 20 % measured 3 m ago", "E0310", "a duration is asked, and `3 m` is a length", None),
+    ("given battery = 20 %, battery = 30 %", "E1406", "`battery` is given twice", "keep one of them"),
+    (
+        "given (battery < 30 %) = true",
+        "E0312",
+        "a condition over time is asked, and `battery < 30 %` is about the moment",
+        None,
+    ),
+    (
+        "given (battery < 30 % for the last 5 s) = 5 %",
+        "E0312",
+        "`5 %` is no truth, and a condition over time has one",
+        "write `true`, `false` or `unknown`",
+    ),
+    ("given (battery < 30 m for the last 5 s) = true", "E0310", "a ratio is asked, and `30 m` is a length", None),
+    (
+        "given (battery < 30 % for the last 5 s) = tru",
+        "E0312",
+        "`tru` is no truth, and a condition over time has one",
+        "did you mean `true`?",
+    ),
+    (
+        "given (battery < 30 % for the last 5 s) = true",
+        "E1409",
+        "nothing in `bridge_inspection` observes `battery < 30 % for the last 5 s`, so its truth changes nothing",
+        None,
+    ),
+    (
+        "given (battery < 30 % for the last 5 s) = true measured 2 s ago",
+        "E1409",
+        "the truth of a condition over time has no age",
+        "leave `measured ... ago` out",
+    ),
+    (
+        "given gps.accuracy = 3 m",
+        "E1409",
+        "nothing in `bridge_inspection` reads `gps.accuracy`, so its value changes nothing",
+        None,
+    ),
+    (
+        "approved by supervisr",
+        "E1409",
+        "no `confirm` of `bridge_inspection` waits for the role `supervisr`",
+        "did you mean `supervisor`?",
+    ),
+    ("released 3 m ago", "E0310", "a duration is asked, and `3 m` is a length", None),
+    ("released -3 s ago", "E0319", "`-3 s` must not be negative", None),
+    ("phase inspektion", "E0201", "`inspektion` is none of the phases of the mission", "did you mean `inspection`?"),
+    ("phase a of a, b, a", "E0202", "the phase `a` is named twice", None),
+    (
+        "phase a of a, b",
+        "E0802",
+        "`inspect_area` is valid only during `inspection`, and the test knows no such phase",
+        "say the phases in their order, as in `phase a of a, inspection`",
+    ),
+]
+
+
+@pytest.mark.parametrize(("part", "code", "message", "help"), WRONG, ids=[each[0] for each in WRONG])
+def test_a_premise(part: str, code: str, message: str, help: str | None) -> None:
+    findings = found(f'test "it" {{ {WHEN} {part} expect allow }}')
+    assert {each[0] for each in findings} == {code}
+    assert not message or (message in [each[1] for each in findings])
+    assert help is None or help in [each[2] for each in findings]
+
+
+ASKED = [
+    ("inspect_aria(bridge_a)", "E0201", "nothing declares a skill `inspect_aria`"),
+    ("inspect_area(bridge_a)", "E0603", "`inspect_area` is called without `altitude`"),
+    ("inspect_area(bridge_a, hight = 3 m)", "E0601", "`inspect_area` has no parameter `hight`"),
+    ("inspect_area(bridge_a, 3 s)", "E0310", "an altitude above home is asked, and `3 s` is a duration"),
+    ("inspect_area(bridge_a, 3 m, zigzag)", "E0313", "`zigzag` is not a value of `pattern`"),
+    ("inspect_area(bridge_a, 3 m) through ajent", "E0709", "there is no source of requests `ajent`"),
+    ("inspect_area(bridge_a, 3 m) by operater", "E0702", "no rule of `bridge_inspection` is about the role `operater`"),
+    ("spin()", "E0702", "no rule of `bridge_inspection` is about `spin`"),
+    ("inspect_area(own, 20 m)", "E0207", "the zone `own` is not one that the policy `bridge_inspection` imports"),
+]
+
+SPIN = """skill spin() {
+  motion hold  class tactical  deadline 5 s  valid for 40 min  lasts at most 1 min
+  fallback return_home, emergency_land  energy at most 5 %
+}
+zone own = circle(47.39850 N, 8.54600 E, 30 m)
+"""
+
+
+@pytest.mark.parametrize(("request_", "code", "message"), ASKED)
+def test_a_request(request_: str, code: str, message: str) -> None:
+    findings = found(f'{SPIN}test "it" {{ when {request_} expect allow }}')
+    assert [each[:2] for each in findings] == [(code, message)]
+
+
+TABLES = [
+    ("wind { 3 m/s expect allow }", "E0201", "`wind` is neither a signal nor a parameter of `inspect_area`"),
+    ("city { 3 m/s expect allow }", "E0204", "`city` is a zone, not a value"),
+    ("battery, battery { 3 %, 3 % expect allow }", "E1406", "`battery` is given twice"),
+    ("altitude { 3 m expect allow }", "E0602", "`altitude` is given twice"),
+    ("speed { unknown expect allow }", "E0312", "an argument is never unknown"),
+    ("speed { 3 m/s measured 2 s ago expect allow }", "E0312", "an argument is not measured, and has no age"),
+    ("speed { 3 m expect allow }", "E0310", "a speed is asked, and `3 m` is a length"),
+    ("battery { 3 m expect allow }", "E0310", "a ratio is asked, and `3 m` is a length"),
+    ("battery { 3 %, 4 % expect allow }", "E1405", "this row has 2 cells, and the table has 1 column"),
+    ("battery { }", "E1402", "the table of the test has no row, so nothing is decided"),
+    (
+        "battery { 3 % expect deny because state/violated }",
+        "E1404",
+        "`state/violated` is a reason of `fallback`, never of `deny`",
+    ),
+]
+
+
+@pytest.mark.parametrize(("table", "code", "message"), TABLES)
+def test_a_table(table: str, code: str, message: str) -> None:
+    findings = found(f'test "it" {{ {WHEN} table {table} }}')
+    assert (code, message) in [each[:2] for each in findings]
+    assert {each[0] for each in findings} == {code}
+
+
+def test_a_test_says_what_is_asked_and_what_must_be_decided() -> None:
+    both = found(f'test "it" {{ {WHEN} expect allow table battery {{ 80 % expect allow }} }}')
+    neither = found('test "it" { }')
+    assert [each[1] for each in both] == ["the test does not say which decision is meant: it has a table too"]
+    assert [each[1] for each in neither] == [
+        "the test does not say what is asked",
+        "the test does not say what must be decided",
+    ]
+
+
+def test_who_asks_and_when_and_in_which_phase_is_never_made_up() -> None:
+    bare = IMPORT + "nominal bare { under bridge_inspection on quad }\n"
+    findings = found(f'test "it" {{ {WHEN} expect allow }}', bare)
+    assert [each[1] for each in findings] == [
+        "neither the test nor its nominal says who asks",
+        "neither the test nor its nominal says when it is",
+        "neither the test nor its nominal says in which phase of its mission that is",
+    ]
+
+
+def test_a_nominal_has_a_policy_and_a_vehicle() -> None:
+    findings = found('test "it" { expect allow }', IMPORT + "nominal bare { }\n")
+    assert findings[0] == ("E0107", "nominal `bare` does not say its `under`, `on`", "add `under`, `on`")
+    findings = found("", IMPORT + NOMINAL.replace("on quad", "on quat").replace("under bridge", "under brid"))
+    assert [each[:2] for each in findings] == [
+        ("E0201", "nothing declares a policy `brid_inspection`"),
+        ("E0201", "nothing declares a vehicle `quat`"),
+    ]
+
+
+def test_a_nominal_is_named_imported_or_the_only_one() -> None:
+    test = f'test "it" FROM {{ {WHEN} expect allow }}'
+    beside = {"good": IMPORT + NOMINAL, "other": IMPORT + NOMINAL.replace("morning", "noon")}
+    imports = 'import "good.rts"\nimport "other.rts"\n'
+    assert found(test.replace("FROM", ""), 'import "good.rts"\n', **beside) == []
+    assert found(test.replace("FROM", "from noon"), imports, **beside) == []
+    (ambiguous,) = found(test.replace("FROM", ""), imports, **beside)
+    assert ambiguous[:2] == ("E1401", "there are 2 nominals, and the test does not say from which it starts")
+    (none,) = found(test.replace("FROM", ""), IMPORT)
+    assert none[:2] == ("E1401", "nothing says where the test starts from")
+    (unknown,) = found(test.replace("FROM", "from mornin"))
+    assert unknown == ("E0201", "nothing declares a nominal `mornin`", "did you mean `morning`?")
+    own = NOMINAL.replace("morning", "own")
+    assert found(test.replace("FROM", ""), imports + own, **beside) == []
+
+
+def test_of_a_signal_that_is_not_given_a_warning_tells() -> None:
+    without = NOMINAL.replace(", wind.speed = 3 m/s", "")
+    (told,) = found(f'test "it" {{ {WHEN} expect allow }}', IMPORT + without)
+    assert told[:2] == (
+        "E1408",
+        "a decision on `inspect_area` reads `wind.speed`, and nothing gives it: it is unknown",
+    )
+    assert found(f'test "it" {{ {WHEN} given wind.speed = unknown expect allow }}', IMPORT + without) == []
+    assert found('test "it" { when return_home() expect allow }', IMPORT + without) == []
+
+
+def test_a_clause_is_quoted_whole_or_up_to_what_is_left_out() -> None:
+    def quoting(clause: str) -> list[tuple[str, str, str | None]]:
+        return found(f'test "it" {{ {WHEN} expect fallback at "{clause}" }}')
+
+    assert quoting("battery > 35 %") == quoting("battery  >  35 %") == quoting("permit inspect_area ...") == []
+    assert quoting("airspace inside city outside school") == quoting("degrade any ...") == []
+    (wrong,) = quoting("battery > 34 %")
+    assert wrong == (
+        "E1410",
+        "no decision on `inspect_area` here is made by a clause `battery > 34 %`",
+        "did you mean `battery > 35 %`?",
+    )
+    (other,) = quoting("permit goto ...")
+    assert other[0] == "E1410"
+
+
+def test_hostile_tables_end_at_a_limit() -> None:
+    rows = "80 % expect allow\n" * 5_000
+    (many,) = found(f'test "it" {{ {WHEN} table battery {{ {rows} }} }}')
+    assert many[:2] == ("E1001", "with this test the file has more than 4096 cases, and so many are run of one file")
+    columns = ", ".join(f"c{number}" for number in range(65))
+    (wide,) = found(f'test "it" {{ {WHEN} table {columns} {{ }} }}')
+    assert wide[:2] == ("E1001", "the table has 65 columns, and at most 64 are read")
+    phases = ", ".join(f"p{number}" for number in range(65))
+    assert "E1001" in {each[0] for each in found(f'test "it" {{ {WHEN} phase p1 of {phases} expect allow }}')}
+
+
+def test_an_imported_files_tests_are_its_own_business() -> None:
+    beside = {"good": IMPORT + NOMINAL + 'test "wrong" { when nothing() expect deny because x }'}
+    assert found(f'test "it" {{ {WHEN} expect allow }}', 'import "good.rts"\n', **beside) == []

@@ -1,0 +1,126 @@
+"""Generated tests are sources that pass, surround every limit, and notice when one is moved."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from reference.generated_tests import failures, generated, play
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.format.format import formatted
+from rtshcua.ground.testing.boundaries.generate import Generated
+from rtshcua.ground.testing.run import run_case
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+SHIPPED = CHECKOUT / "policies" / "bridge_inspection.rts"
+
+#: one skill, one rule of each kind, a template, a delegation, a window of the day and a condition over time
+SMALL = """import "lib:policies/site.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+
+skill rise(top: altitude in 5 m .. 50 m) {
+  motion   climb to top
+  class    tactical  deadline 5 s  valid for 40 min  lasts at most 1 min
+  require  (link.quality >= 40 % or gps.accuracy <= 2 m) and wind.speed <= 8 m/s for the last 3 s
+  fallback return_home, emergency_land
+  energy   at most 5 %  record intent, decision, state, authorization, effect
+}
+template calm(most: speed in 1 m/s .. 20 m/s, who: role) {
+  permit rise by role who through agent, operator when top <= 30 m and wind.speed <= most
+}
+policy small version 3 {
+  use      calm(6 m/s, who = operator)
+  delegate rise by role operator to role trainee through operator when top <= 12 m
+  permit   return_home, emergency_land by any
+  permit   hover by role operator through agent when local time in 06:00 .. 22:00
+  forbid   rise by any when battery in 10 % .. 18 %
+  confirm  rise when top < 8 m by role supervisor within 30 s
+  degrade  rise when obstacle.distance < 4 m to return_home
+  airspace inside city outside school
+  contingency return_home, emergency_land
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def small() -> Generated:
+    return generated(SMALL, "small.rts", "small.rts")
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Generated:
+    text = SHIPPED.read_text(encoding="utf-8")
+    return generated(text, "bridge_inspection.rts", "lib:policies/bridge_inspection.rts")
+
+
+def test_what_is_generated_passes_and_keeps_passing_when_it_is_formatted(small: Generated) -> None:
+    assert small.text is not None
+    assert small.without == ()
+    assert failures(small, {"small.rts": SMALL}) == []
+    text = formatted(Source("tests.rts", small.text)).text
+    assert text is not None
+    played = play(text, {"small.rts": SMALL})
+    assert len(played.cases) == small.cases
+    assert all(run_case(case).met for case in played.cases)
+    assert played.diagnostics == ()
+
+
+def test_it_says_that_it_records_what_is_so_now(small: Generated) -> None:
+    assert small.text is not None
+    assert "record what the policy `small` (version 3) decides" in " ".join(small.text.split())
+    assert "read them before they are kept" in small.text
+
+
+def test_there_are_limits_of_every_kind_of_clause(small: Generated) -> None:
+    roles = {each.part.role for each in small.limits}
+    assert roles == {"permit", "forbid", "confirm", "degrade", "require", "airspace", "energy"}
+    assert any("delegate rise" in each.part.text for each in small.limits)
+
+
+@pytest.mark.parametrize(
+    ("written", "moved"),
+    [
+        ("top <= 30 m", "top <= 30001 mm"),
+        ("calm(6 m/s", "calm(6001 mm/s"),
+        ("top <= 12 m", "top <= 12001 mm"),
+        ("06:00 .. 22:00", "06:00 .. 21:59"),
+        ("10 % .. 18 %", "10 % .. 18.01 %"),
+        ("top < 8 m", "top < 8001 mm"),
+        ("within 30 s", "within 30001 ms"),
+        ("distance < 4 m", "distance < 4001 mm"),
+        ("quality >= 40 %", "quality >= 40.01 %"),
+        ("accuracy <= 2 m", "accuracy <= 1999 mm"),
+        ("deadline 5 s", "deadline 5001 ms"),
+        ("5 m .. 50 m", "5 m .. 50001 mm"),
+        ("energy   at most 5 %", "energy   at most 5.01 %"),
+        ("airspace inside city outside school", "airspace inside city"),
+    ],
+)
+def test_a_limit_of_a_policy_that_moves_by_one_unit_is_noticed(small: Generated, written: str, moved: str) -> None:
+    assert written in SMALL
+    assert failures(small, {"small.rts": SMALL.replace(written, moved)}) != []
+
+
+def test_every_limit_of_the_shipped_policy_is_noticed(shipped: Generated) -> None:
+    """But for how long the contingency hovers, which nothing that is decided depends on."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    numbers = re.compile(r"//[^\n]*|(?P<number>\d+) (?P<unit>m|%|s)(?!\w)")
+    finer = {"m": "{}001 mm", "%": "{}.01 %", "s": "{}001 ms"}
+    noticed: dict[str, bool] = {}
+    for found in numbers.finditer(text):
+        if found["number"]:
+            moved = text[: found.start()] + finer[found["unit"]].format(found["number"]) + text[found.end() :]
+            place = text[text.rindex("\n", 0, found.start()) : found.end()].strip()
+            noticed[place] = failures(shipped, {"bridge_inspection.rts": moved}) != []
+    assert len(noticed) == 8
+    assert [place for place, seen in noticed.items() if not seen] == ["contingency hover for 10 s"]
+
+
+def test_some_skills_alone(shipped: Generated) -> None:
+    text = SHIPPED.read_text(encoding="utf-8")
+    alone = generated(text, "bridge_inspection.rts", "lib:policies/bridge_inspection.rts", ("hover",))
+    assert alone.text is not None
+    assert set(re.findall(r'test "(\w+):', alone.text)) == {"hover"}
+    assert 0 < alone.cases < shipped.cases

@@ -1,0 +1,121 @@
+"""Limits in every arm of an `or`, under `not`, of zones in all their kinds: reached, or named."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from reference.generated_tests import failures, generated
+from rtshcua.ground.testing.boundaries.generate import Generated, Unreached
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+HEAD = """import "lib:policies/site.rts"
+import "lib:skills/signals.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/goto.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+"""
+#: a ring and a window in one arm, a grown zone in the other; bands for the vehicle; a rule on somebody else
+ARMS = """
+zone yard = difference(circle(47.3981 N, 8.5456 E, 70 m), circle(47.3982 N, 8.5462 E, 11 m)) active 21:15 .. 05:45
+zone block = circle(47.3981 N, 8.5470 E, 40 m) floor 17 m ceiling 33 m above home
+policy arms version 3 {
+  permit goto by role operator, pilot through operator
+         when target inside yard or (target inside grow(bridge_a, 7 m) and wind.speed <= 6 m/s)
+  permit return_home, emergency_land, hover by any
+  forbid goto by role operator when not (height < 40 m and position outside block)
+  forbid goto by role pilot when battery < 55 % and altitude > 13 m
+  airspace inside city outside school
+  contingency return_home, emergency_land
+}
+"""
+TEXT = HEAD + ARMS
+
+
+@pytest.fixture(scope="module")
+def arms() -> Generated:
+    return generated(TEXT, "arms.rts", "arms.rts", ("goto",))
+
+
+def test_they_pass(arms: Generated) -> None:
+    assert failures(arms, {"arms.rts": TEXT}) == []
+
+
+@pytest.mark.parametrize(
+    ("written", "moved"),
+    [
+        ("E, 70 m)", "E, 70001 mm)"),
+        ("E, 11 m)", "E, 11001 mm)"),
+        ("21:15", "21:16"),
+        ("05:45", "05:46"),
+        ("grow(bridge_a, 7 m)", "grow(bridge_a, 7001 mm)"),
+        ("<= 6 m/s", "<= 6001 mm/s"),
+        ("height < 40 m", "height < 40001 mm"),
+        ("floor 17 m", "floor 17001 mm"),
+        ("ceiling 33 m", "ceiling 33001 mm"),
+        ("battery < 55 %", "battery < 55.01 %"),
+        ("altitude > 13 m", "altitude > 13001 mm"),
+    ],
+)
+def test_a_limit_in_any_arm_that_moves_by_one_unit_is_noticed(arms: Generated, written: str, moved: str) -> None:
+    assert TEXT.count(written) == 1
+    assert failures(arms, {"arms.rts": TEXT.replace(written, moved)}) != []
+
+
+def named(of: Generated) -> set[tuple[str, str]]:
+    return {(each.role, each.about) for each in of.unreached}
+
+
+def test_what_is_not_reached_is_named_and_nothing_else(arms: Generated) -> None:
+    assert named(arms) == {
+        ("permit", "the ceiling of `grow(bridge_a, 7 m)`, which counts for no place on the ground"),
+        ("energy", "the charge that is needed"),  # `require` asks for more
+        ("airspace", "the ceiling of `city`"),  # forbidden before that is looked at, as is the next
+        ("maintain", "`height`"),
+    }
+    assert {each.role for each in arms.unreached if each.turned} >= {"energy"}
+
+
+def test_what_no_situation_reaches_is_named_where_the_tests_are_read() -> None:
+    far = "zone far = circle(47.3981 N, 8.5456 E, 70 m) floor 5 m above home\n"
+    text = (
+        f"{HEAD}{far}"
+        + """policy arms version 3 {
+  permit goto by role operator through operator when target inside far or wind.speed <= 200000 m/s and height < 80 m
+  permit return_home, emergency_land, hover by any
+  forbid goto by any when battery < 20 % and battery > 30 %
+  forbid goto by role pilot when altitude > 13 m
+  airspace inside city outside school
+  contingency return_home, emergency_land
+}
+"""
+    )
+    made = generated(text, "arms.rts", "arms.rts", ("goto",))
+    assert made.text is not None
+    found = named(made)
+    assert ("forbid", "`battery`") in found
+    assert ("forbid", "") in found  # nobody with that role is permitted anything
+    assert ("permit", "the floor of `far`, which counts for no place on the ground") in found
+    comment = " ".join(re.sub(r"\n//\s*", " ", made.text).split())
+    assert "NOT REACHED" in comment
+    for each in made.unreached:
+        assert each.words in comment, each
+    assert Unreached("goto", "forbid", "forbid goto by role pilot when altitude > 13 m", "") in made.unreached
+
+
+def test_hours_and_dates_of_an_airspace_are_reached() -> None:
+    shut = "zone shut = circle(47.3990 N, 8.5470 E, 30 m) active 12:30 .. 14:30\n"
+    text = (
+        f"{HEAD}{shut}"
+        + """policy arms version 3 {
+  permit goto, return_home, emergency_land, hover by any
+  airspace inside city outside school, shut
+  contingency return_home, emergency_land
+}
+"""
+    )
+    made = generated(text, "arms.rts", "arms.rts", ("hover",))
+    assert named(made) <= {("energy", "the charge that is needed")}
+    for written, moved in (("12:30", "12:31"), ("14:30", "14:31"), ("30 m)", "30001 mm)")):
+        assert failures(made, {"arms.rts": text.replace(written, moved)}) != []

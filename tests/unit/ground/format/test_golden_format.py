@@ -1,0 +1,45 @@
+"""What sources look like before and after: `tests/golden/format` has pairs, and what is right already."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.format.format import formatted
+
+GOLDEN = Path(__file__).resolve().parents[3] / "golden" / "format"
+PAIRS = sorted(GOLDEN.glob("*.before.rts"))
+
+
+def read(path: Path) -> str:
+    return path.read_bytes().decode()
+
+
+@pytest.mark.parametrize("before", PAIRS, ids=lambda path: path.name.partition(".")[0])
+def test_golden(before: Path) -> None:
+    after = before.with_name(before.name.replace(".before.", ".after."))
+    made = formatted(Source("x.rts", read(before)))
+    assert made.diagnostics == ()
+    assert made.text == read(after)
+    assert formatted(Source("x.rts", read(after))).text == read(after)
+
+
+def test_each_pair_is_whole() -> None:
+    assert len(PAIRS) >= 5
+    assert {path.name.partition(".")[0] for path in GOLDEN.iterdir()} == {path.name.partition(".")[0] for path in PAIRS}
+
+
+def test_the_page_shows_the_style() -> None:
+    page = read(GOLDEN.parents[2] / "docs" / "formatting.md")
+    blocks = re.findall(r"^```rts\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    assert blocks
+    for block in blocks:
+        assert formatted(Source("x.rts", block)).text == block
+
+
+def test_the_examples_of_the_language_are_laid_out() -> None:
+    """Their columns are their own; none is refused."""
+    page = read(GOLDEN.parents[2] / "docs" / "language.md")
+    for block in re.findall(r"^```rts\n(.*?)^```$", page, re.DOTALL | re.MULTILINE):
+        assert formatted(Source("x.rts", block)).diagnostics == ()

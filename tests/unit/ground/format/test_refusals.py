@@ -1,0 +1,116 @@
+"""What is refused: sources that the parser does not take, and results that would not say the same."""
+
+from collections.abc import Callable
+
+import pytest
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.format import attempt
+from rtshcua.ground.format.finding import not_formatted
+from rtshcua.ground.format.format import formatted
+from rtshcua.ground.format.read import read
+from rtshcua.ground.format.same import difference
+from rtshcua.ground.language.faults import MAX_SIZE
+from rtshcua.ground.language.parse import parse
+
+TEXT = """// a
+skill s(p: length, q: speed = 1 m/s) {
+  require height <= 20 m and battery > 30 %  // rtshcua: ignore E1304 because x
+  // b
+  grace 1 s
+}
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "zone z = 3", "skill s() {", "skill s() { deadline 2 s", '"', "/* a", "zone z = circle(1 N, 2 E, 3 m) \0 // b",
+        "// \0", "zone z = circle(1 N, 2 E, 3 m) /", "x" * 100, "x" * (MAX_SIZE + 1),
+        "skill s() { require " + "(" * 3_000 + "a < 1" + ")" * 3_000 + " }",
+        "skill s() { require " + "max(1, " * 2_000 + "a" + ")" * 2_000 + " < 1 }",
+    ],
+    ids=lambda text: text[:20],
+)  # fmt: skip
+def test_what_the_parser_does_not_take(text: str) -> None:
+    source = Source("x.rts", text)
+    made = formatted(source)
+    assert made.text is None
+    assert made.diagnostics == parse(source).diagnostics != ()
+
+
+@pytest.mark.parametrize(
+    "text", ["zone z = circle(1 N, 2 E, 3 parsec)", "skill s() { grace 1 s grace 2 s }", "signal a.b : c = d.e"]
+)
+def test_other_errors_are_no_hindrance(text: str) -> None:
+    assert formatted(Source("x.rts", text)).text is not None
+
+
+@pytest.mark.parametrize("text", ["", " ", "\n\n", "\ufeff", "\t\r\n"])
+def test_nothing_is_nothing(text: str) -> None:
+    assert formatted(Source("x.rts", text)).text == ""
+
+
+CHANGES: dict[str, tuple[Callable[[str], str], str]] = {
+    "a word lost": (lambda text: text.replace("battery", ""), "what can be read"),
+    "a number": (lambda text: text.replace("20 m", "21 m"), "a word"),
+    "a unit": (lambda text: text.replace("20 m", "20 km"), "a word"),
+    "parts in another order": (lambda text: text.replace("p: length, q: speed", "q: length, p: speed"), "a word"),
+    "a comment lost": (lambda text: text.replace("// b\n", "\n"), "a comment"),
+    "a comment of other words": (lambda text: text.replace("// b", "// c"), "a comment"),
+    "a comment twice": (lambda text: text.replace("// b", "// b\n// b"), "a comment"),
+    "a comment past a word": (lambda text: text.replace("  // b\n  grace 1 s\n", "  grace 1 s // b\n"), "a comment"),
+    "comments in another order": (lambda text: text.replace("// a", "// z").replace("// b", "// a"), "a comment"),
+    "code in a comment": (lambda text: text.replace("// b\n", "// b "), "a word"),
+    "a line that an ignore speaks of": (lambda text: text.replace("and battery", "\nand battery"), "what a comment"),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_result_that_says_something_else_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    change, what = CHANGES[name]
+    monkeypatch.setattr(attempt, "lay_out", lambda before, width: change(before.text))
+    made = formatted(Source("x.rts", TEXT))
+    assert made.text is None
+    (found,) = made.diagnostics
+    assert found.code is codes.UNSAFE_FORMAT
+    assert f"would change {what}" in found.message
+    assert found.help is not None
+    assert "please report it" in found.help
+
+
+def test_the_same_words_in_another_tree_are_refused() -> None:
+    """Brackets are words, so no text of ours shows it; the rules that were applied are compared all the same."""
+    one = read("skill s() { require a < 1 }")
+    assert one is not None
+    found = difference(one, one._replace(rules=one.rules[:-1]))
+    assert found is not None
+    assert found.what == "the meaning"
+
+
+def test_only_the_comma_at_the_end_of_a_list_may_come_and_go() -> None:
+    def compared(one: str, other: str) -> str | None:
+        first = read(one)
+        assert first is not None
+        found = difference(first, read(other))
+        return None if found is None else found.what
+
+    assert compared("skill s(a: b) { }", "skill s(a: b,) { }") is None
+    assert compared("skill s() { require a in {b, c} }", "skill s() { require a in {b, c,} }") is None
+    assert compared("skill s(a: one of b, c) { }", "skill s(a: one of b c) { }") == "what can be read"
+
+
+def test_the_finding_for_lint_and_editor() -> None:
+    source = Source("x.rts", "// a\nskill s() {}\n")
+    text = formatted(source).text
+    assert text is not None
+    found = not_formatted(source, text)
+    assert found is not None
+    assert found.code is codes.NOT_FORMATTED
+    assert found.span is not None
+    assert source.slice(found.span) == "skill s() {}"
+    assert found.fixes[0].replacement == text
+    assert not_formatted(Source("x.rts", text), text) is None
+    shorter = not_formatted(Source("x.rts", text + "\n\n"), text)
+    assert shorter is not None

@@ -6,10 +6,9 @@ from typing import NamedTuple
 from rtshcua.cli.earlier import Earlier
 from rtshcua.cli.programs import Asked
 from rtshcua.cli.sources import examine
-from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.bounds import Bounds
-from rtshcua.ground.lint.lint import Linted, agreed, lint
 from rtshcua.ground.versions.raised import Compared, compare
 
 
@@ -31,10 +30,9 @@ class Found(NamedTuple):
 
 
 def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
-    """Check programs, one after the other; hold their policies against earlier ones, and look for habits."""
+    """Check programs, one after the other, and hold their policies against earlier ones."""
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
-    linted: list[Linted] = []
     missions: dict[tuple[str, str], Mission] = {}
     versions: dict[Compared, None] = {}
     for each in asked:
@@ -46,9 +44,7 @@ def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
         wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
         for diagnostic in wrong:  # a file that two programs share has its findings once
             found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
-        habits = () if has_errors(checked.diagnostics) else lint(program, each.asked)
-        linted.append(Linted(frozenset(unit.file for unit in program.units), habits))
         files = {mission.name.text: unit.file for unit in program.units for mission in unit.missions}
         for name, bounds in checked.bounds.items():
             missions.setdefault((files[name], name), Mission(name, files[name], bounds))
-    return Found((*found.values(), *agreed(linted)), sources, tuple(missions.values()), tuple(versions))
+    return Found(tuple(found.values()), sources, tuple(missions.values()), tuple(versions))

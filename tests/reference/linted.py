@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.lint.sift import sift
+from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 
@@ -32,6 +35,20 @@ def program(files: Mapping[str, str], first: str = "main.rts") -> Program:
         return files[name].encode() if name in files else (CHECKOUT / path).read_bytes()
 
     return load([first], read, str(CHECKOUT))
+
+
+def linted(one: Program) -> tuple[Diagnostic, ...]:
+    """What the rules find in the first file of a program, its policies lowered, and what is wrong with its ignores; but
+    for what its comments ignore.
+    """
+    grounds = examine_program(one, dialect.load()).grounds
+    return sift(lint(one, None, grounds), one.sources, [one.units[0].file], {}).found
+
+
+def decided(text: str) -> list[tuple[str, str]]:
+    """The code and the underlined text of each finding of `linted`."""
+    one = program({"main.rts": text})
+    return [(each.code.id, underlined(one, each)) for each in linted(one)]
 
 
 def found(text: str, **others: str) -> list[tuple[str, str]]:

@@ -36,6 +36,12 @@ class Questions:
             found = self._answers[key] = satisfiable(goals(), space)
         return found
 
+    def again(self) -> "Questions":
+        """For another program with the same policy: it shares all answers, and has no instances yet."""
+        other = Questions(self._prepared)
+        other._plane, other._spaces, other._answers = self._plane, self._spaces, self._answers
+        return other
+
     def known(self, key: Hashable) -> Answer | None:
         """The answer to a question, if it was asked."""
         return self._answers.get(key)

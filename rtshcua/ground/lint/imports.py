@@ -5,21 +5,22 @@ used for what it alone brings along, if anything that stays mentions that. A pol
 its zones and its vehicle, the signals that every flight reads, and under `permit any` all skills. A file without a
 mission or a policy may bring things along for those who import it, so of its imports only those count of which
 everything comes along anyway; one that declares nothing is there to gather others, and all its imports are used.
+
+Nobody knows who else imports a file: what an import alone brings along may be of use to somebody who was not asked for.
+So to delete it is safe only where another import brings all of it too; else it is for a person to look at.
 """
 
-import re
 from collections.abc import Iterable, Iterator
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
+from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.closure import Imports
 from rtshcua.ground.compiler.policy import WELL_KNOWN
 from rtshcua.ground.lint.mentions import mentioned_by
 from rtshcua.ground.lint.subject import Subject
 from rtshcua.model.ir.program import Import, Unit
-
-_REST = re.compile(r"[ \t\r]*(?://[^\n]*)?(?:\n|\Z)")
 
 
 def check(subject: Subject) -> Iterator[Diagnostic]:
@@ -28,8 +29,9 @@ def check(subject: Subject) -> Iterator[Diagnostic]:
     for unit in subject.asked:
         if needs.declared[unit.file]:
             for each in unit.imports:
-                if needs.none_of(unit.file, each):
-                    yield _found(subject, each)
+                lost = needs.lost(unit.file, each)
+                if lost is not None:
+                    yield _found(subject, each, alone=bool(lost))
 
 
 class _Needs:
@@ -50,25 +52,27 @@ class _Needs:
         self._roots = {unit.file for unit in subject.asked} | (self._units.keys() - imported)
         self._any = subject.permits_any()
 
-    def none_of(self, file: str, gone: Import) -> bool:
-        """Whether nothing of an import of `file` is needed; if so, it is taken away."""
+    def lost(self, file: str, gone: Import) -> frozenset[str] | None:
+        """The files that `file` no longer has without one of its imports, if nothing of that is needed; then it is
+        taken away. None where something is.
+        """
         unit = self._units[file]
-        left = unit.model_copy(update={"imports": tuple(each for each in unit.imports if each is not gone)})
+        left = unit.copied(imports=tuple(each for each in unit.imports if each is not gone))
         target = self._imports.target(file, gone)
         again = any(self._imports.target(file, each) == target for each in left.imports)
         if target is None or (not again and self._is_needed((unit,), frozenset({target}))):
-            return False
+            return None
         units = {**self._units, file: left}
         imports = Imports(tuple(units.values()), self._stable)
         lost = self._imports.closure(file) - imports.closure(file)
         if lost and not unit.policies and not unit.missions:
-            return False
+            return None
         if lost:
             left_over = frozenset[str]().union(*map(imports.closure, self._roots)) - lost
             if self._is_needed((units[name] for name in left_over), lost):
-                return False
+                return None
         self._units, self._imports = units, imports
-        return True
+        return lost
 
     def _is_needed(self, by: Iterable[Unit], files: frozenset[str]) -> bool:
         """Whether a file of `by` needs what `files` declare."""
@@ -80,16 +84,22 @@ class _Needs:
         return any((implied and unit.policies) or names & self._mentioned[unit.file] for unit in by)
 
 
-def _found(subject: Subject, each: Import) -> Diagnostic:
-    fix = Fix(_line(subject, each.span), "", "delete the line", Applicability.SAFE)
-    return Diagnostic(codes.UNUSED_IMPORT, f"nothing of `{each.path}` is used", each.span, fix.title, fixes=(fix,))
+def _found(subject: Subject, each: Import, *, alone: bool) -> Diagnostic:
+    """The finding on an import; `alone` is whether no other brings along what it does.
+
+    A comment on its line stays. It may then speak of something else, so that a person has to look.
+    """
+    text = subject.program.sources[each.span.file].text
+    commented = _is_commented(text, each.span)
+    title = "delete the import" if commented else "delete the line"
+    help = f"{title}, if no file that imports this one needs it" if alone else title
+    how = Applicability.SUGGESTED if alone or commented else Applicability.SAFE
+    fix = Fix(each.span if commented else whole_line(text, each.span), "", title, how)
+    return Diagnostic(codes.UNUSED_IMPORT, f"nothing of `{each.path}` is used", each.span, help, fixes=(fix,))
 
 
-def _line(subject: Subject, span: Span) -> Span:
-    """The whole line of an import that stands alone on it, with a comment behind it; else the import."""
-    text = subject.program.sources[span.file].text
-    start = text.rfind("\n", 0, span.start) + 1
-    rest = _REST.match(text, span.end)
-    if text[start : span.start].strip() or rest is None:
-        return span
-    return Span(span.file, start, rest.end())
+def _is_commented(text: str, span: Span) -> bool:
+    """Whether a comment stands on the line of an import, or ends there."""
+    start, end = text.rfind("\n", 0, span.start) + 1, text.find("\n", span.end)
+    beside = text[start : span.start], text[span.end : end if end >= 0 else len(text)]
+    return any(mark in part for part in beside for mark in ("//", "/*", "*/"))

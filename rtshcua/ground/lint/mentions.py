@@ -8,6 +8,7 @@ from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.ir.skills import Parameter
+from rtshcua.model.ir.tests import Named
 
 
 def mentions(*nodes: Node | None) -> frozenset[str]:
@@ -25,7 +26,7 @@ def mentioned_by(unit: Unit) -> frozenset[str]:
 
 def _declarations(unit: Unit) -> Iterator[Node]:
     yield from (*unit.enums, *unit.signals, *unit.zones, *unit.vehicles)
-    yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions)
+    yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions, *unit.nominals, *unit.tests)
 
 
 def _mentioned(node: Any) -> Iterator[str]:
@@ -34,8 +35,10 @@ def _mentioned(node: Any) -> Iterator[str]:
         yield node.name.removesuffix(ENTRY)
     elif isinstance(node, Name):
         yield node.text
+    elif isinstance(node, Named):  # in a test: a signal, or a parameter of a skill
+        yield node.name.text
     elif isinstance(node, Node):
-        for field in type(node).model_fields:
+        for field in type(node).__struct_fields__:
             if field not in ("span", "name") and not (field == "type" and isinstance(node, Parameter)):
                 yield from _mentioned(getattr(node, field))
     elif type(node) is tuple:

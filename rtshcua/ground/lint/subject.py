@@ -1,11 +1,12 @@
 """What the rules look at."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
 
 from rtshcua.ground.checker.symbols import Symbols, collect
 from rtshcua.ground.compiler.closure import Imports
+from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.language.load import Program
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule, TemplateDecl
 from rtshcua.model.ir.program import Unit
@@ -13,7 +14,8 @@ from rtshcua.model.ir.program import Unit
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A program as it is written, and which of its sources were asked for.
+    """A program as it is written, and which of its sources were asked for; `grounds` are its policies as lowered, each
+    for a vehicle, with which the analysis can be asked.
 
     A mission specification is none of them: it is no source, and an agent writes it by another form.
     """
@@ -22,12 +24,18 @@ class Subject:
     symbols: Symbols
     asked: tuple[Unit, ...]
     imports: Imports
+    grounds: tuple[Ground, ...] = ()
 
     @staticmethod
-    def of(program: Program, asked: Collection[str]) -> "Subject":
+    def of(program: Program, asked: Collection[str], grounds: tuple[Ground, ...] = ()) -> "Subject":
         """A program without errors."""
         units = tuple(unit for unit in program.units if unit.file in asked and PurePath(unit.file).suffix != ".json")
-        return Subject(program, collect(program.units), units, Imports(program.units, program.stable))
+        return Subject(program, collect(program.units), units, Imports(program.units, program.stable), grounds)
+
+    def lowered(self) -> Iterator[Ground]:
+        """The lowered policies of the files that were asked for."""
+        asked = {unit.file for unit in self.asked}
+        return (ground for ground in self.grounds if ground.lowered.declaration.span.file in asked)
 
     @property
     def policies(self) -> tuple[PolicyDecl, ...]:

@@ -96,6 +96,14 @@ def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest
     assert set(answered) == {"format", "version", "diagnostics", "exit", "missions", "versions"}
 
 
+def test_without_a_path_it_is_this_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answers = []
+    for words in (["check"], ["check", "--deny-warnings"], ["check", "."]):
+        assert main(words) == ExitCode.OK
+        answers.append(capsys.readouterr().out)
+    assert answers[0] == answers[1] == answers[2]
+
+
 def test_the_answer_does_not_depend_on_how_often_it_is_asked(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({"policy.rts": POLICY.replace("<= 15 m", "<= 5 m")})
     assert answer(capsys, ".") == answer(capsys, ".")
@@ -137,37 +145,17 @@ def test_one_that_cannot_be_read_does_not_hide_the_others(here: Path, capsys: py
     assert main(["check", "a", "b"]) == ExitCode.DIAGNOSTICS
 
 
-def test_habits_are_looked_for_in_what_was_asked_for(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_habits_are_for_lint(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({"policy.rts": POLICY.replace("\npolicy", 'import "lib:skills/goto.rts"\npolicy')})
-    code, answered = answer(capsys, "a")
-    assert (code, found(answered)) == (ExitCode.OK, [])
-    code, answered = answer(capsys, "a", "policy.rts")
-    assert (code, found(answered)) == (ExitCode.OK, [("E1305", "policy.rts")])
     code, answered = answer(capsys, ".")
-    assert (code, found(answered)) == (ExitCode.OK, [("E1305", "policy.rts")])
-    assert main(["check", ".", "--deny-warnings"]) == ExitCode.DIAGNOSTICS
-    assert "warning[E1305]" in capsys.readouterr().err
+    assert (code, found(answered)) == (ExitCode.OK, [])
+    assert main(["check", ".", "--deny-warnings"]) == ExitCode.OK
 
 
 def test_notes_are_no_warnings(capsys: pytest.CaptureFixture[str]) -> None:
     for code, denied in ((codes.UNDECIDED, False), (codes.NAMING, True), (codes.SYNTAX, True)):
         assert Findings(json=False, deny_warnings=True).report([Diagnostic(code, "something")], {}) == denied
     assert not Findings(json=False).report([Diagnostic(codes.NAMING, "something")], {})
-
-
-def test_habits_are_not_looked_for_beside_errors(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    put({"a/one.rts": above(MISSION).replace("hover(5 s)", "hover(5 s) goto()")})
-    _, answered = answer(capsys, "a")
-    assert {code for code, _ in found(answered)} == {"E0201"}
-
-
-def test_compile_is_not_about_habits(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["keys", "init"]) == ExitCode.OK
-    put({"a/one.rts": above(MISSION).replace("mission look", "mission Look")})
-    assert main(["compile", "a/one.rts", "-o", "x", *AT, "--deny-warnings"]) == ExitCode.OK
-    capsys.readouterr()
-    _, answered = answer(capsys, "a/one.rts")
-    assert found(answered) == [("E1302", "a/one.rts")]
 
 
 def test_a_specification_takes_all_other_sources_as_its_policys(
@@ -190,7 +178,7 @@ def test_a_folder_without_a_source(here: Path, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize(
-    "words", [["check", "--json"], ["check", "x.rts", "--bogus", "--json"], ["compile", "--json"],
+    "words", [["check", "x.rts", "--bogus", "--json"], ["compile", "--json"],
               ["compile", "x.rts", "--at", "noon", "--json"]]
 )  # fmt: skip
 def test_a_wrong_command_line_is_answered_in_json_too(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Set as AbstractSet
 
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import No, Undecided
 from rtshcua.ground.compiler.proofs.nested import covering
@@ -107,17 +108,34 @@ def _clock_matters(rules: Ruleset, number: int, used: tuple[int, ...]) -> bool:
 
 def _report(rules: Ruleset, group: Group, said_by: tuple[Span, ...]) -> None:
     kind = group.declared.kind
+    report = rules.ground.context.report
     copies = [span for span in said_by if _same(rules, group, rules.at[span])]
-    rules.ground.context.report.add(
+    help = "delete it, or change what it is about"
+    if len(said_by) == 1 and not copies:
+        much = "permits too much" if kind == "permit" else "says too much"
+        help = f"look at `{report.text(said_by[0])}` first: if it {much}, narrow it; else delete this rule"
+    source = report.sources.get(group.span.file)
+    gone = group.span if source is None else whole_line(source.text, group.span)
+    report.add(
         codes.REDUNDANT_RULE,
         group.span,
         f"this `{kind}` says nothing that " + ("another does" if len(said_by) == 1 else "others do") + " not say",
-        help="delete it, or change what it is about",
+        help=help,
         labels=[(span, "this says it already" if len(said_by) == 1 else "this says a part of it") for span in said_by],
-        fix=(group.span, "", "delete this rule") if copies else None,
+        fix=(gone, "", "delete this rule") if copies else None,
     )
 
 
 def _same(rules: Ruleset, one: Group, other: Group) -> bool:
-    """Whether two rules have the same conditions."""
-    return {rules.code(number) for number in one.rules} == {rules.code(number) for number in other.rules}
+    """Whether one rule is written twice: for the same skills, roles and sources, under the same conditions, to the same
+    effect. Where the other is wider, it may be the one that is wrong, and no fix deletes the narrow one.
+    """
+    return _said(rules, one) == _said(rules, other)
+
+
+def _said(rules: Ruleset, group: Group) -> set[tuple[object, ...]]:
+    every = ((rules.code(number), rules.rule(number)) for number in group.rules)
+    return {
+        (code, each.skills, each.roles, each.sources, each.approver, each.within_us, each.target and each.target.text)
+        for code, each in every
+    }

@@ -56,8 +56,8 @@ def step(text: str) -> str:
 
 
 CASES = [
-    (REMAINING, "E0402", "did you mean `battery_remaining`?", None),
-    (REMAINING, "E0402", "and 2 more", None),
+    (REMAINING, "E0402", "did you mean `battery_remaining`?", "battery_remaining"),
+    (REMAINING, "E0402", "and 2 more", "battery_remaining"),
     (FIX + "signal f : kind = GPS_RAW_INT.fix_type unknown at x stale after 5 s", "E0408", "`none`, `best`; as", None),
     ("signal f : ratio = BATTERY_STATUS.battery_remaining unknown at x stale after 5 s", "E0408", "-128 to 127", None),
     (step("goto(bridge_a, altitude = 20 m)"), "E0312", "write `bridge_a.entry`", "bridge_a.entry"),
@@ -77,7 +77,7 @@ CASES = [
     ("zone w = corridor(47.3 N, 8.5 E, 47.4 N, 8.5 E, width 0 m)", "E0516", "at least `10 cm`", None),
     ("zone w = corridor(47.3 N, 8.5 E, 47.4 N, 8.5 E, width -1 m)", "E0319", None, None),
     ("enum v = MAV_VTOL_STATES { a = 3 }\nsignal s : v = EXTENDED_SYS_STATE.vtol_state stale after 3 s", "E0411",
-     "did you mean `MAV_VTOL_STATE`?", None),
+     "did you mean `MAV_VTOL_STATE`?", "MAV_VTOL_STATE"),
     ("import <lib:policies/site.rts>\nzone a = circle(nowhere, 3 m)\n" + POLICY, "E0101", None, None),
 ]  # fmt: skip
 

@@ -7,7 +7,8 @@ import pytest
 from reference.linted import CHECKOUT, HEAD, POLICY, RISE, found, program
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lint.lint import Linted, agreed, lint
+from rtshcua.ground.lint.agreed import Linted, agreed
+from rtshcua.ground.lint.lint import lint
 
 SHIPPED = sorted(
     path.relative_to(CHECKOUT)
@@ -16,11 +17,17 @@ SHIPPED = sorted(
 )
 
 
+#: what pyproject.toml ignores in policies that ship, whose rules change with their versions only
+KNOWN = {"E1312"}
+
+
 @pytest.mark.parametrize("path", SHIPPED, ids=str)
 def test_nothing_that_ships_has_a_finding(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(CHECKOUT)
     one = load([str(path)], lambda file: Path(file).read_bytes(), str(CHECKOUT))
-    assert not lint(one), render(lint(one), one.sources)
+    known = KNOWN if path.parent.name == "policies" else set()
+    left = [each for each in lint(one) if each.code.id not in known]
+    assert not left, render(left, one.sources)
 
 
 def test_a_program_with_an_error_is_left_alone() -> None:
@@ -48,7 +55,7 @@ def test_a_skill_that_no_rule_names() -> None:
     skill = RISE.replace(", tag: one of a, b = a", "")
     assert found(HEAD + skill + POLICY) == [("E1301", "rise")]
     assert found(HEAD + skill + POLICY.replace("permit ret", "permit rise by role operator permit ret")) == []
-    degraded = POLICY.replace("emergency_land }", "emergency_land degrade any when battery < 20 % to rise }")
+    degraded = POLICY.replace("emergency_land }", "emergency_land degrade return_home when battery < 20 % to rise }")
     assert found(HEAD + skill + degraded) == []
     assert [
         code for code, _ in found(HEAD + skill + POLICY.replace("permit ret", "permit any by role a permit ret"))
@@ -167,7 +174,8 @@ def test_a_link_must_be_permitted_to_whoever_needs_it() -> None:
     assert found(HEAD + skill + rule) == [("E1303", "rise")]
     assert found(HEAD + skill + rule.replace("contingency", "contingency rise for 20 s,")) == []
     assert (
-        found(HEAD + skill + rule.replace("contingency", "degrade any when battery < 20 % to rise contingency")) == []
+        found(HEAD + skill + rule.replace("contingency", "degrade return_home when battery < 20 % to rise contingency"))
+        == []
     )
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from reference.linted import CHECKOUT, HEAD, POLICY, found, program
+from rtshcua.diagnostics.diagnostic import Applicability
 from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
 from rtshcua.ground.lint.lint import lint
@@ -43,15 +44,36 @@ def test_a_policy_needs_what_it_does_not_mention() -> None:
     assert [code for code, _ in found(HEAD + 'import "lib:skills/hover.rts"\n' + every)] == ["E1303"]
 
 
+def fix_of(text: str) -> tuple[str, bool]:
+    """The text after the only fix, and whether that is safe."""
+    (fix,) = (fix for each in lint(program({"main.rts": text})) for fix in each.fixes)
+    return text[: fix.span.start] + fix.replacement + text[fix.span.end :], fix.applicability is Applicability.SAFE
+
+
+TWICE = 'import "lib:skills/emergency_land.rts"'
+
+
 def test_the_fix_deletes_the_line() -> None:
-    text = HEAD + '  import "lib:skills/hover.rts"   // for later\n' + POLICY
-    one = program({"main.rts": text})
-    (fix,) = (fix for each in lint(one) for fix in each.fixes)
-    assert text[: fix.span.start] + fix.replacement + text[fix.span.end :] == HEAD + POLICY
-    text = HEAD + 'import "lib:skills/hover.rts" ' + POLICY
-    one = program({"main.rts": text})
-    (fix,) = (fix for each in lint(one) for fix in each.fixes)
-    assert text[: fix.span.start] + text[fix.span.end :] == HEAD + " " + POLICY
+    assert fix_of(f"  {TWICE}  \n" + HEAD + POLICY) == (HEAD + POLICY, True)
+    assert fix_of(f"{TWICE} import" + HEAD.replace("import", "", 1) + POLICY)[1]
+
+
+def test_what_an_import_alone_brings_along_is_for_a_person_to_delete() -> None:
+    """Who imports this file may use it, and need not have been asked for."""
+    assert fix_of(HEAD + 'import "lib:skills/hover.rts"\n' + POLICY) == (HEAD + POLICY, False)
+    mission = 'import "main.rts"\npolicy q version 1 { permit hover by any permit return_home, emergency_land by any '
+    mission += "contingency return_home, emergency_land }"
+    both = {"main.rts": HEAD + 'import "lib:skills/hover.rts"\n' + POLICY, "other.rts": mission}
+    one = program(both, "other.rts")
+    assert not one.diagnostics
+    assert lint(one, set(both)) == ()
+
+
+@pytest.mark.parametrize("comment", ["// for later", "/* for later */", "// rtshcua: ignore E1302 because it is so"])
+def test_a_comment_on_the_line_stays(comment: str) -> None:
+    assert fix_of(f"{TWICE} {comment}\n" + HEAD + POLICY) == (f" {comment}\n" + HEAD + POLICY, False)
+    if comment.startswith("/*"):
+        assert fix_of(f"{comment} {TWICE}\n" + HEAD + POLICY) == (f"{comment} \n" + HEAD + POLICY, False)
 
 
 @pytest.mark.parametrize("name", TWINS)

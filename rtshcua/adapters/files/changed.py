@@ -1,0 +1,144 @@
+"""Which files git says have changed: since where this branch left another, or since the last commit."""
+
+import os
+import subprocess
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+#: what in the environment, as that of a hook, says which repository is meant, whatever the folder
+_TOLD = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_PREFIX", "GIT_COMMON_DIR", "GIT_OBJECT_DIRECTORY")
+
+#: an environment to ask git in
+_Around = tuple[tuple[str, str], ...]
+
+
+class NoChanges(Exception):
+    """It cannot be said what has changed; `help` says what to do."""
+
+    def __init__(self, message: str, help: str | None = None) -> None:
+        super().__init__(message)
+        self.help = help
+
+
+class Changes(NamedTuple):
+    """What differs in the repositories whose folders are `tops`: files, deleted ones included, and whole folders, such
+    as submodules and what a link to a folder leads to. All paths are absolute, and free of links but for the last part.
+    """
+
+    files: frozenset[str]
+    folders: tuple[str, ...]
+    tops: tuple[str, ...]
+
+    def touch(self, path: str) -> bool | None:
+        """Whether a file has changed, under its own name, or where that leads; None where no repository tells."""
+        folder, name = os.path.split(os.path.abspath(path))  # noqa: PTH100  a Path costs as much as the answer
+        places = {os.path.join(os.path.realpath(folder), name), os.path.realpath(path)}  # noqa: PTH118
+        if any(place in self.files or _is_below(place, self.folders) for place in places):
+            return True
+        return False if all(_is_below(place, self.tops) for place in places) else None
+
+
+def changed_files(paths: Iterable[Path], base: str | None = None) -> Changes:
+    """What differs from `base`, or is not known to git yet, in the repositories that `paths` lie in.
+
+    With a `base`, what counts is the commit at which this branch left it; without one, the last commit. Raises
+    NoChanges where there is no git, no such base, or a path that lies in no repository.
+    """
+    tops = {top: None for asked in dict.fromkeys(map(_folders, paths)) for top in _tops(asked)}
+    files: set[str] = set()
+    folders: dict[str, None] = {}
+    for top, around in tops:
+        for name in _names(top, around, base):
+            place = os.path.join(top, name.rstrip("/"))  # noqa: PTH118
+            files.add(place)
+            if os.path.isdir(place):  # noqa: PTH112
+                folders[os.path.realpath(place)] = None
+    return Changes(frozenset(files), tuple(folders), tuple(top for top, _ in tops))
+
+
+def _names(top: str, around: _Around, base: str | None) -> list[str]:
+    """The names of what differs in one repository; of a submodule its own."""
+    since = "HEAD" if base is None else _merge_base(base, top, around)
+    if _known(since, top, around):
+        words = ("diff", "--name-only", "--no-renames", "--ignore-submodules=none", "--no-relative", "-z", since, "--")
+        names = _git(*words, folder=top, around=around)
+    else:  # before the first commit all files are new
+        names = _git("ls-files", "-z", folder=top, around=around)
+    names += _git("ls-files", "--others", "--exclude-standard", "-z", folder=top, around=around)
+    return [os.fsdecode(name) for name in names.split(b"\0") if name]
+
+
+def _folders(path: Path) -> tuple[str, ...]:
+    """The folders to ask about a path: itself, or the nearest above it that is there; also of what it leads to."""
+    found: dict[str, None] = {}
+    for place in (Path(os.path.realpath(path.parent), path.name), Path(os.path.realpath(path))):
+        above = next(each for each in (place, *place.parents) if each.is_dir())
+        found[os.path.realpath(above)] = None
+    return tuple(found)
+
+
+def _tops(folders: tuple[str, ...]) -> list[tuple[str, _Around]]:
+    """The repositories of a path's folders. Raises NoChanges where there is none."""
+    found, missing = [], None
+    for folder in folders:
+        try:
+            found.append(_top(folder))
+        except NoChanges as error:
+            missing = missing or error
+    if missing is not None and not found:
+        raise missing
+    return found
+
+
+def _top(folder: str) -> tuple[str, _Around]:
+    """The top of the repository that a folder lies in, and the environment to ask about it in."""
+    above = [Path(folder), *Path(folder).parents]
+    here = any((each / ".git").exists() for each in above)
+    around = tuple((name, value) for name, value in os.environ.items() if not here or name not in _TOLD)
+    said = _git("rev-parse", "--show-toplevel", folder=folder, around=around)
+    return os.path.realpath(os.fsdecode(said.removesuffix(b"\n"))), around
+
+
+def _is_below(place: str, folders: tuple[str, ...]) -> bool:
+    return any(place.startswith(f"{folder.rstrip(os.sep)}{os.sep}") for folder in folders)
+
+
+def _merge_base(base: str, top: str, around: _Around) -> str:
+    if base.startswith("-") or not _known(base, top, around):
+        raise NoChanges(f"git knows no `{base}`", "fetch it first: a shallow clone has only the last commit")
+    try:
+        return os.fsdecode(_git("merge-base", base, "HEAD", folder=top, around=around).strip())
+    except NoChanges:
+        raise NoChanges(
+            f"`{base}` and the current commit have no commit in common",
+            "fetch the history that lies between: a shallow clone has only the last commit",
+        ) from None
+
+
+def _known(name: str, top: str, around: _Around) -> bool:
+    try:
+        _git("rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}", folder=top, around=around)
+    except NoChanges:
+        return False
+    return True
+
+
+def _git(*words: str, folder: str, around: _Around) -> bytes:
+    command = ["git", "-C", folder, *words]
+    try:
+        done = subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL, env=dict(around))
+    except FileNotFoundError:
+        raise NoChanges("there is no `git` here to ask what has changed", "install it, or name the files") from None
+    except OSError as error:
+        raise NoChanges(f"git does not start: {(error.strerror or str(error)).lower()}") from None
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        words_ = said[-1].removeprefix("fatal: ") if said else "it gave no reason"
+        if "not a git repository" in words_:
+            raise NoChanges(
+                f"`{folder}` is in no git repository, so it cannot be said what has changed",
+                "name the files instead",
+            )
+        raise NoChanges(f"git could not say what has changed: {words_}")
+    return done.stdout

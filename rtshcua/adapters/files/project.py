@@ -1,0 +1,97 @@
+"""Finds the configuration that counts for a file: the nearest upward, `rtshcua.toml` before `pyproject.toml`."""
+
+from dataclasses import dataclass
+from os.path import normpath, relpath
+from pathlib import Path
+
+from rtshcua.ground.project.patterns import matches
+from rtshcua.ground.project.settings import NAMES, SHARED, Refused, Settings, parse_settings
+
+#: a configuration is a page or two; more than this of it is not read
+_LARGEST = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """Settings, the file that they stand in (None: the defaults), and the folder that its paths are relative to."""
+
+    settings: Settings
+    root: Path
+    file: Path | None = None
+
+    def excludes(self, path: Path, patterns: tuple[str, ...]) -> bool:
+        """Whether one of these patterns of the configuration means a file."""
+        return any(self.means(pattern, path) for pattern in patterns)
+
+    def means(self, pattern: str, path: Path) -> bool:
+        """Whether a pattern of the configuration means a file; none means a file that lies outside of its folder."""
+        place = Path(relpath(normpath(path.absolute()), self.root)).as_posix()
+        return not place.startswith("../") and matches(pattern, place)
+
+
+class Projects:
+    """The configurations of a run: each file has that which is nearest to it, unless one is given for all (`config`),
+    or none is to count (`isolated`). What was found is remembered by folder.
+    """
+
+    def __init__(self, config: Path | None = None, *, isolated: bool = False) -> None:
+        self._given: Project | Refused | None = None
+        if config is not None:
+            self._given = _read(config) or Refused(str(config), "it has no table `[tool.rtshcua]`")
+        elif isolated:
+            self._given = Project(Settings(), _absolute(Path()))
+        self._by_folder: dict[Path, Project | Refused] = {}
+
+    def of(self, path: Path) -> Project | Refused:
+        """The configuration that counts for a file or a folder."""
+        if self._given is not None:
+            return self._given
+        place = _absolute(path)
+        return self._of_folder(place if place.is_dir() else place.parent)
+
+    def _of_folder(self, folder: Path) -> Project | Refused:
+        passed = []
+        found: Project | Refused | None = None
+        for each in (folder, *folder.parents):
+            found = self._by_folder.get(each) or _standing_in(each)
+            passed.append(each)
+            if found is not None:
+                break
+        found = found or Project(Settings(), _absolute(Path()))
+        self._by_folder |= dict.fromkeys(passed, found)
+        return found
+
+
+def _standing_in(folder: Path) -> Project | Refused | None:
+    for name in NAMES:
+        file = folder / name
+        if file.is_file():
+            found = _read(file)
+            if found is not None:
+                return found
+    return None
+
+
+def _read(file: Path) -> Project | Refused | None:
+    name = _shown(file)
+    try:
+        with file.open("rb") as opened:
+            data = opened.read(_LARGEST + 1)
+        text = data.decode("utf-8")
+    except OSError as error:
+        return Refused(name, f"it cannot be read: {(error.strerror or 'it is unreadable').lower()}")
+    except UnicodeDecodeError as error:
+        return Refused(name, f"byte {error.start} is not UTF-8, so it is not text")
+    if len(data) > _LARGEST:
+        return Refused(name, f"it is larger than {_LARGEST >> 20} MiB, which no configuration is")
+    found = parse_settings(text, name, shared=file.name == SHARED)
+    return found if found is None or isinstance(found, Refused) else Project(found, _absolute(file).parent, file)
+
+
+def _absolute(path: Path) -> Path:
+    return Path(normpath(path.absolute()))
+
+
+def _shown(file: Path) -> str:
+    place, here = _absolute(file), _absolute(Path())
+    return (place.relative_to(here) if place.is_relative_to(here) else place).as_posix()

@@ -1,0 +1,58 @@
+"""Which files are meant by the paths on a command line, and which of them make programs. It imports no parser."""
+
+import os
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.language.paths import shown
+
+SOURCE, SPECIFICATION = ".rts", ".json"
+
+
+class Unusable(NamedTuple):
+    """Why a command ends before it begins, as `Findings.refuse` takes it."""
+
+    code: ExitCode
+    slug: str
+    message: str
+    help: str | None = None
+
+
+def unfolded(paths: Sequence[Path]) -> tuple[Path, ...] | Unusable:
+    """The files that are meant, once each: of a folder all sources below it, but for hidden ones, in order."""
+    files: dict[str, Path] = {}
+    for path in paths:
+        below = sorted(_below(path)) if path.is_dir() else [path]
+        if not below:
+            return Unusable(ExitCode.INPUT, "no-source", f"there is no source ({SOURCE}) in `{path}`, nor below it")
+        for each in below:
+            files.setdefault(shown(str(each)), each)
+    specifications = [path for path in files.values() if path.suffix.lower() == SPECIFICATION]
+    if len(specifications) > 1 or (specifications and specifications[0] != paths[0]):
+        help = "write it first; the sources after it are its policy's"
+        return Unusable(ExitCode.USAGE, "usage", "one specification (.json) is checked at a time", help)
+    return tuple(files.values())
+
+
+def roots(names: Sequence[str], members: Sequence[Collection[str]]) -> tuple[int, ...]:
+    """The numbers of the files that make programs of their own: those that no other's program has among its members; of
+    those that import each other the first.
+    """
+    holders: dict[str, list[int]] = {}
+    for number, member in enumerate(members):
+        for file in member:
+            holders.setdefault(file, []).append(number)
+
+    def is_part(number: int) -> bool:
+        others = (other for other in holders.get(names[number], ()) if other != number)
+        return any(other < number or names[other] not in members[number] for other in others)
+
+    return tuple(number for number in range(len(names)) if not is_part(number))
+
+
+def _below(folder: Path) -> Iterable[Path]:
+    for place, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        yield from (Path(place, name) for name in files if name.endswith(SOURCE) and not name.startswith("."))

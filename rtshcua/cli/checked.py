@@ -1,0 +1,52 @@
+"""What `rtshcua check` does, however its command line was read."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rtshcua.cli.asked import Unusable, unfolded
+from rtshcua.cli.bounds import bounds_told
+from rtshcua.cli.checking import Mission, check_all
+from rtshcua.cli.earlier import Earlier, earlier_policies
+from rtshcua.cli.findings import Findings, exit_code
+from rtshcua.cli.programs import programs
+from rtshcua.cli.progress import watched
+from rtshcua.diagnostics.exits import ExitCode
+
+
+def check_sources(
+    paths: Sequence[Path],
+    *,
+    since: Path | None = None,
+    with_: Sequence[Path] = (),
+    deny_warnings: bool = False,
+    as_json: bool = False,
+) -> ExitCode:
+    """Report everything that is wrong with sources; see `rtshcua.cli.check`."""
+    findings = Findings(json=as_json, deny_warnings=deny_warnings)
+    files = unfolded(paths)
+    if isinstance(files, Unusable):
+        return findings.refuse(*files)
+    earlier = Earlier("", ()) if since is None else earlier_policies(since)
+    if isinstance(earlier, Unusable):
+        return findings.refuse(*earlier)
+    found = check_all(watched(programs(files, tuple(with_))), earlier)
+    code = exit_code(found.diagnostics) if findings.report(found.diagnostics, found.sources) else ExitCode.OK
+    if code is ExitCode.OK and not as_json:
+        print(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
+        for mission in found.missions:
+            print(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
+        for each in found.versions:
+            print(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
+        if since is not None and not found.versions:
+            print(f"nothing in {since} is an earlier version of a policy here")
+    return findings.finish(
+        code,
+        missions=[{"mission": each.name, "file": each.file} | each.bounds._asdict() for each in found.missions],
+        versions=[{"policy": each.name, "version": each.version, "earlier": each.earlier} for each in found.versions],
+    )
+
+
+def _named(mission: Mission, missions: tuple[Mission, ...]) -> str:
+    """A mission's name; with its file, where another has the same."""
+    alone = sum(each.name == mission.name for each in missions) == 1
+    return mission.name if alone else f"{mission.name} ({mission.file})"

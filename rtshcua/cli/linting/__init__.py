@@ -1,0 +1,1 @@
+"""`rtshcua lint`: what it remembers, what it examines anew, what it ignores, fixes and reports."""

@@ -1,0 +1,98 @@
+"""What was found in one program, with all that it depends on: as it is remembered from run to run."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.lint.stored import as_lists, from_lists, places
+
+
+class Result(NamedTuple):
+    """The findings of `check`, and those of the rules."""
+
+    found: tuple[Diagnostic, ...]
+    habits: tuple[Diagnostic, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """The program of one file. `members` are its sources; `reads` the digest of each file that was read for it, None of
+    one that could not be had; `packs` the folders of the packs that it asked for. `asked` are its files that were asked
+    for, of which alone the rules speak, each with the width of its lines, if its layout was looked at. `result` is None
+    where it was not examined, being part of another program.
+    """
+
+    members: tuple[str, ...]
+    reads: Mapping[str, str | None]
+    packs: Mapping[str, str | None]
+    asked: Mapping[str, int | None]
+    result: Result | None
+
+    @property
+    def lasting(self) -> bool:
+        """Whether it may be remembered: what could not be read may be there the next time, or something nearby."""
+        return None not in self.reads.values() and None not in self.packs.values()
+
+
+def encoded(examined: Examined, mark: str) -> bytes:
+    """As bytes; `mark` is of all that findings depend on besides, such as the rules themselves."""
+    result = examined.result
+    return json.dumps(
+        {
+            "mark": mark,
+            "members": examined.members,
+            "reads": dict(examined.reads),
+            "packs": dict(examined.packs),
+            "asked": dict(examined.asked),
+            "result": None if result is None else [as_lists(result.found), as_lists(result.habits)],
+        }
+    ).encode()
+
+
+def decoded(
+    data: bytes,
+    mark: str,
+    asked: Mapping[str, int | None],
+    digest: Callable[[str], str | None],
+    folder: Callable[[str], str | None],
+    length: Callable[[str], int | None],
+) -> Examined | None:
+    """From bytes, if it still holds: the same mark, the same files asked for, and every file and every pack as it was,
+    which `digest` and `folder` say. It speaks of nothing but places in the texts of these files, whose `length` counts
+    characters.
+    """
+    try:
+        tree: Any = json.loads(data)
+        if tree["mark"] != mark:
+            return None
+        members, reads, packs = _texts(tree["members"]), tree["reads"], tree["packs"]
+        _texts([*reads, *reads.values(), *packs, *packs.values()])
+        if any(digest(name) != known for name, known in reads.items()):
+            return None
+        if any(folder(name) != known for name, known in packs.items()):
+            return None
+        mine = {name: asked[name] for name in members if name in asked}
+        result = tree["result"] if tree["asked"] == mine else None
+        return Examined(members, reads, packs, mine, None if result is None else _result(result, reads, length))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _texts(found: Any) -> tuple[str, ...]:
+    """A list of texts, as a tuple. Raises TypeError for any other."""
+    if type(found) is not list or not all(type(each) is str for each in found):
+        raise TypeError("no texts")
+    return tuple(found)
+
+
+def _result(lists: Any, reads: Mapping[str, str | None], length: Callable[[str], int | None]) -> Result:
+    """A result, if it speaks of nothing but what was read for it. Raises as `from_lists` does."""
+    found, habits = lists
+    result = Result(from_lists(found), from_lists(habits))
+    for place in places((*result.found, *result.habits)):
+        whole = length(place.file) if place.file in reads else None
+        if whole is None or place.end > whole:
+            raise ValueError("it speaks of what was not read")
+    return result

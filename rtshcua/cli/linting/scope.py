@@ -1,0 +1,110 @@
+"""Which files a run is about, and the configuration of each."""
+
+from collections.abc import Mapping, Sequence
+from os.path import lexists, normpath
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.files.folders import lint_secret_folder
+from rtshcua.adapters.files.lint_cache import FOLDER, LintCache
+from rtshcua.adapters.files.lint_secret import lint_secret
+from rtshcua.adapters.files.project import Project, Projects
+from rtshcua.cli.asked import SOURCE, Unusable, unfolded
+from rtshcua.cli.linting.options import Options
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.language.paths import shown
+from rtshcua.ground.project.settings import Ignored, Refused
+
+
+class Scope(NamedTuple):
+    """The files, and of each its project, further sources and cache; `left_out` is how many are excluded."""
+
+    files: tuple[Path, ...]
+    projects: Mapping[Path, Project]
+    further: Mapping[Path, Sequence[Path]]
+    caches: Mapping[Path, LintCache | None]
+    left_out: int
+    widths: Mapping[Path, int]  # of the files whose layout is looked at
+
+    def configured(self) -> dict[str, tuple[Ignored, ...]]:
+        """What the configuration of each file ignores in it, by the file's name."""
+        return {shown(str(path)): _ignored(self.projects[path], path) for path in self.files}
+
+
+def scope(options: Options) -> Scope | Unusable:
+    """The files that are asked for, but for those that their configuration excludes; what is wrong with either ends the
+    run.
+    """
+    files = unfolded(options.paths)
+    if isinstance(files, Unusable):
+        return files
+    projects = Projects(options.config, isolated=options.isolated)
+    found: dict[Path, Project] = {}
+    looked_at: set[int] = set()
+    for path in files:
+        project = projects.of(path)
+        if isinstance(project, Refused):
+            return refused(project)
+        if id(project) not in looked_at and not options.with_:
+            looked_at.add(id(project))
+            wrong = _no_further(project)
+            if wrong is not None:
+                return refused(wrong)
+        if not project.excludes(path, project.settings.lint.exclude):
+            found[path] = project
+    kept = tuple(found)
+    caches = {} if options.no_cache else _caches(tuple(found.items()), fresh=options.fixes)
+    return Scope(
+        kept,
+        found,
+        {path: options.with_ or _further(project) for path, project in found.items()},
+        {path: caches.get(path) for path in found},
+        len(files) - len(kept),
+        {path: project.settings.format.width for path, project in found.items() if _looks_at_layout(project, path)},
+    )
+
+
+def refused(configuration: Refused) -> Unusable:
+    """A configuration that is none ends a run: it may be what ignores, or what must not be ignored."""
+    return Unusable(ExitCode.INPUT, "configuration", str(configuration), configuration.help)
+
+
+def _looks_at_layout(project: Project, path: Path) -> bool:
+    settings = project.settings
+    return settings.lint.format and path.suffix == SOURCE and not project.excludes(path, settings.format.exclude)
+
+
+def _ignored(project: Project, path: Path) -> tuple[Ignored, ...]:
+    return tuple(
+        each for each in project.settings.lint.ignored if each.pattern is None or project.means(each.pattern, path)
+    )
+
+
+def _further(project: Project) -> tuple[Path, ...]:
+    here = Path(normpath(Path().absolute()))
+    placed = [Path(normpath(project.root / each)) for each in project.settings.lint.further]
+    return tuple(each.relative_to(here) if each.is_relative_to(here) else each for each in placed)
+
+
+def _no_further(project: Project) -> Refused | None:
+    """The first further source of a configuration that is no file, as a fault of the configuration."""
+    for name, place in zip(project.settings.lint.further, _further(project), strict=True):
+        if not place.is_file():
+            what = "is a folder" if place.is_dir() else "is no file" if lexists(place) else "is not there"
+            return Refused(shown(str(project.file)), f"`{name}` in `with` {what}", "accepted: a list of sources (.rts)")
+    return None
+
+
+def _caches(files: Sequence[tuple[Path, Project]], *, fresh: bool) -> dict[Path, LintCache]:
+    """The cache of each file, one for each folder, where its configuration does not say that there is none."""
+    opened: dict[Path, LintCache] = {}
+    found: dict[Path, LintCache] = {}
+    secret = lint_secret(lint_secret_folder())
+    for path, project in files:
+        folder = project.settings.lint.cache
+        if folder != "":
+            place = project.root / (FOLDER if folder is None else folder)
+            if place not in opened:
+                opened[place] = LintCache(place, secret, fresh=fresh)
+            found[path] = opened[place]
+    return found

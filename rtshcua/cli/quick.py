@@ -1,0 +1,91 @@
+"""Reads plain command lines of `check` and `lint` without typer, which takes longer to start than they to run.
+
+A command line that holds anything else than the options listed here, in their usual forms, is left to typer: help,
+mistakes, abbreviations, and whatever is not understood. A test holds the lists against the commands that typer knows.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from rtshcua.cli.linting.options import Options
+from rtshcua.diagnostics.exits import ExitCode
+
+Kind = Literal["flag", "text", "path", "paths"]
+
+LINT: Mapping[str, tuple[str, Kind]] = {
+    "--format": ("format", "text"),
+    "--output": ("output", "path"),
+    "-o": ("output", "path"),
+    "--fail-on": ("fail_on", "text"),
+    "--with": ("with_", "paths"),
+    "--changed": ("changed", "flag"),
+    "--base": ("base", "text"),
+    "--fix": ("fix", "flag"),
+    "--unsafe-fixes": ("unsafe_fixes", "flag"),
+    "--diff": ("diff", "flag"),
+    "--config": ("config", "path"),
+    "--isolated": ("isolated", "flag"),
+    "--no-cache": ("no_cache", "flag"),
+    "--statistics": ("statistics", "flag"),
+    "--json": ("json", "flag"),
+}
+
+CHECK: Mapping[str, tuple[str, Kind]] = {
+    "--since": ("since", "path"),
+    "--with": ("with_", "paths"),
+    "--deny-warnings": ("deny_warnings", "flag"),
+    "--json": ("as_json", "flag"),
+}
+
+
+def read(words: Sequence[str], known: Mapping[str, tuple[str, Kind]]) -> tuple[tuple[Path, ...], dict[str, Any]] | None:
+    """The paths of a command line and its options by name; None where typer must read it."""
+    paths: list[Path] = []
+    options: dict[str, Any] = {}
+    left = iter(words)
+    for word in left:
+        if not word or word == "--":
+            return None
+        if not word.startswith("-"):
+            paths.append(Path(word))
+            continue
+        option, equals, value = word.partition("=")
+        if option not in known or (equals and not option.startswith("--")):
+            return None
+        name, kind = known[option]
+        if kind == "flag":
+            if equals:
+                return None
+            options[name] = True
+            continue
+        if not equals:
+            value = next(left, "-")
+        if not value or (value.startswith("-") and not equals):
+            return None
+        made = value if kind == "text" else Path(value)
+        options[name] = (*options.get(name, ()), made) if kind == "paths" else made
+    return (tuple(paths), options) if paths else None
+
+
+def lint(words: Sequence[str]) -> ExitCode | None:
+    """`rtshcua lint`; None where typer must read the command line."""
+    found = read(words, LINT)
+    if found is None:
+        return None
+    from rtshcua.cli.linting.run import run
+
+    return run(Options(found[0], **found[1]))
+
+
+def check(words: Sequence[str]) -> ExitCode | None:
+    """`rtshcua check`; None where typer must read the command line."""
+    found = read(words, CHECK)
+    if found is None:
+        return None
+    from rtshcua.cli.checked import check_sources
+
+    return check_sources(found[0], **found[1])
+
+
+QUICK: Mapping[str, Callable[[Sequence[str]], ExitCode | None]] = {"lint": lint, "check": check}

@@ -1,0 +1,117 @@
+"""Outcomes as JUnit XML: what Jenkins (`junit-10.xsd` of its xUnit plugin) and GitLab read.
+
+There is no standard of it. The schema of Jenkins refuses attributes that it does not know, `file` and `line` of a test
+case among them, so the file is that of the suite and the case's `classname`, and the line stands in the text.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+from xml.etree import ElementTree
+
+from rtshcua.diagnostics.excerpt import visible
+
+_HEAD: Final = '<?xml version="1.0" encoding="utf-8"?>\n'
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How one test ended: passed, unless `failure` or `skipped` says why not.
+
+    `kind` is a short name for what failed, for programs; `broken` says that the test could not be run, which JUnit
+    calls an error; `time_ms` is how long it took, None where nobody measured. `line` counts from 1.
+    """
+
+    name: str
+    file: str = ""
+    line: int | None = None
+    failure: str | None = None
+    kind: str = ""
+    broken: bool = False
+    skipped: str | None = None
+    time_ms: int | None = None
+    output: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """The tests of one file, `name`; `properties` are names and values for whoever reads the report."""
+
+    name: str
+    cases: tuple[Outcome, ...]
+    properties: tuple[tuple[str, str], ...] = ()
+
+
+def junit(suites: Iterable[Suite], name: str = "rtshcua") -> str:
+    """A whole document, ended by a newline. What XML cannot hold, or a terminal would obey, is shown as `<U+001B>`."""
+    root = ElementTree.Element("testsuites")
+    each = tuple(suites)
+    _count(root, name, [case for suite in each for case in suite.cases], skipped=False)
+    for suite in each:
+        _suite(root, suite)
+    ElementTree.indent(root)
+    return f"{_HEAD}{ElementTree.tostring(root, encoding='unicode')}\n"
+
+
+def _suite(root: ElementTree.Element, suite: Suite) -> None:
+    made = ElementTree.SubElement(root, "testsuite")
+    _count(made, suite.name, suite.cases, skipped=True)
+    files = {case.file for case in suite.cases if case.file}
+    if len(files) == 1:
+        made.set("file", _line(*files))
+    if suite.properties:
+        properties = ElementTree.SubElement(made, "properties")
+        for key, value in suite.properties:
+            ElementTree.SubElement(properties, "property", name=_line(key), value=_line(value))
+    for case in suite.cases:
+        _case(made, case, suite)
+
+
+def _count(element: ElementTree.Element, name: str, cases: Iterable[Outcome], *, skipped: bool) -> None:
+    each = tuple(cases)
+    element.set("name", _line(name))
+    element.set("tests", str(len(each)))
+    element.set("failures", str(sum(case.failure is not None and not case.broken for case in each)))
+    element.set("errors", str(sum(case.failure is not None and case.broken for case in each)))
+    if skipped:
+        element.set("skipped", str(sum(_is_skipped(case) for case in each)))
+    element.set("time", _seconds(sum(case.time_ms or 0 for case in each)))
+
+
+def _case(made: ElementTree.Element, case: Outcome, suite: Suite) -> None:
+    element = ElementTree.SubElement(made, "testcase", name=_line(case.name), classname=_line(case.file or suite.name))
+    if case.time_ms is not None:
+        element.set("time", _seconds(case.time_ms))
+    if case.failure is not None:
+        text = _text(case.failure)
+        failure = ElementTree.SubElement(element, "error" if case.broken else "failure", message=text.split("\n")[0])
+        if case.kind:
+            failure.set("type", _line(case.kind))
+        failure.text = f"{_place(case)}{text}"
+    elif case.skipped is not None:
+        ElementTree.SubElement(element, "skipped", message=_line(case.skipped))
+    if case.output:
+        ElementTree.SubElement(element, "system-out").text = _text(case.output)
+
+
+def _is_skipped(case: Outcome) -> bool:
+    return case.failure is None and case.skipped is not None
+
+
+def _place(case: Outcome) -> str:
+    if not case.file:
+        return ""
+    return f"{_line(case.file)}{'' if case.line is None else f':{case.line}'}\n"
+
+
+def _seconds(milliseconds: int) -> str:
+    return f"{milliseconds // 1000}.{milliseconds % 1000:03}"
+
+
+def _line(text: str) -> str:
+    return visible(text)
+
+
+def _text(text: str) -> str:
+    """Lines stay lines."""
+    return "\n".join(visible(line) for line in text.split("\n"))

@@ -1,0 +1,185 @@
+"""Findings as SARIF 2.1.0 (OASIS standard, errata 01): for code scanning, editors, and whoever keeps findings.
+
+Numbers in comments and docstrings are sections of the standard. Columns and offsets count characters (`columnKind`
+`unicodeCodePoints`), lines end at a line feed, and ends are exclusive, as everywhere here.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple, Protocol
+
+from rtshcua.diagnostics.codes import Code
+from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
+from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.report.fingerprints import FINGERPRINT, fingerprints
+from rtshcua.diagnostics.report.places import ROOT, artifact, physical, region, uri
+from rtshcua.diagnostics.span import Source, Span
+
+VERSION: Final = "2.1.0"
+SCHEMA: Final = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+#: how a run ends that did its work, whatever it found
+_DONE = (ExitCode.OK, ExitCode.DIAGNOSTICS)
+
+
+class Page(Protocol):
+    """The page of a code, in Markdown: `text` whole, `what` the section that says what the code means."""
+
+    @property
+    def text(self) -> str: ...
+    @property
+    def what(self) -> str: ...
+
+
+class Ignored(NamedTuple):
+    """A finding that the author wants not to be told of, why, and where that is written in a source; None where it is
+    written in a configuration.
+    """
+
+    diagnostic: Diagnostic
+    reason: str
+    at: Span | None = None
+
+
+def sarif(
+    found: Iterable[Diagnostic],
+    sources: Mapping[str, Source],
+    *,
+    version: str,
+    code: ExitCode,
+    ignored: Iterable[Ignored] = (),
+    pages: Mapping[str, Page] | None = None,
+    base: str | None = None,
+) -> dict[str, Any]:
+    """One run as a value that `json.dumps` takes.
+
+    `version` is ours and `code` how the command ends; `pages` has the page of each code by its id, where it has any;
+    `base` is the absolute folder that the names of sources are relative to. A finding that is about no text at all, of
+    a file that cannot be read, is a notification of the run (3.20.21); so that one did not succeed.
+    """
+    each = [(diagnostic, None) for diagnostic in found] + [(one.diagnostic, one) for one in ignored]
+    rules = list(dict.fromkeys(diagnostic.code for diagnostic, _ in each))
+    index = {rule: number for number, rule in enumerate(rules)}
+    placed = [pair for pair in each if _has_place(pair[0])]
+    marks = fingerprints([diagnostic for diagnostic, _ in placed], sources)
+    root: dict[str, Any] = {"description": {"text": "the folder in which the command ran"}}
+    if base is not None:
+        root = {"uri": uri(f"{base.rstrip('/')}/")} | root
+    invocation: dict[str, Any] = {
+        "executionSuccessful": code in _DONE,
+        "exitCode": int(code),
+        "exitCodeDescription": f"{code.slug}: {code.meaning}",
+    }
+    notified = [_notification(diagnostic, index) for diagnostic, _ in each if not _has_place(diagnostic)]
+    if notified:
+        invocation["toolExecutionNotifications"] = notified
+    run = {
+        "tool": {
+            "driver": {
+                "name": "rtshcua",
+                "version": version,
+                "semanticVersion": version,
+                "rules": [_rule(rule, None if pages is None else pages.get(rule.id)) for rule in rules],
+            }
+        },
+        "invocations": [invocation],
+        "originalUriBaseIds": {ROOT: root},
+        "columnKind": "unicodeCodePoints",
+        "newlineSequences": ["\n"],
+        "language": "en-GB",
+        "results": [
+            _result(diagnostic, reason, sources, index[diagnostic.code], mark)
+            for (diagnostic, reason), mark in zip(placed, marks, strict=True)
+        ],
+    }
+    return {"$schema": SCHEMA, "version": VERSION, "runs": [run]}
+
+
+def _has_place(diagnostic: Diagnostic) -> bool:
+    return diagnostic.span is not None or diagnostic.pointer is not None
+
+
+def _rule(code: Code, page: Page | None) -> dict[str, Any]:
+    """A reportingDescriptor (3.49). What it holds takes no arguments, so braces are written as they are."""
+    sentence = f"{code.meaning[:1].upper()}{code.meaning[1:]}."
+    rule: dict[str, Any] = {
+        "id": code.id,
+        "name": "".join(word.capitalize() for word in code.slug.split("-")),
+        "shortDescription": {"text": sentence},
+        "fullDescription": {"text": sentence if page is None else page.what},
+        "defaultConfiguration": {"level": code.severity.value},
+    }
+    if page is not None:
+        rule["help"] = {"text": page.text, "markdown": page.text}
+    return rule
+
+
+def _result(
+    diagnostic: Diagnostic, ignored: Ignored | None, sources: Mapping[str, Source], rule: int, mark: str
+) -> dict[str, Any]:
+    """A result (3.27). `suppressions` is there in all of a run, or a reader could not tell what was not ignored."""
+    result: dict[str, Any] = {
+        "ruleId": diagnostic.code.id,
+        "ruleIndex": rule,
+        "level": diagnostic.severity.value,
+        "message": _told(diagnostic),
+        "locations": [_location(diagnostic, sources)],
+        "partialFingerprints": {FINGERPRINT: mark},
+        "suppressions": [] if ignored is None else [_suppression(ignored, sources)],
+    }
+    if diagnostic.labels:
+        result["relatedLocations"] = [
+            {"id": number, "physicalLocation": physical(label.span, sources), "message": _message(label.text)}
+            for number, label in enumerate(diagnostic.labels, 1)
+        ]
+    if diagnostic.fixes:
+        result["fixes"] = [_fix(fix, sources) for fix in diagnostic.fixes]
+    return result
+
+
+def _notification(diagnostic: Diagnostic, index: Mapping[Code, int]) -> dict[str, Any]:
+    code = diagnostic.code
+    return {
+        "level": code.severity.value,
+        "message": _told(diagnostic),
+        "associatedRule": {"id": code.id, "index": index[code]},
+    }
+
+
+def _location(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> dict[str, Any]:
+    location: dict[str, Any] = {}
+    if diagnostic.span is not None:
+        location["physicalLocation"] = physical(diagnostic.span, sources)
+    if diagnostic.pointer is not None:
+        location["logicalLocations"] = [{"fullyQualifiedName": visible(diagnostic.pointer), "kind": "value"}]
+    return location
+
+
+def _fix(fix: Fix, sources: Mapping[str, Source]) -> dict[str, Any]:
+    replacement: dict[str, Any] = {
+        "deletedRegion": region(fix.span, sources.get(fix.span.file)),
+        "insertedContent": {"text": fix.replacement},
+    }
+    return {
+        "description": _message(fix.title),
+        "artifactChanges": [{"artifactLocation": artifact(fix.span.file), "replacements": [replacement]}],
+        "properties": {"applicability": fix.applicability.value},
+    }
+
+
+def _suppression(ignored: Ignored, sources: Mapping[str, Source]) -> dict[str, Any]:
+    """A suppression (3.35)."""
+    suppression: dict[str, Any] = {"kind": "external", "status": "accepted", "justification": visible(ignored.reason)}
+    if ignored.at is not None:
+        suppression |= {"kind": "inSource", "location": {"physicalLocation": physical(ignored.at, sources)}}
+    return suppression
+
+
+def _told(diagnostic: Diagnostic) -> dict[str, str]:
+    """The message and, in a paragraph of its own, the help, which few readers show from anywhere else."""
+    lines = [diagnostic.message] + ([] if diagnostic.help is None else [f"help: {diagnostic.help}"])
+    return {"text": "\n".join(_message(line)["text"] for line in lines)}
+
+
+def _message(text: str) -> dict[str, str]:
+    """A message (3.11) of anybody's words: no placeholder (3.11.5), no link (3.11.6), nothing that hides."""
+    return {"text": visible(text).replace("{", "{{").replace("}", "}}").replace("](", "] (")}

@@ -1,0 +1,132 @@
+"""Ignores that stand in comments, and what is wrong with them (E1309 to E1311).
+
+    // rtshcua: ignore E1304 because the authority's letter says 30 m
+    // rtshcua: ignore-file naming, E1301 because the register gives the names
+
+The first is about findings that begin on its line, or, where comments alone stand on it, on the next line that has
+something else. The second is about the whole file, and stands before its first declaration. Codes go by their id or
+slug. What has no reason, or names no code that can be ignored, ignores nothing.
+"""
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.codes import REGISTRY, Code, Severity, can_be_ignored, code_named
+from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.lint.comments import FILE, LINE, Comment, asked, comments
+from rtshcua.ground.project.reasons import says_why
+
+_REASON = re.compile(r"(?:^|(?<=[\s,]))because(?!\S)")
+_NAME = re.compile(r"[^\s,]+")
+_HELP = "write it as `// rtshcua: ignore E1304 because the authority's letter says 30 m`"
+
+
+class Ignore(NamedTuple):
+    """One code that a comment ignores: on one line (from 1), or in the whole file (None). `span` is the name of the
+    code, `fix` what takes it out again.
+    """
+
+    code: Code
+    line: int | None
+    reason: str
+    span: Span
+    fix: Fix
+
+
+class Ignores(NamedTuple):
+    """What the comments of a file ignore, and what is wrong with them."""
+
+    given: tuple[Ignore, ...]
+    faults: tuple[Diagnostic, ...]
+
+
+def ignores(source: Source) -> Ignores:
+    """The ignores of a text."""
+    if "rtshcua:" not in source.text:
+        return Ignores((), ())
+    faults: list[Diagnostic] = []
+    given: list[Ignore] = []
+    for comment in comments(source):
+        found = asked(comment.inside)
+        if found is not None:
+            given += _read(source, comment, found, faults)
+    return Ignores(tuple(given), tuple(faults))
+
+
+def _read(source: Source, comment: Comment, what: "re.Match[str]", faults: list[Diagnostic]) -> Iterator[Ignore]:
+    word = what["word"]
+    if word not in (LINE, FILE):
+        near = nearest(word, (LINE, FILE))
+        help = _HELP if near is None else f"did you mean `{near}`?"
+        faults.append(
+            Diagnostic(codes.UNKNOWN_IGNORE, f"`{word}` is nothing that a comment can ask for", comment.span, help)
+        )
+        return
+    start = comment.offset + what.start("rest")
+    found = _REASON.search(what["rest"])
+    written = what["rest"] if found is None else what["rest"][: found.start()]
+    reason = "" if found is None else " ".join(what["rest"][found.end() :].split())
+    names = [(each[0], Span(source.file, start + each.start(), start + each.end())) for each in _NAME.finditer(written)]
+    if not says_why(reason):
+        faults.append(_without_reason(comment))
+        return
+    if not names:
+        faults.append(Diagnostic(codes.UNKNOWN_IGNORE, "this names no code to ignore", comment.span, _HELP))
+    if word == FILE and comment.begun:
+        message = f"`{FILE}` stands behind the first declaration, so it ignores nothing"
+        faults.append(Diagnostic(codes.UNUSED_IGNORE, message, comment.span, "put it before the first declaration"))
+        return
+    for at, (name, span) in enumerate(names):
+        code = code_named(name)
+        if code is None or not can_be_ignored(code):
+            faults.append(_unknown(name, code, span))
+        else:
+            yield Ignore(
+                code, None if word == FILE else comment.about, reason, span, _removal(source, comment, names, at)
+            )
+
+
+def _without_reason(comment: Comment) -> Diagnostic:
+    message = "this does not say why, so it ignores nothing"
+    return Diagnostic(codes.IGNORE_WITHOUT_REASON, message, comment.span, "end it with `because ...`")
+
+
+def _unknown(name: str, code: Code | None, span: Span) -> Diagnostic:
+    if code is not None:
+        why = "is an error, and errors cannot be ignored"
+        if code.severity is not Severity.ERROR:
+            why = "is about ignores themselves, and cannot be ignored"
+        return Diagnostic(codes.UNKNOWN_IGNORE, f"`{name}` {why}", span, "remove it, and correct what it is about")
+    can = [code for code in REGISTRY.values() if can_be_ignored(code)]
+    near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)])
+    help = "codes are written as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
+    fixes = () if near is None else (Fix(span, near, f"write `{near}`"),)
+    return Diagnostic(codes.UNKNOWN_IGNORE, f"there is no code `{name}`", span, help, fixes=fixes)
+
+
+def _removal(source: Source, comment: Comment, names: list[tuple[str, Span]], at: int) -> Fix:
+    """Take one code out of a comment; with the last one the comment goes, and its line if nothing else stands there."""
+    text, span = source.text, names[at][1]
+    if len(names) > 1:
+        start, end = (span.start, names[at + 1][1].start) if at == 0 else (names[at - 1][1].end, span.end)
+        return Fix(Span(source.file, start, end), "", f"take `{names[at][0]}` out", Applicability.SAFE)
+    start, end = comment.span.start, comment.span.end
+    while start and text[start - 1] in " \t":
+        start -= 1
+    behind = end
+    while behind < len(text) and text[behind] in " \t\r":
+        behind += 1
+    if (not start or text[start - 1] == "\n") and (behind == len(text) or text[behind] == "\n"):
+        end = min(behind + 1, len(text))
+    return Fix(Span(source.file, start, end), "", "delete the comment", Applicability.SAFE)
+
+
+def unused(ignore: Ignore) -> Diagnostic:
+    """The finding on an ignore that ignores nothing."""
+    where = "in this file" if ignore.line is None else "there"
+    message = f"nothing of `{ignore.code.id}` ({ignore.code.slug}) is found {where}, so this ignores nothing"
+    return Diagnostic(codes.UNUSED_IGNORE, message, ignore.span, ignore.fix.title, fixes=(ignore.fix,))

@@ -1,0 +1,71 @@
+"""Findings as plain lists for a cache, and back again: exactly those, or none."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from rtshcua.diagnostics.codes import REGISTRY
+from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix, Label
+from rtshcua.diagnostics.span import Span
+
+
+def as_lists(found: tuple[Diagnostic, ...]) -> list[Any]:
+    """Findings as lists that `json` takes."""
+    return [
+        [
+            each.code.id,
+            each.message,
+            each.span,
+            each.help,
+            [[label.span, label.text] for label in each.labels],
+            [[fix.span, fix.replacement, fix.title, fix.applicability.value] for fix in each.fixes],
+            each.pointer,
+        ]
+        for each in found
+    ]
+
+
+def from_lists(lists: Any) -> tuple[Diagnostic, ...]:
+    """The findings that these lists were made of. Raises ValueError, KeyError or TypeError for any others.
+
+    Whether their places are in a text is for the caller to see, who has it.
+    """
+    return tuple(
+        Diagnostic(
+            REGISTRY[code],
+            _text(message),
+            None if span is None else _span(*span),
+            _perhaps(help),
+            tuple(Label(_span(*place), _text(text)) for place, text in labels),
+            tuple(
+                Fix(_span(*place), _text(replacement), _text(title), Applicability(applicability))
+                for place, replacement, title, applicability in fixes
+            ),
+            _perhaps(pointer),
+        )
+        for code, message, span, help, labels, fixes, pointer in lists
+    )
+
+
+def places(found: tuple[Diagnostic, ...]) -> Iterator[Span]:
+    """All places that findings speak of."""
+    for each in found:
+        if each.span is not None:
+            yield each.span
+        yield from (label.span for label in each.labels)
+        yield from (fix.span for fix in each.fixes)
+
+
+def _text(found: Any) -> str:
+    if type(found) is not str:
+        raise TypeError("no text")
+    return found
+
+
+def _perhaps(found: Any) -> str | None:
+    return None if found is None else _text(found)
+
+
+def _span(file: Any, start: Any, end: Any) -> Span:
+    if type(start) is not int or type(end) is not int or not 0 <= start <= end:
+        raise TypeError("no place")
+    return Span(_text(file), start, end)

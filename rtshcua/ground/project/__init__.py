@@ -1,0 +1,1 @@
+"""A project of sources: what its `rtshcua.toml` says, and which files a pattern there means. Pure."""

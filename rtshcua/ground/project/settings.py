@@ -1,0 +1,180 @@
+"""What a project says in `rtshcua.toml`, or in `pyproject.toml` below `[tool.rtshcua]`: the text, as `Settings`.
+
+Nothing is guessed: an unknown key, a value of the wrong type, an ignore without a reason is a refusal, with the nearest
+that would be accepted. `docs/linting.md` has all keys.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from posixpath import normpath
+from typing import Any, Literal
+
+from rtshcua.diagnostics.codes import Code
+from rtshcua.ground.project.tables import NotSo, Table
+
+#: the names under which a configuration is looked for, of one folder the first that has one
+OWN, SHARED = "rtshcua.toml", "pyproject.toml"
+NAMES = (OWN, SHARED)
+
+FailOn = Literal["error", "warning", "note", "never"]
+LEVELS: tuple[FailOn, ...] = ("error", "warning", "note", "never")
+WIDTH, NARROWEST, WIDEST = 120, 40, 400
+
+
+@dataclass(frozen=True, slots=True)
+class Ignored:
+    """A kind of finding that is ignored, and why; `pattern` says in which files, None: in all."""
+
+    code: Code
+    reason: str
+    pattern: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LintSettings:
+    """`[lint]`: what is ignored, which files are left out, from which level on a run fails, further sources, the folder
+    of the cache (None: the one that is usual; an empty text: none), and whether the format is looked at.
+    """
+
+    ignored: tuple[Ignored, ...] = ()
+    exclude: tuple[str, ...] = ()
+    fail_on: FailOn = "warning"
+    further: tuple[str, ...] = ()
+    cache: str | None = None
+    format: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FormatSettings:
+    """`[format]`: how many characters wide lines are, and which files are left out."""
+
+    width: int = WIDTH
+    exclude: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TestSettings:
+    """`[test]`: the coverage in whole per cent below which a run fails, None for any; and which files are left out."""
+
+    __test__ = False  # for pytest
+
+    fail_under: int | None = None
+    exclude: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """A whole configuration. Paths and patterns in it are relative to the folder that it stands in."""
+
+    lint: LintSettings = LintSettings()
+    format: FormatSettings = FormatSettings()
+    test: TestSettings = TestSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Why a configuration is none: in `file`, at `line` where that is known (from 1), what was found, and what would
+    be accepted.
+    """
+
+    file: str
+    message: str
+    help: str | None = None
+    line: int | None = None
+
+    def __str__(self) -> str:
+        """The place and the message, for one line."""
+        return f"{self.file}{'' if self.line is None else f':{self.line}'}: {self.message}"
+
+
+def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | Refused | None:
+    """The settings in a configuration called `file`; `shared` where it is a `pyproject.toml`, in which others have
+    tables too: None where that has none of ours.
+    """
+    try:
+        found = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        return _not_toml(file, str(error))
+    except RecursionError:
+        return Refused(file, "it is nested too deeply to be read")
+    prefix = ""
+    if shared:
+        tool = found.get("tool")
+        if not isinstance(tool, dict) or "rtshcua" not in tool:
+            return None
+        found, prefix = tool["rtshcua"], "tool.rtshcua"
+    try:
+        return _settings(Table.of(found, prefix))
+    except NotSo as error:
+        return Refused(file, error.message, error.help, _line(text, error.key))
+
+
+def _settings(table: Table) -> Settings:
+    lint, form, test = (table.table(name) for name in ("lint", "format", "test"))
+    table.close()
+    return Settings(_lint(lint), _format(form), _test(test))
+
+
+def _lint(table: Table) -> LintSettings:
+    ignored = list(_ignored(table.table("ignore"), None))
+    files = table.table("per-file-ignore")
+    for pattern in files.names():
+        ignored += _ignored(files.table(pattern), pattern)
+    settings = LintSettings(
+        tuple(ignored),
+        table.texts("exclude"),
+        table.one_of("fail-on", LEVELS, "warning"),
+        table.texts("with"),
+        _cache(table),
+        table.flag("format", default=False),
+    )
+    table.close()
+    return settings
+
+
+def _ignored(table: Table, pattern: str | None) -> list[Ignored]:
+    return [Ignored(table.code(name), table.reason(name), pattern) for name in table.names()]
+
+
+def _cache(table: Table) -> str | None:
+    found: Any = table.any_of("cache", (str, bool), 'a folder, as in `".rtshcua_cache"`, or `false`')
+    if isinstance(found, bool):
+        return None if found else ""
+    if found and ("\0" in found or not normpath(found).replace("\\", "/").strip("./")):
+        help = 'accepted: a folder of its own, as in `".rtshcua_cache"`, or `false`'
+        raise NotSo("cache", f"`cache` in `[{table.name}]` is no folder that a cache can have to itself", help)
+    return found or None
+
+
+def _format(table: Table) -> FormatSettings:
+    width = table.number("width", NARROWEST, WIDEST)
+    settings = FormatSettings(WIDTH if width is None else width, table.texts("exclude"))
+    table.close()
+    return settings
+
+
+def _test(table: Table) -> TestSettings:
+    settings = TestSettings(table.number("fail-under", 0, 100), table.texts("exclude"))
+    table.close()
+    return settings
+
+
+def _not_toml(file: str, error: str) -> Refused:
+    """What `tomllib` says, as our messages are written; its place, which it puts at the end, goes to the front."""
+    words, _, place = error.removesuffix(")").partition(" (at ")
+    words = words[:1].lower() + words[1:]
+    line = place.removeprefix("line ").partition(",")[0]
+    return Refused(file, f"it is not TOML: {words}", None, int(line) if line.isdecimal() else None)
+
+
+def _line(text: str, key: str) -> int | None:
+    """The first line on which a key stands; it may be one of the same name in another table, so it is only said where
+    there is one such line.
+    """
+    written = (key, f'"{key}"', f"'{key}'")
+    lines = [
+        number
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip().startswith(written) or any(f"{mark}{each}" in line for each in written for mark in "{.[, ")
+    ]
+    return lines[0] if len(lines) == 1 else None

@@ -1,0 +1,186 @@
+"""The rules about what a policy decides: what they find, and above all what they leave alone."""
+
+import pytest
+
+from reference.linted import HEAD, decided
+
+SKILLS = HEAD + "".join(f'import "lib:skills/{name}.rts"\n' for name in ("takeoff", "hover", "goto", "inspect_area"))
+SAFE = "permit hover, return_home, emergency_land by any contingency return_home, emergency_land"
+
+
+def codes(rules: str, declarations: str = "") -> list[str]:
+    found = decided(f"{SKILLS}{declarations}\npolicy p version 1 {{ {rules} {SAFE} }}")
+    return sorted(code for code, _ in found if code not in ("E1301", "E1305"))
+
+
+# ---------------------------------------------------------------------------------------------------- E1306
+
+WORLD = """
+zone wide = polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)
+zone world = circle(47.3977 N, 8.5456 E, 100 km) ceiling 2 km above home
+zone near = circle(47.3977 N, 8.5456 E, 12 km)
+"""
+ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when altitude > 30 m"
+
+
+@pytest.mark.parametrize(
+    ("rules", "gates"),
+    [
+        (ALL, False),
+        ("permit takeoff by any when altitude <= 40 m", True),
+        (ALL.replace("by any when altitude > 30 m", "by any when altitude > 50 m"), True),
+        (ALL.replace("takeoff by any when altitude > 30 m", "takeoff by role operator when altitude > 30 m"), True),
+        (ALL.replace("by any when altitude > 30 m", "by any through agent when altitude > 30 m"), True),
+        (f"{ALL} airspace inside city", True),
+        (f"{ALL} forbid takeoff by any when wind.speed > 9 m/s", True),
+        (f"{ALL} confirm takeoff when altitude > 20 m by role supervisor within 30 s", True),
+        (f"{ALL} degrade any when battery < 25 % to return_home", True),
+        ("permit takeoff by any when wind.speed < 9 m/s permit takeoff by any when wind.speed >= 9 m/s", False),
+        (f"{ALL} permit goto by role operator when altitude <= 30 m", True),  # another skill is gated
+        ("", True),  # nothing that moves is permitted at all
+        ("permit takeoff by any when altitude >= 0 m and altitude <= 60 m", False),
+        ("permit takeoff by any when altitude > 3 m", True),  # 3 m is the least that it can be asked for
+        ("permit goto by any when target inside wide", False),
+        ("permit goto by any when target inside world and height < 9 km", False),
+        ("permit goto by any when target inside wide or target inside city", False),
+        ("permit goto by any when target inside city", True),
+        ("permit goto by any when not target inside world", True),
+        ("permit goto by any when position inside wide", False),
+        ("permit goto by any when position inside world", True),  # its ceiling: 3.2 km is what the vehicle climbs
+        ("permit goto by any when position inside near", True),
+        ("permit takeoff by any when wind.speed >= 0 m/s", False),
+        ("permit takeoff by any when wind.speed > 0 m/s", True),
+        ("permit takeoff by any when height <= 100 km", False),
+        ("permit takeoff by any when height <= 1 km", True),
+        ("permit takeoff by any when local time in 00:00 .. 23:59", False),
+        ("permit takeoff by any when local time in 00:01 .. 23:59", True),
+        ("permit takeoff by any when battery > 0 %", False),
+        ("permit takeoff by any when battery > 15 %", True),
+        ("permit takeoff by any when battery > 0 % degrade any when battery < 5 % to return_home", True),
+        ("permit takeoff by any when battery > 0 % degrade any when battery < 0 % to return_home", False),
+        ("permit takeoff by any when battery > 0 % forbid takeoff by any when height > 90 km", False),
+        ("permit takeoff by any when battery > 0 % for the last 5 s", True),
+        ("permit takeoff by any when phase is departure", True),
+        ("permit takeoff by any when gps.fix >= fix_3d", False),  # lesser fixes count as missing
+        ("permit takeoff by any when gps.fix >= rtk_fixed", True),
+        (f"{ALL} airspace inside wide", False),
+        (f"{ALL} airspace inside wide outside school", True),
+        (f"{ALL} airspace inside near", True),
+    ],
+)
+def test_a_policy_that_gates_nothing(rules: str, gates: bool) -> None:
+    found = codes(rules, WORLD)
+    assert ("E1306" not in found) == gates, found
+
+
+# ---------------------------------------------------------------------------------------------------- E1307
+
+FAR, NEAR = "circle(47.5990 N, 8.5456 E, 100 m)", "circle(47.4090 N, 8.5456 E, 100 m)"
+BOX = "polygon(47.599 N, 8.545 E, 47.599 N, 8.546 E, 47.598 N, 8.546 E, 47.598 N, 8.545 E)"
+WIDE = "polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)"
+
+
+@pytest.mark.parametrize(
+    ("zone", "airspace", "idle"),
+    [
+        (FAR, "inside city outside far", True),
+        (BOX, "inside city outside far", True),
+        (NEAR, "inside city outside far", False),
+        (BOX.replace("47.59", "47.49"), "inside city outside far", False),  # 11 km away, of 13 within reach
+        ("circle(47.3977 N, 8.5456 E, 20 km)", "inside far", True),
+        ("circle(47.3977 N, 8.5456 E, 20 km) ceiling 50 m", "inside far", False),
+        ("circle(47.3977 N, 8.5456 E, 20 km) active 08:00 .. 18:00", "inside far", False),
+        ("circle(47.3977 N, 8.5456 E, 12 km)", "inside far", False),
+        ("circle(47.5990 N, 8.5456 E, 22 km)", "inside city outside far", False),
+        (WIDE, "inside far", True),
+        (WIDE.replace("48.0", "47.5"), "inside far", False),  # 11 km to the north, of 13 within reach
+        (f"{WIDE} ceiling 10 km above home", "inside far", True),
+        (f"{WIDE} ceiling 3 km above home", "inside far", False),
+        (f"{WIDE} floor -20 km above home", "inside far", True),
+        (f"{WIDE} floor -100 m above home", "inside far", False),
+        ("union(wide, home)", "inside far", True),
+        ("difference(wide, home)", "inside far", False),
+        (f"{NEAR} floor 5 km above home", "inside city outside far", True),
+        (f"{NEAR} floor 3 km above home", "inside city outside far", False),
+    ],
+)
+def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, idle: bool) -> None:
+    others = f"zone wide = {WIDE} zone home = circle(47.3977 N, 8.5456 E, 1 km)"
+    found = codes(f"permit takeoff by role operator airspace {airspace}", f"{others} zone far = {zone}")
+    assert ("E1307" in found) == idle, found
+
+
+# ---------------------------------------------------------------------------------------------------- E1308
+
+
+@pytest.mark.parametrize(
+    ("rules", "bounded"),
+    [
+        ("permit goto by role operator", False),
+        ("permit inspect_area by role operator airspace outside school", False),
+        ("permit goto by role operator airspace inside city", True),
+        ("permit goto by role operator when target inside city", True),
+        ("permit goto by role operator when battery > 50 %", True),  # bounded by something: that is for its author
+        ("permit goto by role operator forbid goto by any when target inside school", True),
+        ("permit goto by role operator forbid any by any when battery < 40 %", True),
+        ("permit takeoff by role operator", True),  # it is told no place
+        ("permit goto by role operator airspace inside wide", False),
+        ("permit goto by role operator airspace inside wide, city", True),
+        ("permit goto by role operator when altitude >= 0 m", False),
+        ("permit goto by role operator through agent, operator when battery > 0 %", False),
+        ("permit goto by role operator when target inside wide", False),
+        ("permit goto by role operator when altitude <= 30 m", True),
+        ("permit goto by role operator when altitude >= 0 m forbid goto by any when altitude < 0 m", False),
+        ("permit goto by role operator when altitude >= 0 m forbid goto by any when altitude < 6 m", True),
+        ("permit goto, inspect_area by role operator when altitude <= 60 m", False),
+    ],
+)
+def test_a_permit_to_fly_anywhere(rules: str, bounded: bool) -> None:
+    found = codes(rules, WORLD)
+    assert ("E1308" not in found) == bounded, found
+
+
+# ---------------------------------------------------------------------------------------------------- E1312
+
+SITTING = "skill sit() { motion land class tactical deadline 9 s valid for 9 min lasts at most 9 s energy at most 1 % }"
+
+
+@pytest.mark.parametrize(
+    ("rules", "how_many"),
+    [
+        ("degrade any when battery < 25 % to return_home", 1),
+        ("degrade any when battery < 25 % to hover", 1),
+        ("degrade any when battery < 25 % to emergency_land", 0),
+        ("degrade any when battery < 25 % to sit", 0),
+        ("degrade takeoff, hover when battery < 25 % to return_home", 0),
+        ("degrade sit, emergency_land, hover when battery < 25 % to return_home", 2),
+        ("degrade emergency_land when battery < 25 % to sit", 0),
+        ("degrade any when wind.speed > 9 m/s to hover degrade any when battery < 25 % to return_home", 2),
+    ],
+)
+def test_a_degrade_that_keeps_from_landing(rules: str, how_many: int) -> None:
+    assert codes(f"permit sit by any {rules}", SITTING).count("E1312") == how_many
+
+
+# ---------------------------------------------------------------------------------------------------- E1303
+
+
+@pytest.mark.parametrize(
+    ("rules", "broad"),
+    [
+        ("permit takeoff by role operator through agent, operator", False),
+        ("permit takeoff by role operator through agent, operator, onboard", True),
+        ("permit takeoff by role operator through agent, onboard when altitude < 20 m", False),
+        ("permit takeoff by role operator through agent, onboard when altitude < 90 m", True),
+        ("permit takeoff by any when altitude >= 0 m", True),
+        ("permit takeoff by any when altitude >= 5 m", False),
+        ("permit goto by any when target inside wide permit takeoff by role operator when altitude <= 30 m", True),
+        ("permit goto by any when target inside near", False),
+        ("permit hover by role operator through agent, operator, onboard", False),
+        ("permit takeoff by role operator delegate any by role operator to role trainee", True),
+        ("permit takeoff by role operator delegate takeoff by role operator to role trainee", False),
+        ("permit takeoff by role operator delegate any by role operator to role trainee when battery > 50 %", False),
+    ],
+)
+def test_authority_that_is_broader_than_anyone_means(rules: str, broad: bool) -> None:
+    assert ("E1303" in codes(f"{rules} airspace inside city", WORLD)) == broad

@@ -1,0 +1,115 @@
+"""What a configuration says, and how one that is wrong is refused: with the nearest that would be accepted."""
+
+import pytest
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.project.patterns import matches
+from rtshcua.ground.project.settings import Ignored, Refused, Settings, parse_settings
+
+WHOLE = """
+[lint]
+ignore = { E1304 = "the letter  says 30 m" }
+exclude = ["drafts", "old/**"]
+fail-on = "error"
+with = ["site.rts"]
+cache = ".cache"
+[lint.per-file-ignore]
+"tests/*.rts" = { naming = "names of the register" }
+[format]
+width = 100
+exclude = ["generated.rts"]
+[test]
+fail-under = 80
+exclude = ["slow"]
+"""
+
+
+def test_all_keys() -> None:
+    found = parse_settings(WHOLE, "rtshcua.toml")
+    assert isinstance(found, Settings)
+    assert found.lint.ignored == (
+        Ignored(codes.REPEATED_NUMBER, "the letter says 30 m"),
+        Ignored(codes.NAMING, "names of the register", "tests/*.rts"),
+    )
+    assert (found.lint.exclude, found.lint.fail_on, found.lint.further) == (
+        ("drafts", "old/**"),
+        "error",
+        ("site.rts",),
+    )
+    assert (found.lint.cache, found.format.width, found.format.exclude) == (".cache", 100, ("generated.rts",))
+    assert (found.test.fail_under, found.test.exclude) == (80, ("slow",))
+
+
+def test_nothing_said_is_the_defaults() -> None:
+    assert parse_settings("", "rtshcua.toml") == Settings()
+    assert parse_settings("[project]\nname = 'x'\n[tool.ruff]", "pyproject.toml", shared=True) is None
+    assert parse_settings("[tool.rtshcua]", "pyproject.toml", shared=True) == Settings()
+    found = parse_settings("[tool.rtshcua.lint]\ncache = false", "pyproject.toml", shared=True)
+    assert isinstance(found, Settings)
+    assert found.lint.cache == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "told", "help"),
+    [
+        ("x =", "r.toml: it is not TOML: invalid value", None),
+        ("\nx y", "r.toml:2: it is not TOML: expected '=' after a key in a key/value pair", None),
+        ("[lnt]", "r.toml:1: there is no key `lnt`", "did you mean `lint`?"),
+        ("[lint]\nexlude = []", "r.toml:2: there is no key `exlude` in `[lint]`", "did you mean `exclude`?"),
+        ("[format]\nxyz = 1", "r.toml:2: there is no key `xyz` in `[format]`", "known: `width`, `exclude`"),
+        ("lint = 3", "r.toml:1: `lint` is a whole number, and must be a table", None),
+        ("lint.fail-on = 3", "r.toml:1: `fail-on` in `[lint]` is a whole number",
+         "accepted: `error`, `warning`, `note`, `never`"),
+        ("lint.fail-on = 'warn'", "r.toml:1: `warn` is nothing that `fail-on` in `[lint]` can be",
+         "did you mean `warning`?"),
+        ("lint.exclude = 'x'", "r.toml:1: `exclude` in `[lint]` is a text",
+         'accepted: a list of texts, as in `exclude = ["drafts"]`'),
+        ("lint.exclude = ['']", "r.toml:1: `exclude` in `[lint]` has an empty text in its list",
+         "accepted: a list of texts"),
+        ("lint.exclude = [1.5]", "r.toml:1: `exclude` in `[lint]` has a number with a point in its list",
+         "accepted: a list of texts"),
+        ("lint.cache = 3", "r.toml:1: `cache` in `[lint]` is a whole number",
+         'accepted: a folder, as in `".rtshcua_cache"`, or `false`'),
+        ("lint.ignore = ['E1304']", "r.toml:1: `lint.ignore` is a list, and must be a table", None),
+        ("[lint.ignore]\nE1304 = ' '", "r.toml:2: `E1304` in `[lint.ignore]` is ignored without a reason",
+         'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),
+        ("[lint.ignore]\nE1304 = '...'", "r.toml:2: `E1304` in `[lint.ignore]` is ignored without a reason",
+         'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),
+        ("[lint.ignore]\nE1304 = true", "r.toml:2: `E1304` in `[lint.ignore]` is `true`, and must be a reason",
+         'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),
+        ("[lint.ignore]\nnamin = 'why not'", "r.toml:2: there is no code `namin`", "did you mean `naming`?"),
+        ("[lint.ignore]\nE0310 = 'why not'", "r.toml:2: `E0310` is an error, and errors cannot be ignored", None),
+        ("[lint.ignore]\nE1309 = 'why not'",
+         "r.toml:2: `E1309` is about ignores themselves, and cannot be ignored", None),
+        ("format.width = 39", "r.toml:1: `width` in `[format]` is 39", "accepted: a whole number from 40 to 400"),
+        ("format.width = true", "r.toml:1: `width` in `[format]` is `true`", "accepted: a whole number from 40 to 400"),
+        ("test.fail-under = 80.5", "r.toml:1: `fail-under` in `[test]` is a number with a point",
+         "accepted: a whole number from 0 to 100"),
+        ("test.fail-under = 101", "r.toml:1: `fail-under` in `[test]` is 101",
+         "accepted: a whole number from 0 to 100"),
+        ("x = 2020-01-01", "r.toml:1: there is no key `x`", "known: `lint`, `format`, `test`"),
+    ],
+)  # fmt: skip
+def test_refusals(text: str, told: str, help: str | None) -> None:
+    found = parse_settings(text, "r.toml")
+    assert isinstance(found, Refused)
+    assert (str(found), found.help) == (told, help)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "meant", "not_meant"),
+    [
+        ("drafts", ["drafts/a.rts", "x/drafts/y/a.rts", "drafts"], ["drafts2/a.rts", "a/mydrafts"]),
+        ("drafts/", ["drafts/a.rts", "x/drafts/a.rts"], ["drafts2/a.rts"]),
+        ("*.rts", ["a.rts", "x/y/b.rts"], ["a.rts2", "a"]),
+        ("a/*.rts", ["a/b.rts"], ["a/b/c.rts", "x/a/b.rts"]),
+        ("a/**", ["a/b.rts", "a/b/c.rts"], ["b/a/c.rts"]),
+        ("**/old", ["old/a.rts", "x/y/old/z.rts"], ["older/a.rts"]),
+        ("a/**/b.rts", ["a/b.rts", "a/x/y/b.rts"], ["b.rts"]),
+        ("./a.rts", ["a.rts"], ["a_rts"]),
+        ("a?.rts", ["ab.rts"], ["a.rts", "a/.rts"]),
+        ("[x].rts", ["[x].rts"], ["x.rts"]),
+    ],
+)
+def test_patterns(pattern: str, meant: list[str], not_meant: list[str]) -> None:
+    assert [matches(pattern, path) for path in (*meant, *not_meant)] == [True] * len(meant) + [False] * len(not_meant)

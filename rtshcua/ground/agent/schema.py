@@ -6,6 +6,8 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from rtshcua.wire import names
 
+#: the draft that the schema is of
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
 FORMAT, VERSION = names.MISSION_SPEC.name, names.MISSION_SPEC.version
 
 NAME = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$"
@@ -114,7 +116,7 @@ class SpecificationShape(Shape):
 def schema() -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a mission specification."""
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$schema": DRAFT,
         "$id": f"urn:{FORMAT.replace('/', ':')}:{VERSION}",
         **SpecificationShape.model_json_schema(),
     }

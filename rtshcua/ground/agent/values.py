@@ -63,7 +63,7 @@ def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tupl
 def _only(step: Step) -> Iterator[Any]:
     """The one part of a step's overrides; none where there are several."""
     overrides = step.overrides
-    names = (name for name in Overrides.model_fields if name != "span")
+    names = (name for name in Overrides.__struct_fields__ if name != "span")
     parts = [] if overrides is None else [getattr(overrides, name) for name in names if getattr(overrides, name)]
     yield from parts if len(parts) == 1 else ()
 
@@ -117,8 +117,8 @@ class _Given(NamedTuple):
 def _moved(node: Any, place: Callable[[Span], Span]) -> Any:
     """A node with other spans, all through."""
     if isinstance(node, Node):
-        changes = {name: _moved(getattr(node, name), place) for name in type(node).model_fields}
-        return node.model_copy(update=changes)
+        changes = {name: _moved(getattr(node, name), place) for name in type(node).__struct_fields__}
+        return node.copied(**changes)
     if isinstance(node, Span):
         return place(node)
     if isinstance(node, tuple) and not hasattr(node, "_fields"):

@@ -54,6 +54,8 @@ class Meaning:
             "energy": vehicle.endurance_us,
             "reserve": vehicle.reserve,
             "local time": vehicle.utc_offset_us,
+            "brakes": (vehicle.braking, vehicle.reaction_us),
+            "return": vehicle.return_altitude,
         }
 
     def zones(self) -> Mapping[str, Fields]:

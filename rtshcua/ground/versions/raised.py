@@ -40,12 +40,17 @@ def compare(
     """
     found: list[Compared] = []
     for lowered in policies:
-        own = [each for each in earlier if _same(each, lowered.policy)]
-        if own:
-            old = max(own, key=lambda each: (each.version, not differences(each, lowered.policy)))
+        old = before(lowered.policy, earlier)
+        if old is not None:
             finding = _finding(lowered, old, where, sources)
             found.append(Compared(old.name, lowered.policy.version, old.version, finding))
     return tuple(dict.fromkeys(found))
+
+
+def before(policy: Policy, earlier: Iterable[Policy]) -> Policy | None:
+    """The earlier policy that one is held against: of its name and vehicle the newest."""
+    own = [each for each in earlier if _same(each, policy)]
+    return max(own, key=lambda each: (each.version, not differences(each, policy)), default=None)
 
 
 def _same(old: Policy, new: Policy) -> bool:

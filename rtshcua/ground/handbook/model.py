@@ -1,0 +1,263 @@
+"""What a handbook says, as one plain value: frozen, comparable, and what `rtshcua docs --json` prints.
+
+Texts are sentences with names between backticks. Lengths are in mm, of the local plane where a place is meant: x east
+and y north of the vehicle's home.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FileDigest:
+    """A file that a policy rests on, named as in the `place` of what stands in it, and the SHA-256 of its bytes."""
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A figure, and what it is of."""
+
+    what: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One `permit`: through which sources, and what must hold all together. `rule` is its number."""
+
+    rule: int
+    through: str
+    conditions: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Hindrance:
+    """A `confirm`, `forbid` or `degrade` about a right: what it comes to, and when; `rule` is its number."""
+
+    rule: int
+    words: str
+    conditions: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Right:
+    """What a role may have done of one skill; any of the ways is enough."""
+
+    skill: str
+    answer: str  # `yes`, `on conditions`, `after approval`, `after approval, on conditions`, `something else`, `no`
+    ways: tuple[Way, ...]
+    confirmations: tuple[Hindrance, ...]
+    prohibitions: tuple[Hindrance, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rights:
+    """All that a role may have done; an empty role stands for everybody else."""
+
+    role: str
+    rights: tuple[Right, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RuleTold:
+    """One rule in the order in which they are signed, as a sentence, and as it is written and where."""
+
+    number: int
+    kind: str
+    told: str
+    written: str
+    place: str
+    changed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterTold:
+    """What may be asked of a skill."""
+
+    name: str
+    what: str
+    limits: str
+    default: str
+
+
+@dataclass(frozen=True, slots=True)
+class SkillTold:
+    """A contract; `as_link` is what is otherwise where a chain ends in it, empty for any other skill."""
+
+    name: str
+    note: str
+    motion: str
+    parameters: tuple[ParameterTold, ...]
+    timing: tuple[str, ...]
+    require: tuple[str, ...]
+    assume: tuple[str, ...]
+    maintain: tuple[str, ...]
+    fallback: tuple[str, ...]
+    as_link: str
+    record: str
+    place: str
+    changed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SignalTold:
+    """What the vehicle reports."""
+
+    name: str
+    type: str
+    source: str
+    unknown: str
+    changed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """An outline in the local plane, exactly as it is signed: a circle by its centre and the square of its radius, or
+    else rings, outer ones counter-clockwise and holes clockwise.
+    """
+
+    rings: tuple[tuple[tuple[int, int], ...], ...] = ()
+    centre: tuple[int, int] | None = None
+    radius_squared: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceTold:
+    """A place that a zone is written by: what it is, WGS 84, and where that is in the local plane."""
+
+    what: str
+    latitude: str
+    longitude: str
+    x: int
+    y: int
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneTold:
+    """A zone. `use` says what the airspace makes of it: `allowed`, `forbidden` or empty; `floor` and `ceiling` are mm
+    above home, None where there is none; `derived` is one that a rule grows out of another.
+    """
+
+    name: str
+    note: str
+    use: str
+    shape: str
+    band: str
+    times: str
+    ground: Ground
+    floor: int | None
+    ceiling: int | None
+    places: tuple[PlaceTold, ...]
+    place: str
+    changed: bool
+    derived: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class StepTold:
+    """One step of a mission, and the way that it takes: local places, the last of which is where it ends. `tighter` is
+    what it is held to beyond its skill's contract.
+    """
+
+    number: int
+    phase: str
+    told: str
+    otherwise: str
+    tighter: tuple[str, ...]
+    path: tuple[tuple[int, int], ...]
+    altitude: int
+
+
+@dataclass(frozen=True, slots=True)
+class MissionTold:
+    """A mission under the policy; `bounds` is what it takes at most."""
+
+    name: str
+    intent: str
+    proposed: str
+    bounds: tuple[Fact, ...]
+    values: str
+    steps: tuple[StepTold, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CaseTold:
+    """A test case: what is given, what is asked, what must be decided, and what was decided when the page was made."""
+
+    name: str
+    given: tuple[str, ...]
+    when: str
+    expect: str
+    decided: str
+    met: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What holds where tests begin, unless they say otherwise, and where that is written."""
+
+    name: str
+    place: str
+    given: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeTold:
+    """What is new or other than before, and its words then and now: none where there was, or is, no such thing."""
+
+    what: str
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Chapter:
+    """A policy for a vehicle, with all that it rests on; `digest` names exactly what is signed."""
+
+    name: str
+    version: int
+    note: str
+    digest: str
+    files: tuple[FileDigest, ...]
+    vehicle: tuple[Fact, ...]
+    home: tuple[int, int]
+    home_within: int
+    return_altitude: int
+    rights: tuple[Rights, ...]
+    rules: tuple[RuleTold, ...]
+    airspace: str
+    contingency: tuple[str, ...]
+    evidence: str
+    skills: tuple[SkillTold, ...]
+    signals: tuple[SignalTold, ...]
+    states: tuple[Fact, ...]
+    zones: tuple[ZoneTold, ...]
+    missions: tuple[MissionTold, ...]
+    starts: tuple[Start, ...]
+    cases: tuple[CaseTold, ...]
+    since: str  # what it was compared with; empty where with nothing
+    changes: tuple[ChangeTold, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FindingTold:
+    """A warning or a note of `rtshcua check`."""
+
+    code: str
+    severity: str
+    message: str
+    help: str
+    place: str
+
+
+@dataclass(frozen=True, slots=True)
+class Handbook:
+    """All chapters; `made_at` is given, never read from a clock."""
+
+    title: str
+    made_at: str
+    made_by: str
+    chapters: tuple[Chapter, ...]
+    findings: tuple[FindingTold, ...]

@@ -1,0 +1,176 @@
+"""The schema under a policy: what fits it is a specification, what the policy never permits does not fit."""
+
+import re
+from copy import deepcopy
+from json import dumps, loads
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtshcua.ground.agent.forms import FORMS, strict
+from rtshcua.ground.agent.narrowed import RESERVED, narrowed
+from rtshcua.ground.agent.patterns import digits, name_but
+from rtshcua.ground.agent.schema import schema as general
+from rtshcua.ground.agent.specification import parse_specification
+from rtshcua.ground.compiler.program import examine_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+POLICY = CHECKOUT / "policies" / "bridge_inspection.rts"
+PROPOSAL = loads((CHECKOUT / "missions" / "proposal.json").read_text(encoding="utf-8"))
+
+
+def narrow() -> dict[str, Any]:
+    program = load([str(POLICY)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
+    (lowered,) = examine_program(program, dialect.load()).policies
+    return narrowed(lowered, program.units, "lib:policies/bridge_inspection.rts")
+
+
+SCHEMA = narrow()
+CHECK = jsonschema.Draft202012Validator(SCHEMA)
+STRICT = jsonschema.Draft202012Validator(strict(SCHEMA))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("narrow", [False, True])
+def test_every_form_holds_a_schema(form: str, narrow: bool) -> None:
+    tool = FORMS[form](deepcopy(SCHEMA) if narrow else general(), narrow=narrow)
+    inner = tool.get("function", tool)
+    found = next((inner[key] for key in ("parameters", "input_schema", "inputSchema") if key in inner), tool)
+    jsonschema.Draft202012Validator.check_schema(found)
+    assert found["type"] == "object"
+    if form != "schema":
+        assert re.fullmatch(r"[a-zA-Z0-9_-]{1,64}", inner["name"])
+        assert inner["description"]
+
+
+def test_the_shipped_proposal_fits() -> None:
+    CHECK.validate(PROPOSAL)
+    jsonschema.Draft202012Validator(general()).validate(PROPOSAL)
+
+
+def filled(proposal: dict[str, Any]) -> dict[str, Any]:
+    """With what the strict forms ask for: no key left out."""
+    whole: dict[str, Any] = deepcopy(proposal)
+    for phase in whole["phases"]:
+        for step in phase["steps"]:
+            step.setdefault("on_inadmissible", "abort")
+            given = step.setdefault("arguments", {})
+            for name in SCHEMA["$defs"][step["skill"]]["properties"]["arguments"]["properties"]:
+                given.setdefault(name, {"speed": "4 m/s", "pattern": "grid"}.get(name))
+    return whole
+
+
+def test_the_proposal_fits_the_strict_forms_when_it_says_everything() -> None:
+    assert not STRICT.is_valid(PROPOSAL)
+    STRICT.validate(filled(PROPOSAL))
+    CHECK.validate(filled(PROPOSAL))
+
+
+def test_strict_forms_say_what_they_may_and_all_that_they_must() -> None:
+    """As documented: every property required, no other one, and none of the keywords that are refused."""
+    refused = {"allOf", "not", "if", "oneOf", "maxLength", "minLength", "default", "examples", "maxItems", "$schema"}
+
+    def walk(value: Any, name: str = "") -> None:
+        if isinstance(value, dict):
+            if name not in ("properties", "$defs"):
+                assert not refused & set(value)
+            if value.get("type") == "object":
+                assert value["additionalProperties"] is False
+                assert value["required"] == list(value["properties"])
+            for key, each in value.items():
+                walk(each, key)
+        elif isinstance(value, list):
+            for each in value:
+                walk(each)
+
+    walk(strict(SCHEMA))
+    assert "overrides" not in dumps(strict(SCHEMA))
+
+
+@pytest.mark.parametrize(
+    ("where", "value"),
+    [
+        (("phases", 0, "steps", 0, "skill"), "fly_away"),
+        (("phases", 0, "steps", 0, "arguments", "altitude"), "41 m"),
+        (("phases", 0, "steps", 0, "arguments", "altitude"), "40.5 m"),
+        (("phases", 0, "steps", 0, "arguments", "altitude"), "2 m"),
+        (("phases", 0, "steps", 0, "arguments", "altitude"), "20"),
+        (("phases", 0, "steps", 0, "arguments", "altitude"), "20 km"),
+        (("phases", 0, "steps", 0, "arguments", "height"), "20 m"),
+        (("phases", 1, "steps", 0, "arguments", "target"), "school.entry"),
+        (("phases", 1, "steps", 0, "arguments", "speed"), "9 m/s"),
+        (("phases", 1, "steps", 1, "arguments", "area"), "school"),
+        (("phases", 1, "steps", 1, "arguments", "area"), "city"),
+        (("phases", 1, "steps", 1, "arguments", "altitude"), "31 m"),
+        (("phases", 1, "steps", 1, "arguments", "pattern"), "spiral"),
+        (("policy", "version"), 8),
+        (("vehicle",), "another"),
+        (("proposed_by", "source"), "operator"),
+        (("proposed_by", "role"), "captain"),
+        (("name",), "inside"),
+        (("imports", 0), "lib:policies/training_field.rts"),
+    ],
+)
+def test_what_the_policy_never_permits_does_not_fit(where: tuple[Any, ...], value: Any) -> None:
+    proposal = deepcopy(PROPOSAL)
+    place: Any = proposal
+    for key in where[:-1]:
+        place = place[key]
+    place[where[-1]] = value
+    assert not CHECK.is_valid(proposal)
+
+
+def made(schema: dict[str, Any]) -> st.SearchStrategy[Any]:
+    """Values that fit a schema, of the keywords that the narrowed one has."""
+    if "$ref" in schema:
+        return made(SCHEMA["$defs"][schema["$ref"].removeprefix("#/$defs/")])
+    if "const" in schema:
+        return st.just(schema["const"])
+    if "enum" in schema:
+        return st.sampled_from(schema["enum"])
+    if "anyOf" in schema:
+        return st.one_of(*map(made, schema["anyOf"]))
+    if "pattern" in schema:
+        return st.from_regex(re.compile(schema["pattern"], re.ASCII), fullmatch=True).filter(
+            lambda text: len(text) <= 200
+        )
+    if schema["type"] == "array":
+        return st.lists(made(schema["items"]), max_size=min(schema.get("maxItems", 2), 2))
+    if schema["type"] == "object":
+        fixed = {name: made(each) for name, each in schema["properties"].items() if name in schema["required"]}
+        free = {name: made(each) for name, each in schema["properties"].items() if name not in schema["required"]}
+        # conditions are free texts: of these the language's own parser is the judge
+        free = {name: each for name, each in free.items() if name not in ("require", "assume", "maintain")}
+        return st.fixed_dictionaries(fixed, optional=free)
+    return st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+
+
+@settings(max_examples=25)
+@given(value=made(SCHEMA))
+def test_whatever_fits_is_a_specification(value: Any) -> None:
+    CHECK.validate(value)
+    specification = parse_specification("spec.json", dumps(value).encode())
+    assert specification.diagnostics == ()
+    (mission,) = specification.unit.missions
+    assert [len(phase.items) for phase in mission.phases] == [len(phase["steps"]) for phase in value["phases"]]
+
+
+@given(low=st.integers(0, 3000), span=st.integers(0, 3000), data=st.data())
+def test_a_pattern_of_a_range_has_just_its_numbers(low: int, span: int, data: st.DataObject) -> None:
+    pattern = re.compile(f"(?:{digits(low, low + span)})")
+    number = data.draw(st.integers(0, 2 * (low + span) + 10))
+    assert bool(pattern.fullmatch(str(number))) == (low <= number <= low + span)
+    assert not pattern.fullmatch(f"0{number}")
+
+
+@given(name=st.one_of(st.sampled_from(sorted(RESERVED)), st.from_regex(r"[a-z]{1,8}", fullmatch=True)))
+def test_a_pattern_of_names_leaves_out_the_reserved_words_alone(name: str) -> None:
+    for each in (name, f"{name}s", name[:-1] or "a", f"{name}_1", name.upper()):
+        assert bool(re.search(name_but(RESERVED), each)) == (each not in RESERVED)
+    assert not re.search(name_but(RESERVED), "1a")

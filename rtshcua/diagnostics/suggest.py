@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
+from functools import lru_cache
 
 #: from this likeness on a name differs from a word by a slip of the finger
 TYPO = 0.85
@@ -18,6 +19,12 @@ def nearest(word: str, known: Iterable[str], about: str = "") -> str | None:
     A name that is spelt alike goes first, then one with the same parts (`battery_remaining` for `remaining`), of those
     the one that shares most with `about`, the words that stand around.
     """
+    return _nearest(word, frozenset(known), about)
+
+
+@lru_cache(maxsize=512)
+def _nearest(word: str, known: frozenset[str], about: str) -> str | None:
+    """Remembered, for what one misspelt declaration leaves behind is the same unknown name in many places."""
     folded = {name.casefold(): name for name in sorted(known)}
     wanted = word.casefold()
     alike = get_close_matches(wanted, list(folded), n=1, cutoff=0.6)

@@ -1,0 +1,221 @@
+"""Parses again only what an edit changed: the pieces of a text, a declaration each, and what was found in them.
+
+What the parser does at the beginning of a declaration depends on nothing before it. So an edit is followed from the
+declaration that it lies in to the first unchanged one that begins where one began before; from there on all is as it
+was, only further on. The result is that of `parse.parse` on the whole text, to the last span: a property test says
+so. Where a piece may begin (`Piece.firm`) is narrow, because the explanation of an error looks around itself.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, TypeVar
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.editor.moved import moved, moved_finding, same
+from rtshcua.ground.editor.positions import Edit, difference
+from rtshcua.ground.language.automaton import Automaton
+from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
+from rtshcua.ground.language.build.missions import Builder
+from rtshcua.ground.language.parse import Parsed, beginning, parse, parsed, refused, run
+from rtshcua.ground.language.recovery import shifts
+from rtshcua.ground.language.table import table
+from rtshcua.model.ir.node import Name, Node
+
+T = TypeVar("T", bound=Node)
+
+_LIST = "<__file_star_"  # the rule for the declarations that were read
+
+
+class Piece(NamedTuple):
+    """From behind the declaration before to the end of one: what was declared and found there.
+
+    `start` is where the last declaration of it begins. `firm` says that nothing but blanks and comments stands before
+    it, that a blank stands behind its first word, and no word touches that: then neither side looks over the border.
+    """
+
+    start: int
+    end: int
+    firm: bool
+    declarations: tuple[Node, ...]
+    found: tuple[Diagnostic, ...]
+    broken: frozenset[str]
+    whole: bool
+
+
+class Cut(NamedTuple):
+    """A text in pieces; the last one is what stands behind the last declaration.
+
+    `since` is the edit that made it of the text before, where that changed no declaration and no syntax error: only
+    comments and blanks. Then all that was found before still holds, some of it further on.
+    """
+
+    source: Source
+    pieces: tuple[Piece, ...]
+    parsed: Parsed
+    since: Edit | None = None
+
+
+def cut(source: Source) -> Cut:
+    """A text that is parsed for the first time."""
+    if refused(source) is not None:
+        return Cut(source, (), parse(source))
+    builder = _Cutting(source)
+    try:
+        run(Automaton(table(), source, builder), builder, beginning(source))
+    except Enough:
+        return Cut(source, (), parse(source))
+    builder.close(len(source.text), len(source.text), firm=False)
+    return _joined(source, tuple(builder.pieces))
+
+
+def cut_again(old: Cut, text: str, earlier: Sequence[Cut] = ()) -> Cut:
+    """The same file with another text. What `earlier` cuts of it have, and `old` lost, need not be parsed again: behind
+    a comment that was opened and is closed again.
+    """
+    if text == old.source.text:
+        return old
+    before = next((each for each in earlier if each.source.text == text), None)
+    if before is not None:
+        return before._replace(since=None)
+    source = Source(old.source.file, text)
+    if not old.pieces or refused(source) is not None:
+        return cut(source)
+    edit = difference(old.source.text, text)
+    first = max((at for at, piece in enumerate(old.pieces) if at and _is_before(old, piece, edit)), default=0)
+    later: dict[int, _Known] = {}
+    for each in (*earlier, old):
+        later |= _later(each, difference(each.source.text, text))
+    start = old.pieces[first].start if first else beginning(source)
+    builder = _Cutting(source, later, old.pieces[first - 1].end if first else start)
+    automaton = Automaton(table(), source, builder)
+    if first:
+        _begin_behind(automaton)
+    try:
+        run(automaton, builder, start)
+    except Enough:
+        return cut(source)
+    except _Met as met:
+        known, at, by = met.known
+        replaced = old.pieces[first:at] if known is old else None
+        rest = known.pieces[at:] if not by else tuple(_moved(piece, by) for piece in known.pieces[at:])
+    else:
+        builder.close(len(text), len(text), firm=False)
+        replaced, rest = old.pieces[first:], ()
+    pieces = (*old.pieces[:first], *builder.pieces, *rest)
+    if sum(len(piece.found) for piece in pieces) >= MAX_FINDINGS:
+        return cut(source)
+    return _joined(source, pieces)._replace(
+        since=edit if replaced is not None and _say_the_same(replaced, builder.pieces) else None
+    )
+
+
+def _say_the_same(old: Sequence[Piece], new: Sequence[Piece]) -> bool:
+    return not any(piece.found for piece in (*old, *new)) and same(
+        tuple(node for piece in old for node in piece.declarations),
+        tuple(node for piece in new for node in piece.declarations),
+    )
+
+
+class _Known(NamedTuple):
+    """The piece `at` of a cut, which stands `by` characters further on now."""
+
+    cut: Cut
+    at: int
+    by: int
+
+
+def _later(known: Cut, edit: Edit) -> dict[int, _Known]:
+    """The pieces behind an edit by where they begin now."""
+    by = edit.length - (edit.end - edit.start)
+    return {
+        piece.start + by: _Known(known, at, by)
+        for at, piece in enumerate(known.pieces)
+        if piece.start >= edit.end and piece.firm
+    }
+
+
+class _Met(Exception):
+    """The parser has come to the beginning of an unchanged piece."""
+
+    def __init__(self, known: _Known) -> None:
+        super().__init__(known)
+        self.known = known
+
+
+class _Cutting(Builder):
+    """Notes after each declaration what has come since the one before."""
+
+    def __init__(self, source: Source, later: Mapping[int, _Known] | None = None, end: int | None = None) -> None:
+        super().__init__(source)
+        self.pieces: list[Piece] = []
+        self._later = later or {}
+        self._end = beginning(source) if end is None else end
+        self._kept = self._noted = 0
+
+    def declare(self, node: T, name: Name | None = None) -> None:
+        """Keeps a declaration, and closes its piece; raises _Met where what follows is known."""
+        super().declare(node, name)
+        text, (_, start, end) = self._source.text, node.span
+        self.close(start, end, firm=_is_firm(text, start, self._end))
+        self._end = end
+        known = self._later.get(_behind(text, end))
+        if known is not None and _is_firm(text, _behind(text, end), end):
+            raise _Met(known)
+
+    def close(self, start: int, end: int, *, firm: bool) -> None:
+        """Ends a piece."""
+        kept, noted = tuple(self.declarations[self._kept :]), tuple(self.diagnostics[self._noted :])
+        self._kept, self._noted = len(self.declarations), len(self.diagnostics)
+        self.pieces.append(Piece(start, end, firm, kept, noted, frozenset(self.broken), self.whole))
+        self.broken.clear()
+        self.whole = True
+
+
+def _behind(text: str, end: int) -> int:
+    """Where the next word begins."""
+    blank = table().skip.match(text, end)
+    return blank.end() if blank else end
+
+
+def _is_firm(text: str, start: int, before: int) -> bool:
+    """See `Piece.firm`; `before` is the end of the declaration before."""
+    word_end = _word_end(text, start)
+    touched = start > 0 and (text[start - 1].isalnum() or text[start - 1] in "_.")
+    return _behind(text, before) == start and text[word_end : word_end + 1].isspace() and not touched
+
+
+def _word_end(text: str, start: int) -> int:
+    end = start
+    while text[end : end + 1].isalpha():
+        end += 1
+    return end
+
+
+def _is_before(old: Cut, piece: Piece, edit: Edit) -> bool:
+    """Whether a piece's first word, and the blank behind it, stand before an edit."""
+    return piece.firm and edit.start > _word_end(old.source.text, piece.start)
+
+
+def _begin_behind(automaton: Automaton) -> None:
+    """The parser as it is after a declaration."""
+    row = automaton.table.rows[0]
+    automaton.states.append(next(state for symbol, state in row.items() if symbol.startswith(_LIST)))
+    assert shifts(automaton.table.rows[automaton.states[-1]], "import")
+    automaton.values.append([None])
+    automaton.starts.append(0)
+
+
+def _moved(piece: Piece, by: int) -> Piece:
+    return piece._replace(
+        start=piece.start + by,
+        end=piece.end + by,
+        declarations=tuple([moved(node, by) for node in piece.declarations]),
+        found=tuple([moved_finding(found, by) for found in piece.found]),
+    )
+
+
+def _joined(source: Source, pieces: tuple[Piece, ...]) -> Cut:
+    declarations = [node for piece in pieces for node in piece.declarations]
+    found = [each for piece in pieces for each in piece.found]
+    broken = frozenset[str]().union(*(piece.broken for piece in pieces))
+    return Cut(source, pieces, parsed(source, declarations, found, broken, whole=all(piece.whole for piece in pieces)))

@@ -1,0 +1,165 @@
+"""Places as editors count them: lines from 0, and in a line UTF-16 or UTF-8 units or characters.
+
+The Language Server Protocol (3.17, "Text Documents") counts UTF-16 code units unless both sides agree on another
+`positionEncoding`, and ends lines by `\\n`, `\\r\\n` or `\\r`. Everything else counts characters of the whole text.
+"""
+
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
+from enum import Enum
+from typing import NamedTuple
+
+_LINE_END = re.compile(r"\r\n|\n|\r")
+_ASTRAL = 0xFFFF
+
+
+class Encoding(Enum):
+    """What a column counts; the values are those of the protocol."""
+
+    UTF_8 = "utf-8"
+    UTF_16 = "utf-16"
+    UTF_32 = "utf-32"
+
+
+class Place(NamedTuple):
+    """A line, and a column in units of the encoding, both from 0."""
+
+    line: int
+    column: int
+
+
+class Change(NamedTuple):
+    """The text from `start` to `end` is replaced; without a start, all of it."""
+
+    start: Place | None
+    end: Place | None
+    text: str
+
+
+class Edit(NamedTuple):
+    """The characters `[start, end)` of the old text became `length` characters."""
+
+    start: int
+    end: int
+    length: int
+
+
+class Lines:
+    """A text, its lines, and places in it."""
+
+    def __init__(self, text: str, encoding: Encoding, starts: list[int] | None = None) -> None:
+        self.text = text
+        self.encoding = encoding
+        self._starts = [0, *(found.end() for found in _LINE_END.finditer(text))] if starts is None else starts
+        self._plain = text.isascii() or encoding is Encoding.UTF_32
+
+    def place(self, offset: int) -> Place:
+        """The place of a character; past the end it is the end. In the middle of `\\r\\n` it is the end of the line."""
+        offset = max(0, min(offset, len(self.text)))
+        line = bisect_right(self._starts, offset) - 1
+        start = self._starts[line]
+        return Place(line, self._units(self.text[start : min(offset, self._line_end(line))]))
+
+    def offset(self, place: Place) -> int:
+        """The character at a place. Past the end of a line it is the end of it, past the last line that of the text;
+        in the middle of a character it is the start of that one.
+        """
+        line, column = place
+        if line < 0:
+            return 0
+        if line >= len(self._starts):
+            return len(self.text)
+        start, end = self._starts[line], self._line_end(line)
+        if self._plain:
+            return min(start + max(0, column), end)
+        return start + self._characters(self.text[start:end], column)
+
+    def replaced(self, start: int, end: int, put: str) -> "Lines":
+        """The text with `put` in the place of `[start, end)`; only there it is looked at for lines again. Whether one
+        begins at a character, the two around tell.
+        """
+        text = self.text[:start] + put + self.text[end:]
+        last, by = start + len(put), len(put) - (end - start)
+        before = self._starts[: max(1, bisect_left(self._starts, start))]
+        found = (each.end() for each in _LINE_END.finditer(text, max(0, start - 1), last + 1))
+        within = [each for each in found if before[-1] < each <= last]
+        behind = [each + by for each in self._starts[bisect_right(self._starts, end) :]]
+        return Lines(text, self.encoding, [*before, *within, *behind])
+
+    def _line_end(self, line: int) -> int:
+        """Where a line ends, without what ends it."""
+        if line + 1 == len(self._starts):
+            return len(self.text)
+        end = self._starts[line + 1] - 1
+        return end - 1 if self.text[end] == "\n" and end > self._starts[line] and self.text[end - 1] == "\r" else end
+
+    def _units(self, piece: str) -> int:
+        if self._plain or piece.isascii():
+            return len(piece)
+        return sum(self._width(char) for char in piece)
+
+    def _characters(self, line: str, column: int) -> int:
+        left = column
+        for at, char in enumerate(line):
+            left -= self._width(char)
+            if left < 0:
+                return at
+        return len(line)
+
+    def _width(self, char: str) -> int:
+        point = ord(char)
+        if self.encoding is Encoding.UTF_16:
+            return 2 if point > _ASTRAL else 1
+        if self.encoding is Encoding.UTF_8:
+            return 1 if point < 0x80 else 2 if point < 0x800 else 3 if point <= _ASTRAL else 4
+        return 1
+
+
+def edited(lines: Lines, changes: Iterable[Change]) -> Lines:
+    """The text after changes that were made one after the other.
+
+    A change whose end is before its start replaces nothing, and inserts at the start.
+    """
+    for change in changes:
+        text = lines.text
+        if change.start is None or change.end is None:
+            start, end = 0, len(text)
+        else:
+            start = lines.offset(change.start)
+            end = max(start, lines.offset(change.end))
+        lines = lines.replaced(start, end, change.text)
+    return lines
+
+
+def difference(old: str, new: str) -> Edit:
+    """The shortest piece of `old` whose replacement makes `new` of it."""
+    if old == new:
+        return Edit(len(old), len(old), 0)
+    least = min(len(old), len(new))
+    start = _alike(old, new, least)
+    behind = _alike_behind(old, new, least - start)
+    return Edit(start, len(old) - behind, len(new) - behind - start)
+
+
+def _alike(old: str, new: str, most: int) -> int:
+    """How many characters in front are the same, at most `most`; halving, so that the work is done by comparisons."""
+    low, high = 0, most
+    while low < high:
+        middle = (low + high + 1) // 2
+        if old[low:middle] == new[low:middle]:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def _alike_behind(old: str, new: str, most: int) -> int:
+    low, high = 0, most
+    while low < high:
+        middle = (low + high + 1) // 2
+        if old[len(old) - middle : len(old) - low] == new[len(new) - middle : len(new) - low]:
+            low = middle
+        else:
+            high = middle - 1
+    return low

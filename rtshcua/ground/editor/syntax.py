@@ -1,0 +1,103 @@
+"""What stands at a place of a text as words and nodes, also where the text is not whole."""
+
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.editor.moved import parts
+from rtshcua.ground.editor.occurrences import declarations
+from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.program import Unit
+
+_TOKEN = re.compile(
+    r"""(?P<comment>//[^\n]*+|/\*(?s:.)*?(?:\*/|\Z)) | (?P<string>"(?:[^"\\\n]|\\.)*+"?)
+      | (?P<time>[0-9]{1,2}:[0-9]{2}(?![0-9])) | (?P<number>[0-9](?:[0-9_]|\.(?=[0-9]))*+)
+      | (?P<word>[A-Za-z_][A-Za-z0-9_]*+(?:\.[A-Za-z_][A-Za-z0-9_]*+)*+) | (?P<mark>[<>=!]=|\.\.|[^\sA-Za-z0-9_])""",
+    re.VERBOSE,
+)
+
+
+class Token(NamedTuple):
+    """A word, number, mark, text or comment; `kind` is the name of its group."""
+
+    kind: str
+    text: str
+    start: int
+    end: int
+
+
+def tokens(text: str, start: int = 0, end: int | None = None) -> Iterator[Token]:
+    """All tokens that begin in a range, comments too; a rougher reading than the parser's, which none can fail."""
+    for found in _TOKEN.finditer(text, start):
+        if end is not None and found.start() >= end:
+            return
+        yield Token(found.lastgroup or "", found[0], found.start(), found.end())
+
+
+def token_at(text: str, offset: int) -> Token | None:
+    """The token that a place is in, or directly behind."""
+    line = text.rfind("\n", 0, offset) + 1
+    found: Token | None = None
+    for token in tokens(text, line, offset + 1):
+        if token.start <= offset <= token.end and not (found is not None and token.kind == "mark"):
+            found = token
+    return found
+
+
+def inside_comment_or_text(text: str, offset: int, since: int = 0) -> bool:
+    """Whether a place is within a comment or a text in quotes; `since` is a place that is in neither."""
+    for token in tokens(text, since, offset):
+        if token.kind in ("comment", "string") and token.start < offset < token.end:
+            return True
+        if token.kind == "comment" and token.text.startswith("//") and token.end == offset:
+            return True
+    return False
+
+
+def path_to(unit: Unit, offset: int) -> tuple[Node, ...]:
+    """The nodes that hold a place, from the declaration inwards."""
+    for declaration in declarations(unit):
+        if declaration.span.start <= offset <= declaration.span.end:
+            return tuple(_path(declaration, offset))
+    return ()
+
+
+def _path(node: Node, offset: int) -> Iterator[Node]:
+    yield node
+    inner = next((each for each in _inner(node) if each.span.start <= offset < each.span.end), None)
+    if inner is None:
+        inner = next((each for each in _inner(node) if each.span.start <= offset <= each.span.end), None)
+    if inner is not None:
+        yield from _path(inner, offset)
+
+
+def _inner(node: Any) -> Iterator[Node]:
+    values = parts(node) if isinstance(node, Node) else node
+    for value in values:
+        if isinstance(value, Node):
+            yield value
+        elif type(value) is tuple and not isinstance(value, Span):
+            yield from _inner_of_tuple(value)
+
+
+def _inner_of_tuple(values: tuple[Any, ...]) -> Iterator[Node]:
+    for value in values:
+        if isinstance(value, Node):
+            yield value
+        elif type(value) is tuple:
+            yield from _inner_of_tuple(value)
+
+
+def note_before(text: str, start: int) -> str:
+    """The comment that stands directly above a declaration, without its marks."""
+    lines = text[:start].split("\n")
+    if lines[-1].strip():
+        return ""
+    said: list[str] = []
+    for line in reversed(lines[:-1]):
+        bare = line.strip()
+        if not bare.startswith("//"):
+            break
+        said.append(bare[2:].strip())
+    return "\n".join(reversed(said))

@@ -1,0 +1,10 @@
+"""The world that the tests of the editor share is one of no errors."""
+
+from rtshcua.ground.compiler.program import examine_program
+from rtshcua.ground.editor.desk import Desk
+from rtshcua.mavlink import dialect
+
+
+def test_no_errors(desk: Desk) -> None:
+    found = examine_program(desk.view("/w/dip.rts").program, dialect.load()).diagnostics
+    assert [each.message for each in found if each.severity.value == "error"] == []

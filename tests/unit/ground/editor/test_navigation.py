@@ -1,0 +1,151 @@
+"""From names to what they mean: definitions, references across programs, hover, and what is where."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.editor.desk import Desk
+from rtshcua.ground.editor.hover import hover
+from rtshcua.ground.editor.navigation import definitions, references, targets
+from rtshcua.library import root
+from rtshcua.mavlink import dialect
+
+DIP, LAKE, LOOK, SITE = "/w/dip.rts", "/w/lake.rts", "/w/look.rts", "/w/site.rts"
+
+
+def place(desk: Desk, file: str, around: str) -> int:
+    """The offset of `|` in a piece of a file's text."""
+    text = desk.text(file)
+    assert text is not None
+    before, _, after = around.partition("|")
+    assert text.count(before + after) == 1, around
+    return text.index(before + after) + len(before)
+
+
+def shown(desk: Desk, spans: list[Span] | tuple[Span, ...]) -> list[str]:
+    """Spans as the file's name and the line that they are on."""
+    found = []
+    for span in spans:
+        text = desk.text(span.file) or ""
+        line = text[text.rfind("\n", 0, span.start) + 1 :].split("\n")[0]
+        found.append(f"{span.file.rpartition('/')[2]}: {line.strip()[:24]}")
+    return found
+
+
+@pytest.mark.parametrize(
+    ("file", "around", "where"),
+    [
+        (DIP, "under la|ke", ["lake.rts: policy lake version 1 {"[:34]]),
+        (DIP, "on qu|ad", ["site.rts: vehicle quad {"]),
+        (DIP, "lo|ok(over", ["look.rts: skill look(target: posit"]),
+        (DIP, "look(ov|er.entry", ["dip.rts: mission dip(over: zone ="]),
+        (DIP, "height|_above = up", ["look.rts: skill look(target: posit"]),
+        (DIP, "manner = fa|st", ["look.rts: skill look(target: posit"]),
+        (DIP, "sea.mood == ca|lm", ["site.rts: enum mood { calm = 0, wi"]),
+        (DIP, "sea.|mood == calm", ["site.rts: signal sea.mood : mood ="]),
+        (DIP, 'import "la|ke.rts"', ["lake.rts: import \"look.rts\""]),
+        (LAKE, "near(ci|ty, top", ["site.rts: zone city = polygon("]),
+        (LAKE, "near(city, t|op", ["lake.rts: template near(over: zone"]),
+        (LAKE, "by role wh|o through", ["lake.rts: template near(over: zone"]),
+        (LAKE, "when target inside gr|ow", []),
+        (LAKE, "inside ov|er and", ["lake.rts: template near(over: zone"]),
+        (LAKE, "height_ab|ove <= top", ["look.rts: skill look(target: posit"]),
+        (LAKE, "phase == rec|overy", ["dip.rts: phase recovery  { return"]),
+        (SITE, "difference(city, po|nd)", ["site.rts: zone pond = circle(47.39"]),
+        (SITE, "sea.mood : mo|od", ["site.rts: enum mood { calm = 0, wi"]),
+    ],
+)  # fmt: skip
+def test_definitions(desk: Desk, file: str, around: str, where: list[str]) -> None:
+    view = desk.view(DIP)
+    found = definitions(view, file, place(desk, file, around))
+    assert shown(desk, found) == [each[: each.index(": ") + 26] for each in where]
+
+
+def test_a_word_in_a_broken_declaration_is_found_too(desk: Desk) -> None:
+    desk.put(DIP, 'import "lake.rts"\nmission m under lake@1 on quad { phase p { look(pond.entry, } }')
+    assert shown(desk, definitions(desk.view(DIP), DIP, place(desk, DIP, "look(po|nd"))) == [
+        "site.rts: zone pond = circle(47.39"
+    ]
+
+
+def test_references_go_through_all_programs(desk: Desk) -> None:
+    """Of the zone, in the file that declares it and in those that import it, but not in a program with another."""
+    desk.put("/w/other.rts", "zone pond = circle(47.3 N, 8.5 E, 5 m)\nzone two = union(pond, pond)\n")
+    view = desk.view(SITE)
+    (target,) = targets(view, SITE, place(desk, SITE, "zone po|nd"))
+    found = references(desk.views([DIP, LAKE, LOOK, SITE]), view, target)
+    assert shown(desk, sorted(found)) == [
+        "dip.rts: mission dip(over: zone =",
+        "site.rts: zone pond = circle(47.39",
+        "site.rts: zone shore = difference(",
+    ]
+    assert [span.file for span, gives in found.items() if gives] == [SITE]
+
+
+@pytest.mark.parametrize(
+    ("file", "around", "said"),
+    [
+        (
+            SITE,
+            "sea.mo|od : mood",
+            ["signal sea.mood", "HEARTBEAT.custom_mode", "older than 2 s", "`255`"],
+        ),
+        (SITE, "zone po|nd", ["80 m × 80 m, 5,026 m²", "Where we practise."]),
+        (SITE, "difference(city, p|ond)", ["zone pond"]),
+        (SITE, "HEARTBEAT.custom|_mode", ["MAVLink field", "uint32_t"]),
+        (SITE, "HEART|BEAT", ["MAVLink message", "`system_status`"]),
+        (SITE, "4|0 m)  ceiling", ["length, kept as 40000 mm", "4000 cm", "0.04 km"]),
+        (SITE, "6|0 m above home", ["altitude above home, kept as 60000 mm"]),
+        (LOOK, "skill lo|ok", ["tactical skill; deadline 5 s", "require `gps.fix >= fix_3d`", "fallback `hover for"]),
+        (LOOK, "12 m|/s", ["12000 mm/s", "43.2 km/h"]),
+        (LOOK, "30 |%", ["ratio, kept as 3000 hundredths of 1 %"]),
+        (LOOK, "height_abov|e: altitude", ["default `20 m`", "range 5 m .. 60 m"]),
+        (LOOK, "class    tac|tical", ["timing class `tactical`: Begins within 30 s"]),
+        (LOOK, "gr|ace    1 s", ["How long a clause may be unknown"]),
+        (LAKE, "height_above <= t|op", ["parameter of `near`", "must be given"]),
+        (LAKE, "contin|gency hover", ["What flies when a step is denied in the air."]),
+        (LAKE, "who = oper|ator", ["role `operator`"]),
+        (DIP, "manner = fa|st", ["a choice for `manner` of `look`"]),
+        (DIP, "sea.mood == ca|lm", ["`calm` = 0, a value of `mood`"]),
+        (DIP, 'import "lake|.rts"', ["declares `near`, `lake`"]),
+    ],
+)
+def test_hover(desk: Desk, file: str, around: str, said: list[str]) -> None:
+    found = hover(desk.view(DIP), file, place(desk, file, around), dialect.load())
+    assert found is not None
+    assert [each for each in said if each not in found.text] == []
+
+
+def test_hover_says_nothing_of_nothing(desk: Desk) -> None:
+    text = desk.text(DIP) or ""
+    assert hover(desk.view(DIP), DIP, text.index("\n\n") + 1, dialect.load()) is None
+    assert hover(desk.view("/w/none.rts"), "/w/none.rts", 3, dialect.load()) is None
+
+
+def test_every_name_of_the_library_means_something() -> None:
+    """Each occurrence covers just its name, and but for roles, phases and the like is declared somewhere."""
+    desk = Desk(lambda path: Path(path).read_bytes(), str(root()))
+    view = desk.view(str(root() / "missions" / "standard.rts"))
+    free = {
+        "ROLE",
+        "SOURCE",
+        "PROPOSER",
+        "CLASS",
+        "RECORD",
+        "TYPE",
+        "MESSAGE",
+        "FIELD",
+        "DIALECT_ENUM",
+        "WORD",
+        "IMPORT",
+    }
+    seen = 0
+    for file in view.units:
+        for each in view.occurrences(file):
+            seen += 1
+            if each.target.sort.name != "IMPORT":
+                assert view.slice(each.span) == each.target.name
+            if each.target.sort.name not in free:
+                assert definitions(view, file, each.span.start), each
+    assert seen > 200

@@ -1,0 +1,92 @@
+"""Parsing again after an edit gives what parsing the whole text gives: declarations, findings, spans, broken names."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.editor import pieces
+from rtshcua.ground.editor.pieces import Cut, cut, cut_again
+from rtshcua.ground.language.parse import parse
+from rtshcua.library import root
+
+LIBRARY = sorted(path for shelf in ("skills", "policies", "missions") for path in (root() / shelf).glob("*.rts"))
+REJECTED = sorted((Path(__file__).parents[3] / "rejected").glob("e01*.rts"))
+TEXT = "".join(path.read_text(encoding="utf-8") for path in LIBRARY)
+TWIN = "".join(path.read_text(encoding="utf-8") for path in REJECTED if "\0" not in path.read_text(encoding="utf-8"))
+PARTS = (
+    "", " ", "\n", "}", "{", "/*", "*/", "//", '"', ",", "1", "1e5", " 2e\n", ".", "zone", "zone ", "\nzone a = b\n",
+    "import", "\nimport <x\n", "signal x : y = A.b stale after 2", "\nenum e { a = 1 }", "x", ";", "-", "when", "𝄞",
+    "\nskill", "\nskill f()", "skill f() { }", "\nimport \"lib:skills/goto.rts\"", "policy p version 1 {", "18:00",
+    "\nmission m", "\r\n", "\t", "@7", "test \"t\" { }", "\nnominal n { }\n", "permit any by any\n",
+)  # fmt: skip
+
+
+def agree(old: str, *texts: str) -> None:
+    now = cut(Source("a.rts", old))
+    assert now.parsed == parse(Source("a.rts", old))
+    earlier: tuple[Cut, ...] = ()
+    for text in texts:
+        earlier, now = (*earlier, now), cut_again(now, text, earlier)
+        whole = parse(Source("a.rts", text))
+        assert now.parsed.diagnostics == whole.diagnostics
+        assert now.parsed == whole
+
+
+@settings(max_examples=settings().max_examples * 3 // 4)
+@given(
+    st.sampled_from([TEXT, TWIN, TEXT[:900], TWIN[:1500]]),
+    st.lists(st.tuples(st.integers(0, 40_000), st.integers(0, 120), st.sampled_from(PARTS)), min_size=1, max_size=4),
+    st.integers(0, 24_000),
+)
+def test_edits_one_after_the_other(text: str, edits: list[tuple[int, int, str]], cut_at: int) -> None:
+    start = cut_at % len(text)
+    text = text[start : start + 1_500]  # from anywhere, also the middle of a declaration
+    states = [text]
+    for at, removed, put in edits:
+        last = states[-1]
+        at %= len(last) + 1
+        states.append(last[:at] + put + last[at + removed % 60 :])
+    agree(*states)
+
+
+@given(st.lists(st.sampled_from(PARTS), max_size=12), st.lists(st.sampled_from(PARTS), max_size=12))
+def test_texts_made_of_parts(one: list[str], other: list[str]) -> None:
+    agree("".join(one), "".join(other), "".join(one) + "".join(other))
+
+
+@pytest.mark.parametrize("char", ["/", "}"])
+def test_one_character_at_each_place(char: str) -> None:
+    text = (
+        'import "a"\nzone a = circle(47 N, 8 E, 5 m)//c\nzone b = a\nsignal c : d = E.f stale after 2\nenum g {h = 1}\n'
+    )
+    for at in range(len(text) + 1):
+        agree(text, text[:at] + char + text[at:], text[:at] + text[at + 1 :])
+
+
+def test_few_pieces_are_parsed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The point of it: an edit in one declaration of many has the parser read that one, and see the next."""
+    text = "".join(f"zone z{n} = circle(47.39{n:03} N, 8.54 E, 5 m) // {n}\n" for n in range(200))
+    old = cut(Source("a.rts", text))
+    read: list[int] = []
+    plain = pieces._Cutting.close
+    monkeypatch.setattr(pieces._Cutting, "close", lambda self, *a, **k: (read.append(1), plain(self, *a, **k))[1])
+    for change in (("5 m) // 100\n", "55 m) // 100\n"), ("// 100", "// one hundred"), ("zone z100", "zone other")):
+        read.clear()
+        now = cut_again(old, text.replace(*change, 1))
+        assert now.parsed == parse(now.source)
+        assert len(read) <= 2
+
+
+def test_a_comment_that_is_closed_again_brings_back_what_was_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "".join(f"zone z{n} = circle(47.39{n:03} N, 8.54 E, 5 m) // {n}\n" for n in range(200))
+    before = cut(Source("a.rts", text))
+    opened = cut_again(before, text.replace("zone z50", "/* zone z50"))
+    read: list[int] = []
+    plain = pieces._Cutting.close
+    monkeypatch.setattr(pieces._Cutting, "close", lambda self, *a, **k: (read.append(1), plain(self, *a, **k))[1])
+    for now in (text, text.replace("zone z50", "/* */ zone z50")):
+        assert cut_again(opened, now, (before,)).parsed == parse(Source("a.rts", now))
+        assert len(read) <= 2

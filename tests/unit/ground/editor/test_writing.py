@@ -1,0 +1,178 @@
+"""While something is written: what may stand at a place, what a call takes, what may be done about a finding."""
+
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtshcua.diagnostics.codes import REGISTRY
+from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.editor.actions import actions, all_safe
+from rtshcua.ground.editor.completion import complete
+from rtshcua.ground.editor.desk import Desk
+from rtshcua.ground.editor.outline import folds, outline
+from rtshcua.ground.editor.pieces import cut
+from rtshcua.ground.editor.signatures import signature
+from rtshcua.mavlink import dialect
+
+FILE = "/w/new.rts"
+HEAD = 'import "lake.rts"\n'
+POLICY = HEAD + "policy p version 1 {\n  "
+MISSION = HEAD + "mission m under lake@1 on quad {\n  "
+SKILL = HEAD + "skill s(far: length in 1 m .. 5 m, area: zone) {\n  "
+
+
+def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
+    """What is proposed between two texts, with its kind."""
+    now = desk.put(FILE, before + after)
+    return {item.text: item.kind for item in complete(desk, desk.view(FILE), now, len(before), dialect.load())}
+
+
+@pytest.mark.parametrize(
+    ("before", "some", "none"),
+    [
+        (HEAD, ["zone", "policy", "mission", "import", "test", "nominal"], ["pond", "permit", "and"]),
+        (HEAD + "zo", ["zone"], ["permit"]),
+        (POLICY, ["permit", "forbid", "airspace", "contingency", "without evidence"], ["zone", "pond", "deadline"]),
+        (POLICY + "permit ", ["look", "goto", "any"], ["pond", "quad", "operator"]),
+        (POLICY + "permit look, ho", ["hover", "goto"], ["pond"]),
+        (POLICY + "permit look by ", ["role", "any"], ["look"]),
+        (POLICY + "permit look by role ", ["operator"], ["agent", "look"]),
+        (POLICY + "permit look by role operator through ", ["agent", "operator", "onboard", "reflex"], ["look"]),
+        (POLICY + "permit look by any when ", ["battery", "target", "pond", "not", "local time"], ["through"]),
+        (POLICY + "permit look by any when target inside ", ["pond", "city", "grow"], ["battery", "look"]),
+        (POLICY + "permit look by any when gps.fix >= ", ["fix_3d", "no_gps"], ["calm"]),
+        (POLICY + "permit look by any when manner == ", ["slow", "fast"], ["fix_3d"]),
+        (POLICY + "permit look by any when sea.mood in {", ["calm", "wild"], ["fix_3d"]),
+        (POLICY + "permit look by any when phase == ", ["survey", "recovery"], ["calm"]),
+        (POLICY + "permit look by any when battery > 20 ", ["%"], ["m", "s"]),
+        (POLICY + "permit look by any when wind.speed > 20 ", ["m/s", "km/h"], ["%", "m"]),
+        (POLICY + "airspace inside ", ["pond", "city"], ["look"]),
+        (POLICY + "contingency ", ["hover", "return_home"], ["pond"]),
+        (POLICY + "use ", ["near"], ["look"]),
+        (POLICY + "use near(", ["over = ", "who = ", "pond"], ["battery"]),
+        (POLICY + "use near(pond, who = ", ["operator"], ["pond"]),
+        (HEAD + "mission m under ", ["lake"], ["quad", "pond"]),
+        (HEAD + "mission m under lake@1 on ", ["quad"], ["lake", "pond"]),
+        (MISSION, ["phase", "intent", "proposed by", "lasts at most"], ["permit", "zone"]),
+        (MISSION + "phase a { ", ["look(", "hover(", "repeat"], ["pond"]),
+        (MISSION + "phase a { look(", ["target = ", "pond.entry"], ["battery", "city.entry"]),
+        (MISSION + "phase a { look(pond.entry, manner = ", ["slow", "fast"], ["pond"]),
+        (MISSION + "phase a { takeoff(altitude = 20 m) look(pond.entry) on inadmissible ", ["abort", "skip"], []),
+        (SKILL, ["motion", "deadline", "lasts at most", "require", "record"], ["permit"]),
+        (SKILL + "class ", ["tactical", "semantic", "reflex"], ["decision"]),
+        (SKILL + "record intent, ", ["decision", "synced_first"], ["tactical"]),
+        (SKILL + "motion cover ", ["area", "far"], ["pond"]),
+        (SKILL + "require far < 3 ", ["m", "cm"], ["s", "%"]),
+        (SKILL + "deadline 5 ", ["s", "min"], []),
+        (SKILL + "fallback ", ["hover", "goto"], ["pond"]),
+        (HEAD + "signal a : ", ["speed", "position", "mood"], ["pond"]),
+        (HEAD + "signal a : speed = ", ["HEARTBEAT", "WIND"], ["battery"]),
+        (HEAD + "signal a : speed = WIND.", ["WIND.speed", "WIND.direction"], []),
+        (HEAD + "enum a = ", ["MAV_STATE"], ["battery"]),
+        (HEAD + "zone a = ", ["circle", "polygon", "union"], ["battery"]),
+        (HEAD + "zone a = union(", ["pond", "city"], ["battery"]),
+        (HEAD + 'import "', ["lib:skills/", "lake.rts", "site.rts"], ["new.rts", "battery"]),
+        (HEAD + 'import "lib:', ["lib:skills/", "lib:policies/"], ["lib:docs/", "lake.rts"]),
+        (HEAD + 'import "lib:skills/', ["lib:skills/goto.rts"], ["lake.rts"]),
+        (HEAD + "// so", [], ["zone", "pond"]),
+        (POLICY + 'permit look by any when /* battery', [], ["battery"]),
+        (POLICY + "forbid )\n  permit ", ["look"], ["pond"]),  # behind an error in the same block
+    ],
+)  # fmt: skip
+def test_proposals(desk: Desk, before: str, some: list[str], none: list[str]) -> None:
+    found = proposed(desk, before, "\n\nzone z = pond\n")
+    assert [each for each in some if each not in found] == []
+    assert [each for each in none if each in found] == []
+
+
+@settings(max_examples=settings().max_examples // 3)
+@given(st.integers(0, 10_000), st.integers(0, 400))
+def test_any_place_has_an_answer(make_lake: Desk, start: int, cut_off: int) -> None:
+    """Also in the middle of anything: no place makes it fail, and what is proposed begins where the word does."""
+    text = "".join(make_lake.text(file) or "" for file in ("/w/site.rts", "/w/look.rts", "/w/lake.rts", "/w/dip.rts"))
+    start %= len(text)
+    desk = make_lake.with_texts({FILE: text[:start] + text[start + cut_off :]})
+    now = desk.open[FILE]
+    for item in complete(desk, desk.view(FILE), now, start, dialect.load()):
+        assert 0 <= item.start <= start
+    signature(desk.view(FILE), now, start)
+
+
+@pytest.mark.parametrize(
+    ("before", "label", "active"),
+    [
+        ("phase a { look(", "look(target: position", 0),
+        ("phase a { look(pond.entry, ", "look(", 1),
+        ("phase a { look(pond.entry, manner = fa", "look(", 2),
+        ("phase a { look(pond.entry, height_above = (1 m + 2 m)", "look(", 1),
+        ("phase a { look(pond.entry)", None, 0),
+        ("phase a { nothing(", None, 0),
+    ],
+)
+def test_signatures(desk: Desk, before: str, label: str | None, active: int) -> None:
+    now = desk.put(FILE, MISSION + before)
+    found = signature(desk.view(FILE), now, len(MISSION + before))
+    assert (found is None) == (label is None)
+    if found is not None and label is not None:
+        assert found.label.startswith(label)
+        assert found.active == active
+        assert found.note == "Look at something from near."
+
+
+def test_outline_and_folds() -> None:
+    text = 'import "a"\nimport "b"\n\n// one\n// two\nenum e {\n  a = 1,\n  b = 2,\n}\n'
+    text += "mission m under p@1 on q {\n  phase x { }\n}\n"
+    now = cut(Source(FILE, text))
+    assert [(each.kind, each.name, [one.name for one in each.inner]) for each in outline(now)] == [
+        ("enum", "e", ["a", "b"]),
+        ("mission", "m", ["x"]),
+    ]
+    assert [(text[:each.start].count("\n"), text[: each.end].count("\n"), each.kind) for each in folds(now)] == [
+        (3, 4, "comment"), (5, 8, ""), (9, 11, ""), (0, 1, "imports"),
+    ]  # fmt: skip
+
+
+def finding(code: str, start: int, end: int, *fixes: tuple[int, int, str, Applicability]) -> Diagnostic:
+    made = tuple(Fix(Span(FILE, a, b), text, f"write `{text}`", how) for a, b, text, how in fixes)
+    return Diagnostic(REGISTRY[code], "wrong", Span(FILE, start, end), fixes=made)
+
+
+def test_actions() -> None:
+    safe, suggested = Applicability.SAFE, Applicability.SUGGESTED
+    text = "zone a = b\n  zone C = d\n"
+    found = [
+        finding("E1302", 18, 19, (18, 19, "c", suggested)),
+        finding("E1305", 0, 4, (0, 4, "", safe)),
+        finding("E0201", 9, 10),
+        finding("E1305", 2, 6, (2, 6, "", safe)),  # in the way of the other
+        finding("E1305", 9, 10, (9, 10, "x", safe)),
+    ]
+    here = [(each.title, [(fix.span.start, fix.replacement) for fix in each.fixes], each.safe)
+            for each in actions(found, FILE, 18, 18, text)]  # fmt: skip
+    assert here == [
+        ("write `c`", [(18, "c")], False),
+        ("ignore `naming` here, with a reason",
+         [(11, "  // rtshcua: ignore E1302 because\n")], False),
+        ("correct everything that is safe to correct", [(0, ""), (9, "x")], True),
+    ]  # fmt: skip
+    assert [each.title for each in actions(found, FILE, 9, 9, text)][:2] == [
+        "write `x`",
+        "ignore `unused-import` here, with a reason",
+    ]
+    assert len(all_safe(found, FILE)) == 2
+    assert list(actions(found, "/w/other.rts", 0, 99, text)) == []
+
+
+def test_a_desk_reads_what_is_open_before_what_is_on_disk(make: Callable[[dict[str, str]], Desk]) -> None:
+    desk = make(
+        {"/w/a.rts": 'import "b.rts"\nzone one = union(two, two)\n', "/w/b.rts": "zone two = circle(47 N, 8 E, 5 m)\n"}
+    )
+    assert "two" in desk.view("/w/a.rts").symbols.zones
+    desk.put("/w/b.rts", "zone three = circle(47 N, 8 E, 5 m)\n")
+    assert set(desk.view("/w/a.rts").symbols.zones) == {"one", "three"}
+    desk.close("/w/b.rts")
+    assert "two" in desk.view("/w/a.rts").symbols.zones
+    assert desk.text("/w/none.rts") is None

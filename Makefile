@@ -21,13 +21,15 @@ demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, veri
 	@.make/demo
 
 test: setup ## run every test, on the checkout and on the wheel; decision, wire and evidence covered in full
-	$(BIN)/pytest -n $(JOBS) --dist loadfile --cov --cov-report term
+	$(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cov --cov-report term
 
-lint: setup ## check style, format, types and layers
+lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/rtshcua fmt --check skills policies missions examples
+	$(BIN)/rtshcua lint skills policies missions examples
 
 soak: setup ## run the long campaigns
 	$(BIN)/pytest -n $(JOBS) -m soak --hypothesis-profile soak

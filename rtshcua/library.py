@@ -8,7 +8,7 @@ from errno import ENOENT
 from functools import cache
 from pathlib import Path
 
-FOLDERS = ("grammar", "skills", "policies", "missions", "docs/codes")
+FOLDERS = ("grammar", "skills", "policies", "missions", "examples", "docs/codes")
 
 
 @cache

@@ -17,7 +17,7 @@ from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.diagnostics.exits import ExitCode
 
 #: the commands whose `--json` is that of `Findings`
-_REPORTING = ("check", "compile")
+_REPORTING = ("check", "compile", "fmt", "lint", "test")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,6 +56,12 @@ def _unknown(word: str) -> ExitCode:
 
 def _call(row: Row, words: list[str]) -> int:
     """Imports the command of `row` and runs it through typer, whose own way of reporting errors is left out."""
+    if row.quick:
+        from rtshcua.cli.quick import QUICK
+
+        code = QUICK[row.name](words)
+        if code is not None:
+            return code
     import typer
     from typer.main import get_command
 
@@ -91,6 +97,7 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
     words = cast("str", error.format_message()).rstrip(".")  # type: ignore[attr-defined]
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"rtshcua {row.name}"
+    words = words.replace("Value error, ", "")  # typer's words for what an enumeration does not have
     words = words[:1].lower() + words[1:]
     if row.name in _REPORTING and "--json" in given:
         from rtshcua.cli.findings import Findings

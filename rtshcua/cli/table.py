@@ -19,6 +19,7 @@ class Row(NamedTuple):
     name: str
     group: str
     help: str
+    quick: bool = False  # plain command lines of it are read by `rtshcua.cli.quick`, without typer
 
     @property
     def module(self) -> str:
@@ -27,10 +28,17 @@ class Row(NamedTuple):
 
 
 COMMANDS = (
-    Row("check", "write", "report everything that is wrong with sources or a mission specification"),
+    Row("check", "write", "report everything that is wrong with sources or a mission specification", quick=True),
+    Row("lint", "write", "report that and what is worth a second look; fix it, ignore it, for CI too", quick=True),
+    Row("fmt", "write", "lay sources out in the one style; comments stay where they are"),
+    Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit"),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
     Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
+    Row("docs", "write", "render skills and policies as one page that a person can sign off on"),
     Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),
+    Row("init", "write", "make a project of your own, with policy, mission, tests and CI"),
+    Row("lsp", "write", "serve an editor: findings while you write, hover, renaming, completion"),
+    Row("completion", "write", "print a script by which bash, zsh or fish complete commands"),
     Row("keys", "fly", "make and list signing keys and the trust root"),
     Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
     Row("approve", "fly", "answer a step that asks for confirmation, with your signature"),

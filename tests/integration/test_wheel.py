@@ -36,7 +36,7 @@ def python(place: Path) -> Path:
     (site,) = (place / "venv/lib").glob("python*/site-packages")
     pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
     made = subprocess.run(
-        [*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)],
+        [*pip, "install", "--quiet", "--no-compile", "--no-deps", "--no-index", str(wheel)],
         capture_output=True,
         text=True,
         check=False,
@@ -73,12 +73,12 @@ def library(run: Run) -> Path:
 
 def test_library_is_inside_the_wheel_and_whole(library: Path, place: Path, checkout: Path) -> None:
     assert library.is_relative_to(place / "venv")
-    for folder in ("grammar", "skills", "policies", "missions"):
+    for folder in ("grammar", "skills", "policies", "missions", "examples"):
         ours, shipped = (
             {
                 file.relative_to(top): file.read_bytes()
                 for file in (top / folder).rglob("*")
-                if file.is_file() and "__pycache__" not in file.parts
+                if file.is_file() and not {"__pycache__", ".rtshcua_cache"} & {*file.parts}
             }
             for top in (checkout, library)
         )
@@ -97,3 +97,8 @@ def test_compile_and_show_a_shipped_mission(run: Run, library: Path, tmp_path: P
     run("rtshcua", "compile", library / "missions/short.rts", "-o", bundle, "--at", "2026-01-01T00:00:00Z")
     assert bundle.stat().st_size > 0
     assert run("rtshcua", "show", bundle).stdout
+
+
+def test_a_project_of_ones_own_is_sound(run: Run, tmp_path: Path) -> None:
+    run("rtshcua", "init", tmp_path / "riverside")
+    run("rtshcua", "lint", tmp_path / "riverside")

@@ -1,0 +1,1 @@
+"""What `rtshcua completion` knows of the other commands."""

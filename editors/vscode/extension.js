@@ -51,7 +51,7 @@ async function start() {
     client = undefined;
     const choice = await vscode.window.showErrorMessage(
       `rtshcua: the language server \`${command}\` does not start: ${error.message}. ` +
-        'Install it with `pip install "rtshcua[editor]"`, or say where it is.',
+        'Install the extra `editor` of rtshcua, or say where it is.',
       "Open Settings",
     );
     if (choice !== undefined) {

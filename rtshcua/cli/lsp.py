@@ -31,7 +31,7 @@ def lsp(
         if (missing.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
             raise
         return fail(
-            ExitCode.USAGE, "the language server is not installed", 'install it: `pip install "rtshcua[editor]"`'
+            ExitCode.USAGE, "the language server is not installed", 'in the checkout: `pip install ".[editor]"`'
         )
     if tcp is not None and (stdio or not 0 < tcp < 1 << 16):
         return fail(ExitCode.USAGE, "`--tcp` takes a port from 1 to 65535, and goes without `--stdio`")

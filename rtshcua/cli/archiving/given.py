@@ -84,5 +84,5 @@ def with_extra(work: Callable[[], T]) -> T | ExitCode:
         extra = _EXTRAS.get((error.name or "").partition(".")[0])
         if extra is None:
             raise
-        help = f"`pip install 'rtshcua[{extra}]'` brings it"
+        help = f"`pip install '.[{extra}]'`, in the checkout, brings it"
         return fail(ExitCode.INPUT, f"this needs the package `{error.name}`, which is not installed", help)

@@ -247,7 +247,7 @@ def test_without_the_extra_it_says_which(
     assert archive(*words, *((runs, *ROOT) if words == ("add",) else ())) == ExitCode.INPUT
     err = capsys.readouterr().err
     assert "this needs the package `duckdb`, which is not installed" in err
-    assert "pip install 'rtshcua[archive]'" in err
+    assert "pip install '.[archive]'" in err
 
 
 @pytest.mark.parametrize(

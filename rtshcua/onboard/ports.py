@@ -20,7 +20,10 @@ from rtshcua.onboard.stores import ReplayStore as ReplayStore
 
 
 class Readings(Frozen, frozen=True):
-    """Signals that one frame carried: (state slot, canonical integer or None for "reported as not known")."""
+    """Signals that one frame carried: (state slot, canonical integer or None for "reported as not known").
+
+    `at_us` is when the vehicle measured them, on our monotonic clock, as early as it may have been.
+    """
 
     at_us: int
     values: tuple[tuple[int, int | None], ...]
@@ -71,20 +74,35 @@ class Failed(Frozen, frozen=True):
 
 
 class TakenOver(Frozen, frozen=True):
-    """Someone else changed the flight mode: the pilot, or the autopilot's own failsafe. It wins."""
+    """Someone else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They win.
+
+    `how` says what showed it: the name of the mode, or another target, a landing or a disarming that nobody here
+    commanded.
+    """
 
     at_us: int
-    mode: str
+    how: str
+
+
+class Crashed(Frozen, frozen=True):
+    """The vehicle came down as no landing does. `how` says what showed it."""
+
+    at_us: int
+    how: str
 
 
 class LinkLost(Frozen, frozen=True):
-    """No heartbeat of the vehicle for longer than the link's limit."""
+    """Nothing came from the vehicle, or nothing that was asked was answered, for longer than the link's limit.
+
+    `why` says which of the two.
+    """
 
     at_us: int
+    why: str = ""
 
 
 class LinkBack(Frozen, frozen=True):
-    """Heartbeats are back after `LinkLost`."""
+    """The vehicle is heard again, and answers, after `LinkLost`. Its state is not fresh yet."""
 
     at_us: int
 
@@ -143,6 +161,7 @@ Event = (
     | Succeeded
     | Failed
     | TakenOver
+    | Crashed
     | LinkLost
     | LinkBack
     | Interrupted

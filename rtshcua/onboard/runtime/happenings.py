@@ -60,7 +60,7 @@ class Happenings:
             case Failed():
                 self._failed(now, event)
             case TakenOver():
-                self._journal.effect(now, "taken-over", detail=event.mode)
+                self._journal.effect(now, "taken-over", detail=event.how)
                 conduct.stand_down(now, Ending.STOOD_DOWN)
             case LinkLost() | LinkBack():
                 self._link(now, lost=isinstance(event, LinkLost))

@@ -30,7 +30,7 @@ def test_pilot_takes_over_while_it_flies(flyer: Make, flavour: str) -> None:
     one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
     begun = one.now_us
     taken = one.until(TakenOver, 5)
-    assert taken.mode == {"px4": "Position", "ardupilot": "POSHOLD"}[flavour]
+    assert taken.how == {"px4": "Position", "ardupilot": "POSHOLD"}[flavour]
     assert taken.at_us - begun < 500_000  # the heartbeat was asked for at 5 Hz
     assert not any(isinstance(event, (TakenOver, Failed, Succeeded)) for event in one.wait(30))
 
@@ -48,7 +48,7 @@ def test_its_own_failsafe_takes_over(flyer: Make, kind: MotionKind) -> None:
     one.begin(kind, *([(300_000, 0)] if kind == MotionKind.FLY else []), altitude=20_000)
     one.wait(3)
     one.vehicle.simulation.inject(BatteryLevel(0, 300))
-    assert one.until(TakenOver, 10).mode in ("Land", "LAND")
+    assert one.until(TakenOver, 10).how in ("Land", "LAND")
 
 
 def test_nothing_more_is_sent_after_release(flyer: Make) -> None:

@@ -82,7 +82,7 @@ class Bench:
         self.tick()
 
     def taken(self) -> list[str]:
-        return [event.mode for event in self.events if isinstance(event, TakenOver)]
+        return [event.how for event in self.events if isinstance(event, TakenOver)]
 
 
 BOTH = pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])

@@ -71,7 +71,7 @@ def test_the_battery_is_known_with_its_stream(watched: Recorded) -> None:
 
 
 def test_the_failsafe_is_a_mode_taken_over_though_nothing_of_ours_flew(watched: Recorded) -> None:
-    taken = [(at, event.mode) for at, event in watched.of(TakenOver)]
+    taken = [(at, event.how) for at, event in watched.of(TakenOver)]
     assert [mode for _, mode in taken] == ["LAND", "RTL"]
     assert abs(taken[0][0] - TAKEN) < 0.2
     assert abs(taken[1][0] - RETURN) < 0.2
@@ -111,7 +111,7 @@ def test_the_effects_of_our_commands_are_seen_in_the_recording(flown: Recorded) 
 def test_after_our_last_command_the_failsafe_takes_over(flown: Recorded) -> None:
     ((at, taken), *_) = flown.of(TakenOver)
     assert abs(at - TAKEN) < 0.2
-    assert taken.mode == "LAND"
+    assert taken.how == "LAND"
 
 
 def test_nothing_answers_so_streams_are_asked_for_and_their_rates_told(watched: Recorded) -> None:

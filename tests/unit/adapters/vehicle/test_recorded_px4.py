@@ -59,7 +59,7 @@ def test_a_text_in_two_chunks_is_one(watched: Recorded) -> None:
 def test_the_end_of_a_takeoff_takes_nothing_over_and_a_return_does(watched: Recorded) -> None:
     ((at, taken),) = watched.of(TakenOver)
     assert abs(at - RETURN) < 0.2
-    assert taken.mode == "Return"
+    assert taken.how == "Return"
 
 
 def test_it_says_when_it_is_armed_and_in_the_air(watched: Recorded) -> None:

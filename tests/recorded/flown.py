@@ -19,7 +19,7 @@ from rtshcua.mavlink.frames import Codec, Received
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import SHIFT, Projection
-from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.frames import OURS, FrameSession
 from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
@@ -49,8 +49,8 @@ def at_home(latitude: int, longitude: int) -> Policy:
 class Recorded:
     """One flight. `late_us` is when the first frame came, in us after the autopilot's start (the page's second 0).
 
-    The recording holds only what the vehicle sent, and to another client. So nothing answers what the driver asks:
-    `parameters` are told to it instead, and its fence is left alone. `commands` are begun at their second, as if the
+    The recording holds only what the vehicle sent, and to another client. So nothing of it answers what the driver
+    asks: `parameters` and the last mode are told to it instead, and its fence is left alone. `commands` are begun at their second, as if the
     recorded client's had been ours.
     """
 
@@ -69,7 +69,8 @@ class Recorded:
         self._monitor = StateMonitor(prepared)
         self._frames = FrameSession()
         self.driver = Driver(self.policy, self._frames, fence=False)
-        self._reader = Codec(0, 0)
+        self._reader, self._teller = Codec(0, 0), Codec(1, 1)
+        self._beat = b""
         self._now_us = START_US
         self.states.append(self._state())
         waiting = list(self.commands)
@@ -77,9 +78,7 @@ class Recorded:
             while self._now_us < entry.at_us:
                 next_us = min(entry.at_us, self._now_us + TICK_US)
                 self._pass(next_us, waiting)
-            heard = self.driver.receive(entry.frame, self._now_us)
-            self._take(heard.events)
-            self._sent(heard.answers)
+            self._receive(entry.frame)
 
     @property
     def second(self) -> float:
@@ -119,7 +118,7 @@ class Recorded:
         self._sent(frames)
         while waiting and waiting[0][0] <= self.second:
             begun = waiting.pop(0)[1]
-            self._frames.open(begun, to_us)
+            self._frames.open(begun, to_us + SECOND)
             events, frames = self.driver.begin(begun, to_us)
             self._take(events)
             self._sent(frames)
@@ -139,12 +138,29 @@ class Recorded:
             if isinstance(event, Readings):
                 self._monitor.update(event)
 
+    def _receive(self, frame: bytes) -> None:
+        for received in self._reader.parse(frame):
+            if received.name == "HEARTBEAT" and received.component == 1:
+                self._beat = frame
+        heard = self.driver.receive(frame, self._now_us)
+        self._take(heard.events)
+        self._sent(heard.answers)
+
     def _sent(self, frames: Sequence[bytes]) -> None:
         for frame in frames:
             (received,) = self._reader.parse(frame)
             self.sent.append((round(self.second, 2), received))
+            if received.name == "COMMAND_LONG" and received.message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
+                self._tell_mode()
             if received.name == "PARAM_REQUEST_READ" and received.message.param_id in self.parameters:
                 self._answer(received.message.param_id)
+
+    def _tell_mode(self) -> None:
+        """As both real ones answer: acknowledged, and the mode as it was told last."""
+        ack = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 0, 0, 1, OURS)
+        self._receive(self._teller.pack(ack))
+        if self._beat:
+            self._receive(self._beat)
 
     def _answer(self, name: str) -> None:
         value = mavlink.MAVLink_param_value_message(name.encode(), self.parameters[name], 9, 1, 0)

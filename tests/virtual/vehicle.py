@@ -70,7 +70,7 @@ class VirtualVehicle:
 
     def begin(self, command: Command, now_us: int) -> None:
         if self._free:
-            self.frames.open(command, now_us)
+            self.frames.open(command, now_us + 10 * SECOND)
         events, frames = self.driver.begin(command, now_us)
         self._send(frames, events)
         self._pending += events

@@ -6,10 +6,25 @@ It obeys position targets in GUIDED only, and ignores them silently elsewhere; t
 from rtshcua.adapters.ardupilot import modes
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.datum import relative_m
-from rtshcua.adapters.vehicle.effects import airborne, armed, arrived, climbed, down, in_mode, in_mode_or_down, still
+from rtshcua.adapters.vehicle.effects import (
+    airborne,
+    armed,
+    arrived,
+    climbed,
+    down,
+    homeward,
+    in_mode,
+    in_mode_or_down,
+    still,
+    to_place,
+    to_the_ground,
+    up_to,
+)
 from rtshcua.adapters.vehicle.fence import FenceHabits
 from rtshcua.adapters.vehicle.flavour import Flavour, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.progress import Expected
+from rtshcua.adapters.vehicle.targets import Target
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
@@ -17,6 +32,8 @@ _MODE_US = 5_000_000
 _ARM_US = 8_000_000
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
+#: link time within which a climb, a leg, a return (it hovers over home for 5 s) and a landing get a metre further
+_CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 20_000_000, 15_000_000
 _GUIDED = frozenset({modes.GUIDED})
 _POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
 
@@ -26,47 +43,58 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
     match command.kind:
         case MotionKind.CLIMB:
             takeoff = messages.command(system, messages.TAKEOFF, 0, 0, 0, 0, 0, 0, relative_m(command.altitude))
+            rises = Expected(up_to(command.altitude), _CLIMBS_US)
             return [
                 _guided(system),
                 Stage(messages.arm(system), messages.ARM_DISARM, armed, _GUIDED, _ARM_US),
                 Stage(takeoff, messages.TAKEOFF, airborne, _GUIDED, _ARM_US, powered=True),
-                Stage(None, None, climbed(command.altitude), _GUIDED, powered=True),
+                Stage(None, None, climbed(command.altitude), _GUIDED, powered=True, progress=rises),
             ]
         case MotionKind.FLY | MotionKind.COVER:
             way = [_guided(system)]
             if command.speed:
                 speed = messages.command(system, messages.CHANGE_SPEED, 1, command.speed / 1_000, -1)
                 way.append(Stage(speed, messages.CHANGE_SPEED, None, _GUIDED, _SPEED_US, powered=True))
-            for latitude, longitude in zip(command.geo[::2], command.geo[1::2], strict=True):
-                target = messages.position_target(system, latitude, longitude, relative_m(command.altitude))
-                near = arrived(latitude, longitude, command.altitude)
-                way.append(Stage(target, None, near, _GUIDED, repeat_us=_REPEAT_US, powered=True, travels=True))
-            return way
+            points = zip(command.geo[::2], command.geo[1::2], strict=True)
+            return way + [_leg(system, *point, command.altitude, seen.home_amsl) for point in points]
         case MotionKind.HOME:
-            return _down(system, modes.RETURN)
+            return _down(system, modes.RETURN, Expected(homeward, _RETURNS_US))
         case MotionKind.LAND:
-            return _down(system, modes.LAND)
+            return _down(system, modes.LAND, Expected(to_the_ground, _LANDS_US))
         case _:
             hold = frozenset({modes.HOLD})
             mode = messages.set_mode(system, modes.HOLD)
             return [
-                Stage(mode, messages.DO_SET_MODE, in_mode(modes.HOLD), hold, _MODE_US, powered=True),
-                Stage(None, None, still, hold, powered=True),
+                Stage(mode, messages.DO_SET_MODE, in_mode(modes.HOLD), hold, _MODE_US, powered=True, stops=True),
+                Stage(None, None, still, hold, powered=True, stops=True),
             ]
 
 
+def _leg(system: int, latitude: int, longitude: int, altitude: int, home_amsl: int | None) -> Stage:
+    return Stage(
+        messages.position_target(system, latitude, longitude, relative_m(altitude)),
+        None,
+        arrived(latitude, longitude, altitude),
+        _GUIDED,
+        repeat_us=_REPEAT_US,
+        powered=True,
+        target=Target(latitude, longitude, None if home_amsl is None else home_amsl + altitude),
+        progress=Expected(to_place(latitude, longitude, altitude), _FLIES_US),
+    )
+
+
 def _guided(system: int) -> Stage:
-    """GUIDED first: it is entered at once where it is the mode already."""
+    """GUIDED first. Where it is the mode already nothing is sent, for that would undo a takeover under way."""
     message = messages.set_mode(system, modes.GUIDED)
-    return Stage(message, messages.DO_SET_MODE, in_mode(modes.GUIDED), _GUIDED, _MODE_US)
+    return Stage(message, messages.DO_SET_MODE, in_mode(modes.GUIDED), _GUIDED, _MODE_US, spare=True)
 
 
-def _down(system: int, mode: int) -> list[Stage]:
+def _down(system: int, mode: int, progress: Expected) -> list[Stage]:
     own = frozenset({mode})
     message = messages.set_mode(system, mode)
     return [
         Stage(message, messages.DO_SET_MODE, in_mode_or_down(mode), own, _MODE_US),
-        Stage(None, None, down, own),
+        Stage(None, None, down, own, progress=progress),
     ]
 
 
@@ -77,6 +105,7 @@ ARDUPILOT = Flavour(
     stages=stages,
     estimator="EKF_STATUS_REPORT",
     natural=frozenset(),
+    mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
     bytewise=False,
     fence=FenceHabits(frame=0, all_inclusions=True, switches=(("FENCE_TYPE", _POLYGONS), ("FENCE_ENABLE", 1))),

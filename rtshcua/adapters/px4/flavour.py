@@ -1,21 +1,40 @@
 """How PX4 is made to do each kind of motion.
 
 Altitudes in commands are above mean sea level here, whatever the frame says. An acknowledgement of DO_REPOSITION or
-DO_SET_MODE says nothing: only the heartbeat tells.
+DO_SET_MODE says nothing: only the heartbeat tells, and of a stop only the speed.
 """
 
 from rtshcua.adapters.px4 import modes
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.datum import amsl_m
-from rtshcua.adapters.vehicle.effects import armed, arrived, climbed, down, in_mode, in_mode_or_down, still
+from rtshcua.adapters.vehicle.effects import (
+    armed,
+    arrived,
+    climbed,
+    down,
+    homeward,
+    in_mode,
+    in_mode_or_down,
+    still,
+    to_place,
+    to_the_ground,
+    up_to,
+)
 from rtshcua.adapters.vehicle.fence import FenceHabits
 from rtshcua.adapters.vehicle.flavour import Flavour, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.progress import Expected
+from rtshcua.adapters.vehicle.targets import Target
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
 _MODE_US = 5_000_000
 _ARM_US = 8_000_000
+#: link time within which a climb, a leg, a return and a landing get a metre further
+_CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 20_000_000, 15_000_000
+#: mm: how far from where it is it may say that it takes off, or that it will come to stand;
+_TAKES_OFF, _STOPS = 20_000, 10_000
+_STOPS_S = 3  # and how many seconds' way further, if it moves
 _HOLD = frozenset({modes.HOLD})
 
 
@@ -23,19 +42,7 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
     """The stages of a manoeuvre. Raises NoDatum where they need an altitude and `seen.home_amsl` is not known."""
     match command.kind:
         case MotionKind.CLIMB:
-            amsl = amsl_m(command.altitude, seen.home_amsl)
-            own = frozenset({modes.TAKEOFF, modes.HOLD})
-            takeoff = messages.command(
-                system, messages.TAKEOFF, messages.NAN, 0, 0, messages.NAN, messages.NAN, messages.NAN, amsl
-            )
-            # Armed in Hold, and only then told to take off: it would accept both the other way round, and one that was
-            # refused its arming would take off whenever somebody armed it.
-            return [
-                _hold(system),
-                Stage(messages.arm(system), messages.ARM_DISARM, armed, _HOLD, _ARM_US),
-                Stage(takeoff, messages.TAKEOFF, in_mode(modes.TAKEOFF), own, _MODE_US, powered=True),
-                Stage(None, None, climbed(command.altitude), own, powered=True),
-            ]
+            return _climb(command, seen, system)
         case MotionKind.FLY | MotionKind.COVER:
             amsl = amsl_m(command.altitude, seen.home_amsl)
             return [
@@ -45,30 +52,55 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                     arrived(latitude, longitude, command.altitude),
                     _HOLD,
                     powered=True,
-                    travels=True,
+                    target=Target(latitude, longitude, round(amsl * 1_000)),
+                    progress=Expected(to_place(latitude, longitude, command.altitude), _FLIES_US),
                 )
                 for latitude, longitude in zip(command.geo[::2], command.geo[1::2], strict=True)
             ]
         case MotionKind.HOME:
-            return _down(system, modes.RETURN, modes.SUB_RETURN)
+            return _down(system, modes.RETURN, modes.SUB_RETURN, Expected(homeward, _RETURNS_US))
         case MotionKind.LAND:
-            return _down(system, modes.LAND, modes.SUB_LAND)
+            return _down(system, modes.LAND, modes.SUB_LAND, Expected(to_the_ground, _LANDS_US))
         case _:
-            return [_hold(system), Stage(None, None, still, _HOLD, powered=True)]
+            return [_stop(seen, system), Stage(None, None, still, _HOLD, powered=True, stops=True)]
 
 
-def _hold(system: int) -> Stage:
-    """Hold first: it is entered at once where it is the mode already."""
-    message = messages.set_mode(system, modes.AUTO, modes.SUB_LOITER)
-    return Stage(message, messages.DO_SET_MODE, in_mode(modes.HOLD), _HOLD, _MODE_US)
+def _climb(command: Command, seen: Observed, system: int) -> list[Stage]:
+    """Armed in Hold, and only then told to take off: it would accept both the other way round, and one that was refused
+    its arming would take off whenever somebody armed it.
+    """
+    amsl = amsl_m(command.altitude, seen.home_amsl)
+    own = frozenset({modes.TAKEOFF, modes.HOLD})
+    takeoff = messages.command(
+        system, messages.TAKEOFF, messages.NAN, 0, 0, messages.NAN, messages.NAN, messages.NAN, amsl
+    )
+    hold = messages.set_mode(system, modes.AUTO, modes.SUB_LOITER)
+    above = Target(seen.latitude, seen.longitude, round(amsl * 1_000), _TAKES_OFF)
+    return [
+        Stage(hold, messages.DO_SET_MODE, in_mode(modes.HOLD), _HOLD, _MODE_US, spare=True),
+        Stage(messages.arm(system), messages.ARM_DISARM, armed, _HOLD, _ARM_US),
+        Stage(takeoff, messages.TAKEOFF, in_mode(modes.TAKEOFF), own, _MODE_US, powered=True, target=above),
+        Stage(
+            None, None, climbed(command.altitude), own, powered=True, target=above,
+            progress=Expected(up_to(command.altitude), _CLIMBS_US),
+        ),
+    ]  # fmt: skip
 
 
-def _down(system: int, mode: int, sub: int) -> list[Stage]:
+def _stop(seen: Observed, system: int) -> Stage:
+    """Not DO_SET_MODE: in Hold already, flying to a place, PX4 acknowledges that and flies on (vehicles.md 5)."""
+    within = _STOPS + _STOPS_S * (seen.speed or 0)
+    here = Target(seen.latitude, seen.longitude, None, within) if seen.located else None
+    stop = messages.stop_here(system)
+    return Stage(stop, messages.REPOSITION, None, _HOLD, _MODE_US, powered=True, target=here, stops=True)
+
+
+def _down(system: int, mode: int, sub: int, progress: Expected) -> list[Stage]:
     own = frozenset({mode})
     message = messages.set_mode(system, modes.AUTO, sub)
     return [
         Stage(message, messages.DO_SET_MODE, in_mode_or_down(mode), own, _MODE_US),
-        Stage(None, None, down, own),
+        Stage(None, None, down, own, progress=progress),
     ]
 
 
@@ -79,6 +111,7 @@ PX4 = Flavour(
     stages=stages,
     estimator="ESTIMATOR_STATUS",
     natural=frozenset({(modes.TAKEOFF, modes.HOLD)}),
+    mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     bytewise=True,
     fence=FenceHabits(frame=3, all_inclusions=False, switches=()),

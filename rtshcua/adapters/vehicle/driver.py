@@ -8,14 +8,17 @@ from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.announcer import Announcer
 from rtshcua.adapters.vehicle.commander import Commander
+from rtshcua.adapters.vehicle.crash import CrashWatch
 from rtshcua.adapters.vehicle.datum import NoDatum
 from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
 from rtshcua.adapters.vehicle.flavour import Flavour, Message, Stages, mode_name
 from rtshcua.adapters.vehicle.link import Heard, Link
-from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
+from rtshcua.adapters.vehicle.link_watch import LinkWatch
+from rtshcua.adapters.vehicle.manoeuvre import Aids, Manoeuvre
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.preflight import HEEDED, Preflight
-from rtshcua.adapters.vehicle.streams import ALWAYS, Streams
+from rtshcua.adapters.vehicle.progress import Brakes
+from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, Streams
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Texts
 from rtshcua.mavlink.frames import Received, Verifier
@@ -24,6 +27,7 @@ from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.ports import (
     AirState,
     Command,
+    Crashed,
     Event,
     Failed,
     LinkBack,
@@ -38,7 +42,6 @@ from rtshcua.onboard.ports import (
 
 COMPONENT = OURS
 HEARTBEAT_US = 1_000_000
-LINK_LOST_US = 3_000_000
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
@@ -73,10 +76,14 @@ class Driver:
         self._seen = Observed()
         self._system = 0
         self._commander = Commander(slack)
+        self._aids: Aids | None = None
         self._manoeuvre: Manoeuvre | None = None
+        self._unsent: int | None = None  # the token of a command of which no frame left yet
+        self._moving = False  # a frame that moves the vehicle is among those to be packed
+        self._watch = LinkWatch(slack)
+        self._crash = CrashWatch()
         self._spoken: set[str] = set()
         self._beat_us: int | None = None
-        self._silent = False
         self._was_ready = False
         self._released = False
         self._was_air: tuple[bool, bool] | None = None
@@ -99,7 +106,13 @@ class Driver:
             return None
         if self._preflight is None or self._seen.airborne:
             return self.link.crowd or self._seen.unready
-        return self.link.crowd or self._preflight.astray or self._seen.unready or self._preflight.unready
+        preflight = self._preflight
+        return self.link.crowd or preflight.astray or self._seen.unready or preflight.unready or self._mute
+
+    @property
+    def _mute(self) -> str | None:
+        """Before anything flies it must have answered: its mode has to be known before each frame that moves it."""
+        return None if self._watch.answers else "it answers nothing that it is asked"
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
         """Take in a datagram of another sender than the vehicle's."""
@@ -114,13 +127,16 @@ class Driver:
             if self._flavour is None:
                 self._choose(frame)
             if frame.system == self._system and self._flavour is not None:
+                if frame.component == _AUTOPILOT:
+                    self._watch.heard(now_us)
+                    self._look(now_us, events)
                 told = self._take(frame, now_us, events, send)
                 if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
                     self._advance(now_us, send, events)
         return Heard(events, self._pack(send, now_us, events) if send else [], received)
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """What is due at a time: heartbeat, requests for streams, retries, a link that fell silent."""
+        """What is due at a time: heartbeat, requests for streams, retries, a link that went down."""
         if self._flavour is None:
             return [], []
         send: list[Message] = []
@@ -132,11 +148,9 @@ class Driver:
         send += self._streams.due(self._system, now_us)
         send += self._prepare(now_us)
         self._hear(self._texts.due(now_us), events)
-        heard_us = self._seen.heartbeat_us
-        if not self._silent and heard_us is not None and now_us - heard_us > LINK_LOST_US:
-            self._silent = True
-            events.append(LinkLost(now_us))
+        self._look(now_us, events)
         self._advance(now_us, send, events)
+        send += self._ask(now_us)
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(Ready(now_us))
@@ -145,8 +159,11 @@ class Driver:
         return events, self._pack(send, now_us, events)
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard."""
-        if self._flavour is None:
+        """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard.
+
+        What goes out may be a question only: a frame that moves the vehicle waits until its mode is known.
+        """
+        if self._flavour is None or self._aids is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
         self.link.begin()
         before = frozenset[int]() if self._manoeuvre is None else self._manoeuvre.modes
@@ -156,10 +173,12 @@ class Driver:
             return [Failed(now_us, command.token, "no-datum", str(error))], []
         except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
             return [Failed(now_us, command.token, "broken-manoeuvre", str(error))], []
-        self._manoeuvre = Manoeuvre(command, self._flavour, self._seen, stages, self._commander, before)
+        self._manoeuvre = Manoeuvre(command, self._aids, self._seen, stages, before)
+        self._unsent = command.token
         events: list[Event] = []
-        frames = self._pack(self._manoeuvre.start(self._seen, now_us), now_us, events)
-        return [Sent(now_us, command.token), *events] if frames else events, frames
+        send: list[Message] = []
+        self._advance(now_us, send, events)
+        return events, self._pack(send, now_us, events)
 
     def _way(self, flavour: Flavour, command: Command) -> Stages:
         """How this skill is flown: in a way of its own, if a pack brings one, else as any of its kind."""
@@ -168,7 +187,7 @@ class Driver:
 
     def release(self) -> None:
         """Stand down: nothing that moves the vehicle is sent any more."""
-        self._manoeuvre, self._released = None, True
+        self._manoeuvre, self._unsent, self._released = None, None, True
 
     def announce(self, severity: int, text: str) -> None:
         """Tell any ground station; goes out with a later `tick`, when the link has nothing better to do."""
@@ -183,8 +202,9 @@ class Driver:
             self.link.settle(frame.system)
             self._seen.estimator = Estimator(flavour.estimator)
             wanted = {**self._telemetry.intervals, **ALWAYS, flavour.estimator: STALE_US // _WITHIN_STALE}
-            self._streams = Streams(wanted, self._telemetry.sources)
+            self._streams = Streams(wanted, self._telemetry.sources, AT_TIMES)
             slack = self._commander.slack
+            self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
             self._preflight = Preflight(self._policy, flavour, self._seen, fence=self._fence, slack=slack)
             self._heeded = {*self._seen.heeded, *HEEDED, "STATUSTEXT"}
 
@@ -207,12 +227,14 @@ class Driver:
             return False
         before = self._seen.mode
         self._seen.take(name, message, now_us)
+        crashed = self._crash.look(self._seen, now_us)
+        if crashed is not None:
+            events.append(Crashed(now_us, crashed))
         match name:
             case "HEARTBEAT":
                 self._watch_mode(before, now_us, events)
-                if self._silent:
-                    self._silent = False
-                    events.append(LinkBack(now_us))
+            case "ATTITUDE":
+                return False
             case "STATUSTEXT":
                 self._hear(self._texts.take(message, now_us), events)
             case _ if self._preflight is not None and self._is_for_us(message):
@@ -227,10 +249,11 @@ class Driver:
         message = frame.message
         if frame.component != _AUTOPILOT or not self._is_for_us(message):
             return
+        self._watch.answered()
         if message.command == messages.SET_INTERVAL:
             self._streams.answered(message.result == 0)
         else:
-            self._commander.acknowledge(message.command, message.result, now_us)
+            self._commander.acknowledge(message.command, message.result, self._seen.up_us)
 
     def _is_for_us(self, message: Message) -> bool:
         return getattr(message, "target_component", 0) in (0, COMPONENT)
@@ -268,15 +291,38 @@ class Driver:
             notes.clear()
         return events
 
+    def _look(self, now_us: int, events: list[Event]) -> None:
+        """Whether the link is up, and how long it was so far."""
+        if self._watch.look(now_us):
+            why = self._watch.down
+            events.append(LinkBack(now_us) if why is None else LinkLost(now_us, why))
+        self._seen.up_us = self._watch.up_us
+
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
-        if self._manoeuvre is not None:
-            try:
-                out, happened = self._manoeuvre.advance(self._seen, now_us)
-            except Exception as error:  # noqa: BLE001  see `begin`
-                events += self._break(self._manoeuvre, error, now_us)
-                return
-            send += out
-            events += happened
+        """Go on with the manoeuvre; where a frame of it waits for the mode, ask at once."""
+        manoeuvre = self._manoeuvre
+        if manoeuvre is None:
+            return
+        try:
+            out, happened = manoeuvre.advance(self._seen, now_us)
+        except Exception as error:  # noqa: BLE001  see `begin`
+            events += self._break(manoeuvre, error, now_us)
+            return
+        self._moving = self._moving or bool(out)
+        send += out
+        events += happened
+        if manoeuvre.waits:
+            send += self._ask(now_us)
+
+    def _ask(self, now_us: int) -> list[Message]:
+        """Ask for the mode, if it is time to."""
+        if self._aids is None or self._released:
+            return []
+        flies = self._seen.airborne or (self._manoeuvre is not None and not self._manoeuvre.over)
+        asks = self._aids.mode.due(self._system, self._seen, now_us, flies=flies)
+        if asks:
+            self._watch.asked(now_us)
+        return asks
 
     def _break(self, manoeuvre: Manoeuvre, error: Exception, now_us: int) -> list[Event]:
         if manoeuvre.over:
@@ -286,14 +332,18 @@ class Driver:
 
     def _is_ready(self, now_us: int) -> bool:
         seen = self._seen
-        if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us):
+        if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us) or self._mute:
             return False
         return seen.airborne or self._preflight is None or self._preflight.unready is None
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""
         frames, refused = self.link.pack(send, now_us)
+        moving, self._moving = self._moving, False
         if refused and self._manoeuvre is not None and not self._manoeuvre.over:
             self._manoeuvre.over = True
             events.append(Failed(now_us, self._manoeuvre.token, refused[0]))
+        elif moving and not refused and self._unsent is not None:
+            events.append(Sent(now_us, self._unsent))
+            self._unsent = None
         return frames

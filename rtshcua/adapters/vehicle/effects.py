@@ -10,7 +10,14 @@ _MM_PER_UNIT = 11.1319  # one 1e-7 degree of latitude; only for "has it arrived"
 ARRIVED = 2_000  # mm, horizontally
 LEVEL = 1_500  # mm, vertically
 CLIMBED = 1_000  # mm below the height asked for
-STILL = 700  # mm/s, in any direction
+STILL = 700  # mm/s
+
+
+def apart(latitude: int, longitude: int, to_latitude: int, to_longitude: int) -> float:
+    """How far two places (1e-7 degree) are from each other, in mm."""
+    north = (latitude - to_latitude) * _MM_PER_UNIT
+    east = (meridian(longitude, to_longitude) - to_longitude) * _MM_PER_UNIT * cos(radians(to_latitude / 1e7))
+    return hypot(north, east)
 
 
 def in_mode(number: int) -> Callable[[Observed], bool]:
@@ -50,13 +57,45 @@ def climbed(altitude: int) -> Callable[[Observed], bool]:
 
 def arrived(latitude: int, longitude: int, altitude: int) -> Callable[[Observed], bool]:
     """Near the place (1e-7 degree, mm above home), by what the estimator vouches for."""
-    shrink = cos(radians(latitude / 1e7))
 
     def near(seen: Observed) -> bool:
         if not (seen.located and seen.levelled):
             return False
-        north = (seen.latitude - latitude) * _MM_PER_UNIT
-        east = (meridian(seen.longitude, longitude) - longitude) * _MM_PER_UNIT * shrink
-        return hypot(north, east) <= ARRIVED and abs(seen.height - altitude) <= LEVEL
+        away = apart(seen.latitude, seen.longitude, latitude, longitude)
+        return away <= ARRIVED and abs(seen.height - altitude) <= LEVEL
 
     return near
+
+
+# ---------------------------------------------------------------- what is left, in mm: see `progress`
+
+
+def to_place(latitude: int, longitude: int, altitude: int) -> Callable[[Observed], tuple[int, ...] | None]:
+    """The way to a place that is flown to in a straight line."""
+
+    def left(seen: Observed) -> tuple[int, ...] | None:
+        if not (seen.located and seen.levelled):
+            return None
+        away = apart(seen.latitude, seen.longitude, latitude, longitude)
+        return (round(hypot(away, seen.height - altitude)),)
+
+    return left
+
+
+def up_to(altitude: int) -> Callable[[Observed], tuple[int, ...] | None]:
+    """The height that is missing."""
+    return lambda seen: (altitude - seen.height,) if seen.levelled else None
+
+
+def to_the_ground(seen: Observed) -> tuple[int, ...] | None:
+    """The height above home. On the ground, until the motors stop, nothing is expected of it any more."""
+    return (seen.height,) if seen.levelled and seen.airborne else None
+
+
+def homeward(seen: Observed) -> tuple[int, ...] | None:
+    """The way to where it took off from, and up or down: a return climbs first, then crosses, then descends."""
+    if not (seen.located and seen.levelled and seen.airborne):
+        return None
+    began = seen.began
+    away = 0 if began is None else round(apart(seen.latitude, seen.longitude, *began))
+    return away, seen.height, -seen.height

@@ -6,6 +6,8 @@ from typing import Any, TypeAlias
 
 from rtshcua.adapters.vehicle.fence import FenceHabits
 from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.progress import Expected
+from rtshcua.adapters.vehicle.targets import Target
 from rtshcua.onboard.ports import Command
 
 Message = Any
@@ -15,11 +17,13 @@ Message = Any
 class Stage:
     """One part of a manoeuvre: send, then wait until the effect is seen.
 
-    `message` is sent at once, and again while it is not acknowledged; `command` is the MAV_CMD whose acknowledgement
-    belongs to it. A message without one (None) is sent again each `repeat_us`. `done` None: it has no effect that could
-    be seen, so its acknowledgement has to do. `modes` are the flight modes that belong to this stage; another one means
-    that somebody took over. `timeout_us` 0: only the skill's own time limit ends the wait. `powered`: it cannot go on
-    once the motors are off on the ground. `travels`: a vehicle that stands still has stopped short.
+    `message` is sent once the flight mode is known, and again while it is not acknowledged; `command` is the MAV_CMD
+    whose acknowledgement belongs to it. A message without one (None) is sent again each `repeat_us`, until the
+    autopilot reports its `target`. `done` None: it has no effect that could be seen, so its acknowledgement has to do.
+    `modes` are the flight modes that belong to this stage; another one means that somebody took over. `timeout_us` 0:
+    only progress and the skill's own time limit end the wait. `powered`: it cannot go on once the motors are off on the
+    ground. `target`: where the autopilot must say that it flies to. `progress`: what must get less meanwhile.
+    `stops`: the vehicle must brake as its policy declares. `spare`: what is done already is not sent.
     """
 
     message: Message | None
@@ -29,7 +33,10 @@ class Stage:
     timeout_us: int = 0
     repeat_us: int = 0
     powered: bool = False
-    travels: bool = False
+    target: Target | None = None
+    progress: Expected | None = None
+    stops: bool = False
+    spare: bool = False
 
 
 Stages: TypeAlias = Callable[[Command, Observed, int], list[Stage]]
@@ -49,8 +56,10 @@ class Flavour:
     """An autopilot: its name, the names of its modes, how it is made to do each kind of motion, and its own ways.
 
     `estimator` is the message in which its estimator reports. `natural` are changes of mode (from, to) that it makes
-    in the course of what it was told. `returns` are parameters of which one is there. `bytewise`: integer parameters
-    travel as their bytes. `fence` says how it takes a geofence.
+    in the course of what it was told. `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is
+    older (the link's delay comes on top): what the fastest report of the mode that it really gives allows. `returns`
+    are parameters of which one is there. `bytewise`: integer parameters travel as their bytes. `fence` says how it
+    takes a geofence.
     """
 
     name: str
@@ -59,6 +68,7 @@ class Flavour:
     stages: Stages
     estimator: str
     natural: frozenset[tuple[int, int]]
+    mode_within_us: int
     returns: tuple[ReturnAltitude, ...]
     bytewise: bool
     fence: FenceHabits

@@ -14,11 +14,13 @@ TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
 REPOSITION = dialect.MAV_CMD_DO_REPOSITION
 CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
 SET_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+REQUEST = dialect.MAV_CMD_REQUEST_MESSAGE
 RUN_PREARM_CHECKS = dialect.MAV_CMD_RUN_PREARM_CHECKS
 FENCE = dialect.MAV_MISSION_TYPE_FENCE
 TEXT_OCTETS = 50
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
+_NOWHERE = (1 << 31) - 1  # INT32_MAX
 _POSITION_ONLY = 0x0DF8  # POSITION_TARGET_TYPEMASK: ignore velocity, acceleration, yaw and yaw rate
 
 
@@ -55,6 +57,17 @@ def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, s
     )  # fmt: skip
 
 
+def stop_here(system: int) -> Any:
+    """DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand ("pause").
+
+    As COMMAND_INT, where INT32_MAX is what NaN is in a float (vehicles.md 5; PX4: `Navigator`, DO_REPOSITION).
+    """
+    flags = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    return dialect.MAVLink_command_int_message(
+        system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL, REPOSITION, 0, 0, -1.0, flags, 0, NAN, _NOWHERE, _NOWHERE, NAN
+    )
+
+
 def position_target(system: int, latitude: int, longitude: int, height_m: float) -> Any:
     """SET_POSITION_TARGET_GLOBAL_INT: a place at a height in metres above home."""
     return dialect.MAVLink_set_position_target_global_int_message(
@@ -76,7 +89,7 @@ def message_interval(system: int, message: str, interval_us: int) -> Any:
 
 def request(system: int, message: str) -> Any:
     """REQUEST_MESSAGE: once, by the name of a message that the dialect has."""
-    return command(system, dialect.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
+    return command(system, REQUEST, number_of(message) or 0)
 
 
 def time_sync(now_ns: int) -> Any:

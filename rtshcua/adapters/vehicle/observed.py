@@ -1,6 +1,7 @@
 """What the vehicle was seen to do: the only ground on which a command counts as done."""
 
 from dataclasses import dataclass, field
+from math import acos, cos, degrees, hypot, isfinite
 from typing import Any
 
 from rtshcua.adapters.vehicle import datum, health
@@ -9,10 +10,15 @@ from rtshcua.adapters.vehicle.estimator import Estimator
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _ON_GROUND = 1  # MAV_LANDED_STATE
 _IN_AIR = (2, 3, 4)  # IN_AIR, TAKEOFF, LANDING
+_LANDING = 4
 _FIX_3D = 3
 _CRITICAL = (5, 6)  # MAV_STATE: CRITICAL, EMERGENCY
 _DEBUG = 7  # MAV_SEVERITY
-_HEEDED = ("HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "SYS_STATUS")
+_ABOVE_SEA = (0, 5)  # MAV_FRAME_GLOBAL, MAV_FRAME_GLOBAL_INT
+_HEEDED = (
+    "HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "POSITION_TARGET_GLOBAL_INT", "GPS_RAW_INT", "SYS_STATUS",
+    "ATTITUDE",
+)  # fmt: skip
 _REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
 
 
@@ -21,7 +27,10 @@ class Observed:
     """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
-    so now. `notes` collects what an operator should know.
+    so now. `target` is where the autopilot says that it flies to: latitude, longitude, mm above mean sea level.
+    `began` is the place where it last stood. `descent` is how fast it sinks and `tilt` how many degrees it leans,
+    whoever vouches for that. `beats` counts heartbeats; `up_us` is link time, see `LinkWatch`. `notes` collects what an
+    operator should know.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -35,11 +44,17 @@ class Observed:
     levelled: bool = False
     home_amsl: int | None = None
     speed: int | None = None
+    descent: int = 0
+    tilt: int = 0
+    target: tuple[int, int, int] | None = None
+    began: tuple[int, int] | None = None
     fix: int = 0
     prearm: bool = False
     unwell: tuple[str, ...] = ()
     heartbeat_us: int | None = None
+    beats: int = 0
     now_us: int = 0
+    up_us: int = 0
     critical: bool = False
     notes: list[str] = field(default_factory=list)
     text: str = ""
@@ -58,11 +73,17 @@ class Observed:
                 self.mode = message.custom_mode
                 self.armed = bool(message.base_mode & _ARMED)
                 self.heartbeat_us = now_us
+                self.beats += 1
                 self._judge(message.system_status)
             case "EXTENDED_SYS_STATE":
                 self.landed_state = message.landed_state
             case "GLOBAL_POSITION_INT":
                 self._place(message, now_us)
+            case "POSITION_TARGET_GLOBAL_INT":
+                if message.coordinate_frame in _ABOVE_SEA and isfinite(message.alt):
+                    self.target = message.lat_int, message.lon_int, round(message.alt * 1_000)
+            case "ATTITUDE":
+                self.tilt = _tilt(message.roll, message.pitch)
             case "GPS_RAW_INT":
                 self.fix = message.fix_type
             case "SYS_STATUS":
@@ -95,6 +116,11 @@ class Observed:
     def airborne(self) -> bool:
         """In the air, as far as it says; an armed vehicle that does not say counts as in the air."""
         return self.landed_state in _IN_AIR or (self.landed_state == 0 and self.armed)
+
+    @property
+    def landing(self) -> bool:
+        """Coming down to land, as it says itself."""
+        return self.landed_state == _LANDING
 
     @property
     def down(self) -> bool:
@@ -151,6 +177,16 @@ class Observed:
             self.height = message.relative_alt
             if self.located:
                 self.home_amsl = datum.home_amsl_mm(message.alt, message.relative_alt)
+        if self.located and self.down:
+            self.began = self.latitude, self.longitude
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
         # from cm/s; without a speed that the estimator knows, it does not count as still
-        self.speed = 10 * max(abs(message.vx), abs(message.vy), abs(message.vz)) if known else None
+        self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None
+        self.descent = 10 * message.vz
+
+
+def _tilt(roll: float, pitch: float) -> int:
+    """Degrees between the vehicle's own vertical axis and the world's, of ATTITUDE's radians."""
+    if not (isfinite(roll) and isfinite(pitch)):
+        return 0
+    return round(degrees(acos(max(-1.0, min(1.0, cos(roll) * cos(pitch))))))

@@ -17,27 +17,34 @@ PATIENCE_REFUSED_US = 2_000_000
 MEASURE_US = 5_000_000
 SLOW = 2
 
-#: What effects are seen by, and how often, in us; the heartbeat too, for a change of mode must not be seen late.
+#: What effects are seen by, and how often, in us; mode and landed state too, for a takeover must not be seen late.
 ALWAYS: Mapping[str, int] = {
-    "HEARTBEAT": 200_000,
+    "HEARTBEAT": 100_000,
     "GLOBAL_POSITION_INT": 100_000,
-    "EXTENDED_SYS_STATE": 200_000,
+    "EXTENDED_SYS_STATE": 100_000,
+    "ATTITUDE": 100_000,
     "GPS_RAW_INT": 500_000,
     "SYS_STATUS": 500_000,
 }
+#: What is sent at times only, whatever is asked for: PX4 has no target before it flies, ArduCopter in GUIDED alone.
+AT_TIMES: Mapping[str, int] = {"POSITION_TARGET_GLOBAL_INT": 100_000}
 
 
 class Streams:
     """SET_MESSAGE_INTERVAL for each message of `wanted` (its interval in us), one request outstanding at a time.
 
-    `needed` holds groups of messages of which one is enough: the sources of one signal. `notes` collects what an
-    operator should know: which streams come too seldom, and when they are right again.
+    Those `at_times` are asked for like the others, and not missed when they do not come. `needed` holds groups of
+    messages of which one is enough: the sources of one signal. `notes` collects what an operator should know: which
+    streams come too seldom, and when they are right again.
     """
 
-    def __init__(self, wanted: Mapping[str, int], needed: Iterable[frozenset[str]]) -> None:
+    def __init__(
+        self, wanted: Mapping[str, int], needed: Iterable[frozenset[str]], at_times: Mapping[str, int] | None = None
+    ) -> None:
+        self._at_times = at_times or {}
         self._needed = [*needed, *[frozenset({name}) for name in ALWAYS]]
         self._wanted = {name: us for name, us in wanted.items() if messages.number_of(name) is not None}
-        self._queue = list(self._wanted)
+        self._queue = [*self._wanted, *self._at_times]
         self._refused: set[str] = set()
         self._heard_us: dict[str, int] = {}
         self._asking: str | None = None
@@ -78,7 +85,8 @@ class Streams:
         if not self._queue:
             return []
         self._asking, self._asked_us = self._queue.pop(0), now_us
-        return [messages.message_interval(system, self._asking, self._wanted[self._asking])]
+        interval_us = self._wanted.get(self._asking) or self._at_times[self._asking]
+        return [messages.message_interval(system, self._asking, interval_us)]
 
     def settled(self, now_us: int) -> bool:
         """Whether one message of each group was heard, or was waited for long enough."""

@@ -4,7 +4,7 @@
 |---|---|---|
 | climb | mode Hold, arm, take off to the height above sea | mode GUIDED, arm, take off to the height above home |
 | fly, cover | reposition to a point of the path, at its height | mode GUIDED, speed, position target on the path |
-| hold | mode Hold | mode BRAKE |
+| hold | reposition to no place, height or heading, which stops it | mode BRAKE |
 | home | mode Return | mode RTL |
 | land | mode Land | mode LAND |
 
@@ -27,7 +27,7 @@ _SET_MODE, _ARM, _TAKEOFF, _SPEED, _REPOSITION = 176, 400, 22, 178, 192  # MAV_C
 _TRAVELS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 #: the modes (custom main mode, sub-mode) that an autopilot is put in, and for which motions
 _MODES: Final = {
-    (PX4, 4, 3): frozenset({MotionKind.CLIMB, MotionKind.HOLD}),
+    (PX4, 4, 3): frozenset({MotionKind.CLIMB}),
     (PX4, 4, 5): frozenset({MotionKind.HOME}),
     (PX4, 4, 6): frozenset({MotionKind.LAND}),
     (ARDUPILOT, 4, 0): frozenset({MotionKind.CLIMB}) | _TRAVELS,
@@ -38,6 +38,7 @@ _MODES: Final = {
 _ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
 _DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
 _POSITION_ONLY: Final = 0x0DF8  # POSITION_TARGET_TYPEMASK: all but the position is ignored
+_NOWHERE: Final = 2_147_483_647  # INT32_MAX: no place
 _ABOVE_SEA, _ABOVE_HOME = 0, 6  # MAV_FRAME of the two ways to say a height
 
 
@@ -82,6 +83,10 @@ def obeyed(frame: Frame, target: Target, autopilot: int, home: Home | None) -> b
         return False
     if frame.message == COMMAND_LONG:
         return _command(fields, target, autopilot, home)
+    if frame.message == COMMAND_INT and autopilot == PX4 and target.kind == MotionKind.HOLD:
+        speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+        nowhere = (x, y) == (_NOWHERE, _NOWHERE) and isnan(z) and isnan(yaw)
+        return nowhere and (number, reference, flags, radius, speed) == (_REPOSITION, _ABOVE_SEA, 1, 0, -1)
     if target.kind not in _TRAVELS:
         return False
     if frame.message == COMMAND_INT and autopilot == PX4:

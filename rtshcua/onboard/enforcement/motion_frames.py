@@ -43,6 +43,7 @@ class MavCmd(IntEnum):
 
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _CHANGE_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
+_NOWHERE: Final = (1 << 31) - 1  # INT32_MAX, which PX4 takes for NaN where a place is asked for
 _GLOBAL: Final = 0  # MAV_FRAME: z is above mean sea level
 _GLOBAL_RELATIVE_ALT_INT: Final = 6  # z is above home
 _POSITION_ONLY: Final = 0x0DF8  # POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
@@ -52,7 +53,6 @@ _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = MappingProxyType(
     {
         PX4: {  # main mode AUTO (4), sub-mode
             MotionKind.CLIMB: (4, 3),  # it is armed in Hold
-            MotionKind.HOLD: (4, 3),
             MotionKind.HOME: (4, 5),
             MotionKind.LAND: (4, 6),
         },
@@ -87,6 +87,8 @@ def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int |
     match frame.message:
         case shape.COMMAND_LONG:
             return _long(frame.fields, command, autopilot, home_amsl)
+        case shape.COMMAND_INT if autopilot == PX4 and command.kind == MotionKind.HOLD:
+            return _stop(frame.fields)
         case shape.COMMAND_INT:
             return autopilot == PX4 and _reposition(frame.fields, command, home_amsl)
         case shape.SET_POSITION_TARGET_GLOBAL_INT:
@@ -98,7 +100,8 @@ def point_of(frame: Frame) -> tuple[int, int] | None:
     """Where a frame that carries out a command sends the vehicle, in 1e-7 degree; None if it leaves it where it is."""
     match frame.message:
         case shape.COMMAND_INT:
-            return frame.fields[4], frame.fields[5]
+            point = frame.fields[4], frame.fields[5]
+            return None if point == (_NOWHERE, _NOWHERE) else point
         case shape.SET_POSITION_TARGET_GLOBAL_INT:
             return frame.fields[1], frame.fields[2]
     return None
@@ -144,6 +147,21 @@ def _reposition(fields: tuple[Any, ...], command: Command, home_amsl: int | None
         and (_is_speed(speed, command) if command.speed else speed == -1)
         and _is_point(x, y, command)
         and _is_above_sea(z, command, home_amsl)
+    )
+
+
+def _stop(fields: tuple[Any, ...]) -> bool:
+    """DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand.
+
+    A finite one of them would make PX4 keep the target that it flies to.
+    """
+    speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+    return (
+        (number, reference, flags) == (MavCmd.DO_REPOSITION, _GLOBAL, _CHANGE_MODE)
+        and (speed, radius) == (-1, 0)
+        and (x, y) == (_NOWHERE, _NOWHERE)
+        and isnan(yaw)
+        and isnan(z)
     )
 
 

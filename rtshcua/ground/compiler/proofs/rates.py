@@ -33,9 +33,10 @@ class Rates:
     within_stale: int = 4
     fixed: Mapping[str, int] = field(
         default_factory=lambda: {
-            "HEARTBEAT": 200_000,
+            "HEARTBEAT": 100_000,
             "GLOBAL_POSITION_INT": 100_000,
-            "EXTENDED_SYS_STATE": 200_000,
+            "EXTENDED_SYS_STATE": 100_000,
+            "ATTITUDE": 100_000,
             "GPS_RAW_INT": 500_000,
             "SYS_STATUS": 500_000,
         }

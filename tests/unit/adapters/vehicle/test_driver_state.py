@@ -42,14 +42,23 @@ class Bench:
             self.now_us += S // 10
             events, frames = self.driver.tick(self.now_us)
             self.events += events
-            self.sent += [Codec(0, 0).parse(frame)[0] for frame in frames]
+            sent = [Codec(0, 0).parse(frame)[0] for frame in frames]
+            self.sent += sent
+            if any(each.name == "COMMAND_LONG" and each.message.command == 512 for each in sent):
+                self.answer()
+
+    def answer(self) -> None:
+        """What is asked for: the mode, as it was told last."""
+        self.hear(mavlink.MAVLink_command_ack_message(512, 0, 0, 0, 1, 191))
+        self.beat(*self.told)
 
     def begin(self, kind: MotionKind, *geo: int, altitude: int = 0) -> list[Event]:
         command = Command(7, kind.name.lower(), kind, (0,) * len(geo), geo, altitude, 0)
-        self.frames.open(command, self.now_us)
+        self.frames.open(command, self.now_us + S)
         return self.driver.begin(command, self.now_us)[0]
 
     def beat(self, mode: int, armed: bool = False, status: int = 4) -> None:
+        self.told = mode, armed, status
         self.hear(mavlink.MAVLink_heartbeat_message(2, self.autopilot, ARMED if armed else 0, mode, status, 3))
 
     def landed(self, state: int) -> None:

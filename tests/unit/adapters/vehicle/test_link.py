@@ -21,6 +21,8 @@ def test_what_the_boundary_does_not_let_out_has_failed() -> None:
     assert target.driver.begin(LAND, 7) == ([Failed(7, 5, FrameRefusal.NO_SESSION)], [])
     assert not [event for event in target.driver.tick(10_000_000)[0] if isinstance(event, Failed)], "told once"
     target.frames.open(LAND, 20_000_000)
+    target.now_us = 11_000_000
+    target.receive(target.says(greeting("px4")[0]))  # its mode is known
     events, frames = target.driver.begin(LAND, 11_000_000)
     assert events == [Sent(11_000_000, 5)]
     assert len(frames) == 1
@@ -39,8 +41,12 @@ def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
     target.frames.open(LAND, 1_000_000)
     assert len(target.driver.begin(LAND, 0)[1]) == 1
     target.frames.close()
-    events, frames = target.driver.tick(1_500_000)
-    assert [event for event in events if isinstance(event, Failed)] == [Failed(1_500_000, 5, FrameRefusal.NO_SESSION)]
+    target.now_us = 1_500_000
+    target.sent.clear()
+    target.receive(target.says(mavlink.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3)))
+    failed = [event for event in target.events if isinstance(event, Failed)]
+    assert failed == [Failed(1_500_000, 5, FrameRefusal.NO_SESSION)]
+    frames = [*target.sent, *target.driver.tick(1_600_000)[1]]
     messages = [received.message for frame in frames for received in Codec(9, 9).parse(frame)]
     assert mavlink.MAV_CMD_DO_SET_MODE not in [getattr(message, "command", None) for message in messages]
 

@@ -1,0 +1,77 @@
+"""A crash told from a landing: by the motors, the fall and the attitude, not by the landed state alone.
+
+What lies on the ground with its motors off says ON_GROUND however it came there.
+"""
+
+from typing import Final
+
+from rtshcua.adapters.vehicle.observed import Observed
+
+#: mm above home: motors that stop higher than this were not stopped by a landing. Lower, the report of the landing may
+#: still be on its way.
+ABOVE: Final = 3_000
+#: us for which motors off, or a tilt, must be seen: two reports may come in either order
+LASTS_US: Final = 400_000
+#: mm/s: no landing comes down so fast,
+FALLS: Final = 3_000
+#: and no motors stop it to this
+STOPPED: Final = 500
+#: within this time, in us, between two reports of its speed.
+AT_ONCE_US: Final = 400_000
+#: us from there until it says that it lies on the ground, or that its motors are off
+SETTLES_US: Final = 10_000_000
+#: degrees: autopilots lean at most 45 of their own accord
+TILTED: Final = 60
+
+
+class CrashWatch:
+    """Looks at each observation of one flight; tells of a crash once."""
+
+    def __init__(self) -> None:
+        self._flown = False
+        self._told = False
+        self._unpowered_us: int | None = None
+        self._tilted_us: int | None = None
+        self._fell: tuple[int, int] | None = None  # when, and how fast it came down
+        self._impact: tuple[int, int] | None = None
+
+    def look(self, seen: Observed, now_us: int) -> str | None:
+        """What shows that it crashed; None, also once that was told."""
+        if seen.airborne and seen.armed:
+            self._flown = True
+        if not self._flown or self._told:
+            return None
+        how = self._motors(seen, now_us) or self._attitude(seen, now_us) or self._fall(seen, now_us)
+        self._told = how is not None
+        return how
+
+    def _motors(self, seen: Observed, now_us: int) -> str | None:
+        if seen.armed or not seen.airborne or seen.height < ABOVE:
+            self._unpowered_us = None
+            return None
+        if self._unpowered_us is None:
+            self._unpowered_us = now_us
+        if now_us - self._unpowered_us < LASTS_US:
+            return None
+        return f"its motors stopped {seen.height // 1_000} m above home"
+
+    def _attitude(self, seen: Observed, now_us: int) -> str | None:
+        if seen.tilt < TILTED:
+            self._tilted_us = None
+            return None
+        if self._tilted_us is None:
+            self._tilted_us = now_us
+        return f"it leans {seen.tilt} degrees" if now_us - self._tilted_us >= LASTS_US else None
+
+    def _fall(self, seen: Observed, now_us: int) -> str | None:
+        if seen.descent >= FALLS:
+            self._fell, self._impact = (now_us, seen.descent), None
+        elif self._fell is not None:
+            if abs(seen.descent) <= STOPPED and now_us - self._fell[0] <= AT_ONCE_US:
+                self._impact = self._fell
+            self._fell = None
+        if self._impact is None or now_us - self._impact[0] > SETTLES_US:
+            return None
+        if seen.airborne and seen.armed:
+            return None
+        return f"it came down at {self._impact[1] / 1_000:.1f} m/s"

@@ -66,7 +66,14 @@ class Target:
     def moved(self) -> list[bytes]:
         """Which of the frames that move a vehicle would leave."""
         commands = [Command(1, "skill", kind, (0, 0), (1, 1), 5_000, 1_000) for kind in MotionKind]
-        return [frame for command in commands for frame in self.driver.begin(command, self.now_us)[1]]
+        frames = [frame for command in commands for frame in self.driver.begin(command, self.now_us)[1]]
+        return [frame for frame in frames if not _asks(frame)]
+
+
+def _asks(frame: bytes) -> bool:
+    """Whether it only asks for a message."""
+    message = Codec(9, 9).parse(frame)[0].message
+    return getattr(message, "command", None) == mavlink.MAV_CMD_REQUEST_MESSAGE
 
 
 def remembered(thing: object) -> object:

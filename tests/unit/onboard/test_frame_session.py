@@ -77,6 +77,7 @@ def one(place: int, first: int, last: int) -> list[float]:
 K = MotionKind
 TAKEOFF = (nan, nan, nan, 508.0)
 
+NOWHERE = {"param1": -1.0, "x": 2**31 - 1, "y": 2**31 - 1, "z": nan}
 TRAVELS = (K.FLY, K.COVER)
 
 #: autopilot, a frame, and the commands that it carries out
@@ -85,7 +86,8 @@ CARRIED: list[tuple[int, Any, tuple[MotionKind, ...]]] = [
     (PX4, long(22, nan, 0, 0, *TAKEOFF), (K.CLIMB,)),
     (PX4, long(400, 1), (K.CLIMB,)),
     (PX4, reposition(), TRAVELS),
-    (PX4, long(176, 1, 4, 3), (K.CLIMB, K.HOLD)),  # it is armed in Hold
+    (PX4, long(176, 1, 4, 3), (K.CLIMB,)),  # it is armed in Hold; it does not stop it
+    (PX4, reposition(**NOWHERE), (K.HOLD,)),
     (PX4, long(176, 1, 4, 5), (K.HOME,)),
     (PX4, long(176, 1, 4, 6), (K.LAND,)),
     (ARDUPILOT, long(176, 1, 4), (K.CLIMB, *TRAVELS)),
@@ -212,6 +214,15 @@ def test_nothing_is_armed_or_disarmed_by_force(forced: float, on: int) -> None:
 
 
 REFUSED: list[tuple[str, int, MotionKind, Any]] = [
+    ("PX4 keeps its target where a height is given", PX4, K.HOLD, reposition(**NOWHERE | {"z": 508.0})),
+    ("and where a heading is", PX4, K.HOLD, reposition(**NOWHERE | {"param4": 1.0})),
+    ("one coordinate is a place", PX4, K.HOLD, reposition(**NOWHERE | {"x": GEO[0]})),
+    ("a stop has no speed", PX4, K.HOLD, reposition(**NOWHERE | {"param1": 4.0})),
+    ("a stop stops in Hold", PX4, K.HOLD, reposition(**NOWHERE | {"param2": 0})),
+    ("a place is no stop", PX4, K.HOLD, reposition()),
+    ("nor is the mode, to PX4", PX4, K.HOLD, long(176, 1, 4, 3)),
+    ("a stop is no leg", PX4, K.FLY, reposition(**NOWHERE)),
+    ("ArduCopter is stopped by its mode", ARDUPILOT, K.HOLD, reposition(**NOWHERE)),
     ("too high", PX4, K.CLIMB, long(22, 0, 0, 0, nan, nan, nan, 510.001)),
     ("above home instead of above sea", PX4, K.CLIMB, long(22, 0, 0, 0, nan, nan, nan, 20.0)),
     ("at a pitch", PX4, K.CLIMB, long(22, 1, 0, 0, *TAKEOFF)),

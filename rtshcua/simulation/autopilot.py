@@ -64,6 +64,12 @@ class Flavour:
     """The streams that run from boot, and their intervals in microseconds."""
     builders: Mapping[int, Builder]
     """Every message that can be streamed or requested."""
+    constant: frozenset[int]
+    """The messages whose interval is refused to be changed."""
+    only_streamed: frozenset[int]
+    """The messages that REQUEST_MESSAGE is refused for."""
+    least_us: Mapping[int, int]
+    """The shortest interval that is delivered, whatever is asked for, where there is one."""
     parameters: tuple[Parameter, ...]
     bytewise: bool
     """Whether integer parameters travel as their bytes."""
@@ -110,6 +116,8 @@ class Autopilot:
     def __init__(self, flavour: Flavour, config: SimulationConfig) -> None:
         self.flavour = flavour
         self.home = config.home
+        self.system = config.system
+        self.utc_us = config.utc_us
         self.now_us = 0
         self.link_quality = 10_000
         """What the radio tells of the link, in 1/10000."""

@@ -19,17 +19,19 @@ FORCE = 21196
 """Parameter 2 of COMPONENT_ARM_DISARM that overrides every check."""
 
 
-def request_message(refused: int) -> Handler:
-    """MAV_CMD_REQUEST_MESSAGE; `refused` answers for a message that the vehicle does not have."""
+def request_message(refused: int, needs_one: bool) -> Handler:
+    """MAV_CMD_REQUEST_MESSAGE; `refused` answers for a message that the vehicle does not have.
+
+    `needs_one`: for one that it has nothing to tell in, too.
+    """
 
     def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
         if whole(command.p1) == AVAILABLE_MODES:
             return (ACCEPTED if available_modes(a, whole(command.p2)) else refused,)
         build = a.flavour.builders.get(whole(command.p1))
-        if build is None:
-            return (refused,)
-        a.send(build(a))
-        return (ACCEPTED,)
+        message = None if build is None or whole(command.p1) in a.flavour.only_streamed else build(a)
+        a.send(message)
+        return (refused if message is None and (build is None or needs_one) else ACCEPTED,)
 
     return handle
 
@@ -39,11 +41,14 @@ def set_message_interval(refused: int, say_why: bool) -> Handler:
 
     def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
         number = whole(command.p1)
-        if number not in a.flavour.builders or isnan(command.p2):
+        if number not in a.flavour.builders or number in a.flavour.constant or isnan(command.p2):
             if say_why:
                 a.say(mavlink.MAV_SEVERITY_INFO, f"No ap_message for mavlink id ({number})")
             return (refused,)
-        a.streams.set(number, whole(command.p2))
+        interval_us = whole(command.p2)
+        if interval_us > 0:
+            interval_us = max(interval_us, a.flavour.least_us.get(number, 0))
+        a.streams.set(number, interval_us)
         return (ACCEPTED,)
 
     return handle

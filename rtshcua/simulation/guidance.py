@@ -1,6 +1,6 @@
 """From places to velocities: what the autopilot asks of the body. Metres, seconds, radians."""
 
-from math import atan2, copysign, cos, hypot, sin, sqrt
+from math import atan2, copysign, cos, hypot, inf, sin, sqrt
 
 from rtshcua.simulation.handling import Agility, Handling
 from rtshcua.simulation.kinematics import Approach, Body
@@ -13,6 +13,8 @@ ARRIVED_M, ARRIVED_M_S = 0.5, 0.4
 """Nearer and slower than this, it is there."""
 _NEAR_M = 0.1
 """So near the target, speed towards it means nothing."""
+_LEVEL_M = 2.0
+"""So near, the way up or down is not tied to the way ahead any more."""
 _PULL = 0.5
 """On a circle, speed towards it for each metre off it, 1/s."""
 
@@ -30,9 +32,9 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
     return north / distance * speed, east / distance * speed
 
 
-def hardest(agility: Agility, approach: Approach) -> float:
-    """The most that it may accelerate, in m/s^2."""
-    return max(agility.acceleration, approach.braking * _SPARE)
+def hardest(agility: Agility) -> float:
+    """The most that it may accelerate on its way to a target, in m/s^2."""
+    return max(agility.acceleration, agility.approach.braking * _SPARE)
 
 
 def is_above(body: Body, north: float, east: float, within: float) -> bool:
@@ -58,6 +60,16 @@ def climb_rate(up: float, target: float, handling: Handling, taking_off: bool) -
     if taking_off:
         fastest = min(fastest, handling.takeoff_climb)
     return copysign(min(fastest, handling.agility.climb_approach.speed(abs(away))), away)
+
+
+def steepest(body: Body, north: float, east: float, up: float) -> float:
+    """The most that it climbs or sinks on its way to a place: the way is straight, as recorded from both."""
+    north, east = north - body.north, east - body.east
+    away = hypot(north, east)
+    if away < _LEVEL_M:
+        return inf
+    closing = (north * body.v_north + east * body.v_east) / away
+    return max(closing, _NEAR_M) * abs(up - body.up) / away
 
 
 def landing_rate(body: Body, handling: Handling) -> float:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.stopping import Stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,8 +14,10 @@ class Agility:
     acceleration: float
     approach: Approach
     """How it slows down in front of a target."""
-    stop: Approach
-    """How it slows down when told to stay."""
+    stop: Stop
+    """How it stops when told to stay."""
+    brake: Stop
+    """The same in BRAKE."""
     climb_acceleration: float
     climb_approach: Approach
     """How it slows down in front of a height."""
@@ -61,3 +64,5 @@ class Handling:
     """Whether another mode flies at the cruise speed again."""
     lifts_to_targets: bool = False
     """Whether a target makes it lift off when it stands armed."""
+    comes_back: bool = False
+    """Whether it comes back to where it was when it was told to return (the place), or to hold (the height)."""

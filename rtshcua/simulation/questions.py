@@ -14,8 +14,11 @@ from rtshcua.simulation.modes import Mode
 
 AVAILABLE_MODES = 435
 """The message is not in the dialect: https://mavlink.io/en/messages/common.html#AVAILABLE_MODES."""
-_CRC_EXTRA = 134
 _LAYOUT = struct.Struct("<IIBBB35s")
+
+CURRENT_MODE = 436
+"""Neither is this one: https://mavlink.io/en/messages/common.html#CURRENT_MODE."""
+_CURRENT_MODE_LAYOUT = struct.Struct("<IIB")
 
 _STANDARD: Mapping[Mode, int] = {
     Mode.POSITION: 1, Mode.ALTITUDE: 4, Mode.RETURN: 5, Mode.MISSION: 6, Mode.LAND: 7, Mode.TAKEOFF: 8
@@ -27,18 +30,28 @@ _NAK, _UNKNOWN_COMMAND = 129, 7
 _FTP_SIZE = 251
 
 
-class _AvailableModes(mavlink.MAVLink_message):  # type: ignore[misc]
-    """AVAILABLE_MODES, packed by hand."""
+class _Packed(mavlink.MAVLink_message):  # type: ignore[misc]
+    """A message that the dialect does not have, packed by hand."""
 
-    id = AVAILABLE_MODES
+    id: int
+    name: str
+    extra: int
 
     def __init__(self, payload: bytes) -> None:
-        super().__init__(AVAILABLE_MODES, "AVAILABLE_MODES")
+        super().__init__(self.id, self.name)
         self._bytes = payload
 
     def pack(self, mav: Message, force_mavlink1: bool = False) -> Message:
         """The frame."""
-        return self._pack(mav, _CRC_EXTRA, self._bytes, force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.extra, self._bytes, force_mavlink1=force_mavlink1)
+
+
+class _AvailableModes(_Packed):
+    id, name, extra = AVAILABLE_MODES, "AVAILABLE_MODES", 134
+
+
+class _CurrentMode(_Packed):
+    id, name, extra = CURRENT_MODE, "CURRENT_MODE", 193
 
 
 def available_modes(a: Autopilot, number: int) -> bool:
@@ -50,8 +63,17 @@ def available_modes(a: Autopilot, number: int) -> bool:
     for index, (mode, custom) in enumerate(listed, start=1):
         if number in (0, index):
             name = modes.names[mode].encode()
-            a.send(_AvailableModes(_LAYOUT.pack(custom, 0, len(listed), index, _STANDARD.get(mode, 0), name)))
+            payload = _LAYOUT.pack(custom, 0, len(listed), index, _STANDARD.get(mode, 0), name)
+            a.send(_AvailableModes(payload))
     return True
+
+
+def current_mode(a: Autopilot) -> Message:
+    """CURRENT_MODE."""
+    mode = a.vehicle.mode
+    number = a.flavour.modes.numbers[mode]
+    payload = _CURRENT_MODE_LAYOUT.pack(number, number, _STANDARD.get(mode, 0))
+    return _CurrentMode(payload)
 
 
 def _file(a: Autopilot, received: Received) -> None:

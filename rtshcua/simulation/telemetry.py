@@ -205,6 +205,11 @@ def radio_status(a: Autopilot) -> Message:
     return mavlink.MAVLink_radio_status_message(rssi, rssi, percent, 30, 30, 0, 0)
 
 
+def system_time(a: Autopilot) -> Message:
+    """SYSTEM_TIME: the time of day, and since the start."""
+    return mavlink.MAVLink_system_time_message(a.utc_us + a.now_us, a.boot_ms)
+
+
 COMMON: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
@@ -216,5 +221,6 @@ COMMON: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: home_position,
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
     mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE: obstacle_distance,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: system_time,
 }
 """Those that both flavours stream alike, by number."""

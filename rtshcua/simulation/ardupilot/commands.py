@@ -93,10 +93,18 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
 
 
 def _pause(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """DO_PAUSE_CONTINUE, in GUIDED (`ModeGuided::pause`): a target that comes while it stands is kept for later.
+
+    AUTO, which the real one pauses too, is left out.
+    """
     if a.vehicle.mode is not Mode.GUIDED:
         return (FAILED,)
     if whole(command.p1) == 0:
-        a.vehicle.hold()
+        a.vehicle.pause()
+    elif whole(command.p1) == 1:
+        a.vehicle.go_on()
+    else:
+        return (DENIED,)
     return (ACCEPTED,)
 
 
@@ -191,7 +199,7 @@ COMMANDS: Mapping[int, Handler] = {
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
     mavlink.MAV_CMD_DO_FENCE_ENABLE: _fence_enable,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval(DENIED, say_why=True),
-    mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(FAILED),
+    mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(FAILED, needs_one=False),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,
     mavlink.MAV_CMD_GET_HOME_POSITION: get_home,
 }

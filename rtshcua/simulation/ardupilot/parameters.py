@@ -4,6 +4,7 @@ from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.handling import Agility, Handling
 from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.parameters import INT8, INT16, INT32, Parameter
+from rtshcua.simulation.stopping import Stop
 
 PARAMETERS = (
     Parameter("ARMING_CHECK", INT32, value=1),
@@ -39,10 +40,23 @@ PARAMETERS = (
 """In the order of their indices."""
 
 
+def _loiter(speed: float) -> float:
+    return speed * (speed / 9.2 + 0.65)
+
+
+def _brake(speed: float) -> float:
+    return speed * (0.0487 * speed + 1.555)
+
+
+_LOITER = Stop(Approach(braking=5.5, gain=2.6), hardest=6.5, ahead=_loiter, told=_loiter)
+"""Measured from 10.1 m/s: 18 m, below 0.4 m/s after 3.0 s."""
+_BRAKE = Stop(Approach(braking=3.0, gain=0.75), hardest=3.6, ahead=_brake, told=_brake)
+"""Measured from 10.1 m/s: 20.7 m, below 0.4 m/s after 4.6 s; recorded from 4.0 m/s: 7 m, 3.5 s."""
 _AGILITY = Agility(
     acceleration=2.5,
     approach=Approach(braking=1.25, gain=1.0),
-    stop=Approach(braking=3.0, gain=1.0),
+    stop=_LOITER,
+    brake=_BRAKE,
     climb_acceleration=1.1,
     climb_approach=Approach(braking=0.55, gain=1.0),
     takeoff_acceleration=1.2,

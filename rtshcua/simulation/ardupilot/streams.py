@@ -1,10 +1,11 @@
-"""What ArduCopter streams: nothing but the heartbeat until it is asked."""
+"""What ArduCopter streams: nothing but the heartbeat, and its own TIMESYNC, until it is asked."""
 
 from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.frames import Message
+from rtshcua.simulation.ardupilot.targets import position_target
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.mission_telemetry import mission_current
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS
@@ -53,6 +54,11 @@ def _wind(a: Autopilot) -> Message | None:
     return mavlink.MAVLink_wind_message(a.air.from_degrees if a.air.speed else 0.0, a.air.speed, 0.0)
 
 
+def _timesync(a: Autopilot) -> Message:
+    """It asks for the other end's time; its own system id is added to its time, by which it knows the answer."""
+    return mavlink.MAVLink_timesync_message(0, a.now_us * 1000 + a.system)
+
+
 def _autopilot_version(_: Autopilot) -> Message:
     zeros = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0)
@@ -64,9 +70,14 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_WIND: _wind,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target,
+    mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,
 }
 
-DEFAULT: Mapping[int, int] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000}
+DEFAULT: Mapping[int, int] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
+    mavlink.MAVLINK_MSG_ID_TIMESYNC: 10_000_000,
+}
 """The streams that run from boot, and their intervals in microseconds."""
 
 _GROUPS: dict[int, tuple[int, ...]] = {

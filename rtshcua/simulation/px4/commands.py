@@ -62,42 +62,60 @@ def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
     if vehicle.in_air and vehicle.takeoff_up <= vehicle.body.up:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Already higher than takeoff altitude")
         vehicle.set_mode(Mode.LOITER)
+    elif vehicle.mode is Mode.TAKEOFF:
+        vehicle.climb()  # in takeoff already: to the new height
     else:
         vehicle.set_mode(Mode.TAKEOFF)
     return (ACCEPTED,)
 
 
 def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """As `Navigator::run` and `Commander::handle_command` of v1.16 do it. The ACK is for the mode alone.
+
+    Without a place it keeps the target it has, at the height that is given, or here; without a place, a height and a
+    heading it stops ("pause").
+    """
     if whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE == 0:
         return (UNSUPPORTED,)
     if not a.can_enter(Mode.LOITER):
         return (TEMPORARILY_REJECTED,)
     vehicle = a.vehicle
+    kept, taking_off = vehicle.destination, vehicle.mode is Mode.TAKEOFF
     vehicle.set_mode(Mode.LOITER)
     if not vehicle.in_air:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Reposition ignored: not flying")
         return (ACCEPTED,)
-    here = vehicle.target
-    north, east = here.north, here.east
+    here, up = a.here, command.altitude - a.home.amsl_mm / 1000
+    north, east = here.north, here.east  # without a place, the fence is asked about its own
+    placed = command.latitude is not None and command.longitude is not None
     if command.latitude is not None and command.longitude is not None:
         north, east = a.home.local(command.latitude, command.longitude)
-    up = command.altitude - a.home.amsl_mm / 1000
-    target = Point(north, east, up if isfinite(up) else here.up)
-    if not a.fence.allows(target):
+    if not a.fence.allows(Point(north, east, up if isfinite(up) else here.up)):
         a.say(mavlink.MAV_SEVERITY_CRITICAL, "Reposition is outside geofence\t")
         return (ACCEPTED,)
     if command.p1 > 0:
         vehicle.speed = command.p1
-    vehicle.go_to(target)
+    if not placed and not isfinite(up) and not isfinite(command.p4):
+        if taking_off:  # it comes back to where it was, without a braking distance
+            vehicle.go_to(here)
+        else:
+            vehicle.hold()
+        return (ACCEPTED,)
+    if not placed and kept is not None:
+        north, east = kept.north, kept.east
+    vehicle.go_to(Point(north, east, up if isfinite(up) else here.up))
+    if isfinite(command.p4):
+        vehicle.turn_to(command.p4)
     return (ACCEPTED,)
 
 
 def _change_altitude(a: Autopilot, command: Command) -> tuple[int, ...]:
+    """On its way it stops, and climbs there, as recorded."""
     up = command.p1 - a.home.amsl_mm / 1000
     if not isfinite(up) or not a.can_enter(Mode.LOITER):
         return (TEMPORARILY_REJECTED,)
     a.vehicle.set_mode(Mode.LOITER)
-    a.vehicle.go_to(Point(a.vehicle.target.north, a.vehicle.target.east, up))
+    a.vehicle.hold(up)
     return (ACCEPTED,)
 
 
@@ -187,7 +205,7 @@ COMMANDS: Mapping[int, Handler] = {
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval(FAILED, say_why=False),
-    mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(DENIED),
+    mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(DENIED, needs_one=True),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,
     mavlink.MAV_CMD_GET_HOME_POSITION: get_home,
 }

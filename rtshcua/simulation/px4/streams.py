@@ -8,6 +8,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.mavlink.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.mission_telemetry import mission_current
+from rtshcua.simulation.px4.targets import position_target
+from rtshcua.simulation.questions import CURRENT_MODE, current_mode
 from rtshcua.simulation.telemetry import COMMON, LOST_FLAGS
 
 _BOOT_FLAGS, _FIRST_FLAGS, _GOOD_FLAGS = 0x480, 0x0E5, 0x3FF
@@ -53,6 +55,11 @@ def _wind_cov(a: Autopilot) -> Message | None:
     )
 
 
+def _timesync(a: Autopilot) -> Message:
+    """PX4 asks for the other end's time."""
+    return mavlink.MAVLink_timesync_message(0, a.now_us * 1000)
+
+
 def _autopilot_version(_: Autopilot) -> Message:
     zeros = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 1, zeros, zeros, zeros, 0, 0, 1)
@@ -64,7 +71,16 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_WIND_COV: _wind_cov,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target,
+    mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,
+    CURRENT_MODE: current_mode,
 }
+
+CONSTANT = frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT})
+"""HEARTBEAT comes at 1 Hz, whatever is asked for (measured: result 4)."""
+ONLY_STREAMED = frozenset({CURRENT_MODE, mavlink.MAVLINK_MSG_ID_TIMESYNC})
+LEAST_US: Mapping[int, int] = {CURRENT_MODE: 550_000}
+"""Measured: asked for at 10 Hz, it comes at 1.8 Hz."""
 
 DEFAULT: Mapping[int, int] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
@@ -80,5 +96,8 @@ DEFAULT: Mapping[int, int] = {
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: 100_000,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 2_000_000,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 1_000_000,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 100_000,
+    mavlink.MAVLINK_MSG_ID_TIMESYNC: 100_000,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1_000_000,
 }
 """The streams that run from boot, and their intervals in microseconds."""

@@ -60,6 +60,10 @@ class Pilot:
             return self.long(mavlink.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xFF, number >> 24)
         return self.long(mavlink.MAV_CMD_DO_SET_MODE, 1, number)
 
+    def pause(self) -> list[int]:
+        """PX4's DO_REPOSITION without a place, a height and a heading: stop."""
+        return self.long(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, nan, nan, nan, nan)
+
     # ------------------------------------------------------------------------------------------- flying
 
     def ready(self) -> "Pilot":

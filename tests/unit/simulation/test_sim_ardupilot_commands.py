@@ -149,7 +149,61 @@ def test_pause_stops_and_brake_stops(flying: Any) -> None:
         assert flying.truth.speed_mm_s > 4_000
         assert stop() == [0]
         flying.wait(5)
-        assert flying.truth.speed_mm_s < 100
+        assert flying.truth.speed_mm_s < 150
+        assert flying.long(193, 1) == [0 if flying.truth.mode is Mode.GUIDED else 4]
+
+
+def test_a_pause_keeps_mode_and_target_and_what_comes_meanwhile(flying: Any) -> None:
+    flying.long(511, 87, 100_000)
+    flying.go_to(200, 0, 10)
+    flying.wait(5)
+    asked = flying.last("POSITION_TARGET_GLOBAL_INT")
+    assert flying.long(193, 0) == [0]
+    flying.wait(6)
+    assert (flying.truth.mode, flying.truth.speed_mm_s < 150) == (Mode.GUIDED, True)
+    assert flying.last("POSITION_TARGET_GLOBAL_INT").lat_int == asked.lat_int
+    north = flying.truth.north_mm
+    flying.go_to(0, 100, 10)
+    flying.wait(5)
+    assert abs(flying.truth.north_mm - north) < 300, "a target that comes in a pause is not flown to"
+    assert flying.last("POSITION_TARGET_GLOBAL_INT").lat_int != asked.lat_int, "but it is kept"
+    assert flying.long(193, 2) == [2]
+    assert flying.long(193, 1) == [0]
+    flying.wait(5)
+    assert flying.truth.east_mm > 5_000
+
+
+def test_targets_are_told_where_the_mode_has_one(copter: Any) -> None:
+    def told() -> list[Any]:
+        return [f.message for f in copter.wait(1) if f.name == "POSITION_TARGET_GLOBAL_INT"]
+
+    assert copter.long(511, 87, 200_000) == [0]
+    copter.take_off(10)
+    assert not told(), "none in a takeoff"
+    copter.go_to(80, 0, 12)
+    assert len(told()) in (5, 6)
+    target = told()[-1]
+    assert (target.coordinate_frame, target.type_mask) == (0, 0xFDF8)
+    assert target.alt == pytest.approx(copter.config.home.amsl_mm / 1000 + 12, abs=0.01)
+    assert (target.lat_int, target.lon_int) == copter.config.home.globe(80, 0)
+    copter.mode(Mode.LOITER)
+    assert not told(), "none in LOITER"
+    copter.mode(Mode.GUIDED)
+    assert not told(), "none before one is given"
+    copter.mode(Mode.RETURN)
+    assert told()
+    copter.mode(Mode.LAND)
+    assert not told()
+
+
+def test_the_same_mode_again_changes_nothing(flying: Any) -> None:
+    flying.go_to(100, 0, 10)
+    flying.wait(5)
+    assert flying.mode(Mode.GUIDED) == [0]
+    flying.wait(5)
+    assert flying.truth.speed_mm_s > 4_000
+    assert flying.mode(Mode.LOITER) == [0]
+    assert flying.long(17) == [0]
 
 
 def test_set_mode_message_is_acknowledged_with_its_own_number(flying: Any) -> None:
@@ -158,8 +212,12 @@ def test_set_mode_message_is_acknowledged_with_its_own_number(flying: Any) -> No
     assert flying.truth.mode is Mode.LAND
 
 
-def test_nothing_but_the_heartbeat_and_the_radio_unasked(copter: Any) -> None:
-    assert {frame.name for frame in copter.seen} <= {"HEARTBEAT", "RADIO_STATUS"}
+def test_nothing_but_the_heartbeat_its_time_and_the_radio_unasked(copter: Any) -> None:
+    copter.wait(20)
+    assert {frame.name for frame in copter.seen} == {"HEARTBEAT", "RADIO_STATUS", "TIMESYNC"}
+    asked = [frame.message for frame in copter.seen if frame.name == "TIMESYNC"]
+    assert [(m.tc1, m.ts1 % 10) for m in asked] == [(0, 1)] * len(asked)
+    assert len(asked) in (2, 3), "every 10 s, its system id added to its time"
 
 
 def test_data_stream_request_overrides_an_interval(copter: Any) -> None:

@@ -1,6 +1,8 @@
 """What the simulated PX4 answers: the table of a recorded session with the real one (v1.16.0)."""
 
+import struct
 from collections.abc import Callable
+from itertools import pairwise
 from math import nan
 from typing import Any
 
@@ -30,6 +32,11 @@ def flying(px4: Any) -> Any:
         (511, (33, 200_000), [0]),
         (511, (230, 1_000_000), [0]),
         (511, (193, 1_000_000), [4]),  # ArduPilot's estimator message
+        (511, (0, 100_000), [4]),  # the heartbeat's rate is what it is
+        (511, (436, 100_000), [0]),
+        (512, (436,), [2]),
+        (512, (0,), [0]),
+        (512, (87,), [2]),  # nothing to tell yet
         (512, (148,), [0]),
         (512, (242,), [0]),
         (512, (9999,), [2]),
@@ -184,3 +191,153 @@ def test_streams_run_unasked(px4: Any) -> None:
     names = {frame.name for frame in px4.seen}
     assert {"GLOBAL_POSITION_INT", "ESTIMATOR_STATUS", "WIND_COV", "EXTENDED_SYS_STATE", "DISTANCE_SENSOR"} <= names
     assert not {"EKF_STATUS_REPORT", "WIND"} & names
+
+
+def test_the_heartbeat_keeps_its_second_whatever_happens(flying: Any) -> None:
+    flying.wait(0.98)
+    times = []
+    for turn in range(500):
+        if turn == 120:
+            assert flying.long(511, 0, 100_000) == [4]
+        if turn == 170:
+            flying.mode(Mode.LAND)
+        times += [flying.simulation.now_us for frame in flying.wait(0.02) if frame.name == "HEARTBEAT"]
+    assert {after - before for before, after in pairwise(times)} == {1_000_000}
+
+
+def test_asked_for_the_heartbeat_tells_the_new_mode_at_once(flying: Any) -> None:
+    flying.mode(Mode.LAND)
+    asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 0, 0, 0, 0, 0, 0, 0)
+    answers = flying.send(asked)
+    assert [f.name for f in answers] == ["HEARTBEAT", "COMMAND_ACK"]
+    assert answers[0].message.custom_mode == LAND
+
+
+def test_the_current_mode_comes_slower_than_asked(px4: Any) -> None:
+    assert px4.long(511, 436, 100_000) == [0]
+    number = (436).to_bytes(3, "little")
+    datagrams = px4.simulation.advance(px4.simulation.now_us + 20_000_000)
+    told = [d for d in datagrams if d[7:10] == number]
+    assert 34 <= len(told) <= 37
+    assert int.from_bytes(told[-1][10:14], "little") == LOITER
+
+
+def test_the_landed_state_tells_at_once_that_it_lands(flying: Any) -> None:
+    assert flying.long(511, 245, 100_000) == [0]
+    flying.mode(Mode.LAND)
+    states = [f.message.landed_state for f in flying.wait(1) if f.name == "EXTENDED_SYS_STATE"]
+    assert (len(states), set(states)) == (10, {4})
+
+
+def test_the_same_mode_again_does_not_stop_a_reposition(flying: Any) -> None:
+    flying.go_to(150, 0, 10)
+    flying.wait(5)
+    north = flying.truth.north_mm
+    assert flying.mode(Mode.LOITER) == [0, 0]
+    flying.send(mavlink.MAVLink_set_mode_message(1, 1, LOITER))
+    assert flying.long(17) == [0]
+    flying.wait(9)
+    assert flying.truth.speed_mm_s > 4_500
+    assert flying.truth.north_mm - north > 40_000
+
+
+def targets(received: list[Any]) -> list[Any]:
+    return [f.message for f in received if f.name == "POSITION_TARGET_GLOBAL_INT"]
+
+
+NOWHERE = (2**31 - 1, 2**31 - 1, nan)
+
+
+@pytest.mark.parametrize("mode", [Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.LAND, Mode.MISSION])
+@pytest.mark.parametrize("as_int", [False, True])
+def test_a_reposition_without_a_place_stops(flying: Any, mode: Mode, as_int: bool) -> None:
+    def pause() -> list[int]:
+        return flying.int(192, 0, [-1, 1, 0, nan], *NOWHERE) if as_int else flying.pause()
+
+    home = flying.config.home
+    if mode is Mode.MISSION:
+        upload(flying, [(16, 120, 0)])
+        assert flying.long(300) == [0]
+    elif mode is Mode.TAKEOFF:
+        assert flying.long(22, -1, 0, 0, nan, nan, nan, AMSL + 60) == [0]
+    else:
+        flying.go_to(120, 0, 10)
+        flying.wait(8)
+        flying.mode(mode) if mode is not Mode.LOITER else None
+    flying.wait(6 if mode is Mode.MISSION else 2)
+    before = flying.truth
+    assert pause() == [0]
+    target = targets(flying.wait(1))[0]
+    assert flying.truth.mode is Mode.LOITER
+    flying.wait(9)
+    assert flying.truth.speed_mm_s < 150
+    assert abs(flying.truth.climb_mm_s) < 100
+    told = home.local(target.lat_int, target.lon_int)
+    assert abs(flying.truth.north_mm / 1000 - told[0]) < 2.5
+    assert target.alt == pytest.approx(home.amsl_mm / 1000 + before.up_mm / 1000, abs=0.1), "the height of that moment"
+    assert abs(flying.truth.up_mm - before.up_mm) < 300
+
+
+def test_a_reposition_of_height_or_heading_alone_keeps_the_target(flying: Any) -> None:
+    place = flying.config.home.globe(150, 20)
+    flying.go_to(150, 20, 10)
+    flying.wait(4)
+    assert flying.long(192, -1, 1, 0, nan, nan, nan, AMSL + 14) == [0]
+    target = targets(flying.wait(1))[-1]
+    assert (target.lat_int, target.lon_int, target.alt) == (*place, pytest.approx(AMSL + 14, abs=0.01))
+    up = flying.truth.up_mm / 1000
+    assert flying.long(192, -1, 1, 0, 1.0, nan, nan, nan) == [0]
+    target = targets(flying.wait(1))[-1]
+    assert (target.lat_int, target.lon_int, target.alt) == (*place, pytest.approx(AMSL + up, abs=0.2))
+    flying.wait(6)
+    assert flying.last("ATTITUDE").yaw == pytest.approx(1.0, abs=0.05)
+    assert flying.truth.speed_mm_s > 4_500
+
+
+def test_a_pause_outside_the_fence_is_refused_and_it_flies_on(flying: Any) -> None:
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_MAX_HOR_DIST", 30, 9))
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_ACTION", struct.unpack("<f", struct.pack("<i", 1))[0], 6))
+    flying.go_to(25, 0, 10)
+    flying.wait(1)
+    flying.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_MAX_HOR_DIST", 2, 9))
+    flying.wait(3)
+    assert flying.truth.north_mm > 2_000
+    assert flying.pause() == [0]
+    flying.wait(2)
+    assert flying.texts()[-1] == "Reposition is outside geofence\t"
+    flying.wait(8)
+    assert flying.truth.north_mm > 24_000
+
+
+def test_the_target_is_told_in_every_mode_that_has_one(px4: Any) -> None:
+    assert not targets(px4.wait(2)), "none on the ground"
+    px4.take_off(10)
+    home, amsl = px4.config.home, px4.config.home.amsl_mm / 1000
+    first = targets(px4.seen)[0]
+    assert (first.coordinate_frame, first.type_mask, first.alt) == (5, 0, pytest.approx(amsl + 10, abs=0.01))
+    px4.go_to(60, 30, 20)
+    told = targets(px4.wait(5))
+    assert len(told) == 50
+    assert {(m.lat_int, m.lon_int, round(m.alt - amsl)) for m in told} == {(*home.globe(60, 30), 20)}
+    px4.mode(Mode.LAND)
+    assert {m.alt for m in targets(px4.wait(1))} == {0.0}
+    px4.mode(Mode.RETURN)
+    here = (px4.truth.latitude, px4.truth.longitude)
+    climb = targets(px4.wait(1))
+    assert {round(m.alt - amsl) for m in climb} == {30}
+    assert abs(climb[-1].lat_int - here[0]) < 60
+    px4.until(lambda: targets(px4.wait(0.1))[-1].lat_int == home.latitude)
+    assert targets(px4.wait(1))[-1].alt == pytest.approx(amsl + 30, abs=0.01)
+    px4.until(lambda: px4.last("EXTENDED_SYS_STATE").landed_state == 4)
+    assert targets(px4.wait(1))[-1].alt == pytest.approx(amsl, abs=0.01)
+    px4.until(lambda: not px4.truth.armed)
+    px4.wait(0.5)
+    assert not targets(px4.wait(1))
+
+
+def upload(px4: Any, items: list[tuple[int, float, float]]) -> None:
+    px4.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
+    for number, (command, north, east) in enumerate(items):
+        place = px4.config.home.globe(north, east)
+        px4.send(mavlink.MAVLink_mission_item_int_message(1, 1, number, 6, command, 0, 1, 0, 0, 0, nan, *place, 10, 0))
+    px4.wait(0.5)

@@ -33,12 +33,15 @@ PX4 = SimulationConfig(
 
 LANDING = "the height of its simulator strays by half a metre on the ground, which keeps the landing from being noticed"
 LIFTED = "the reposition on the ground begins to fly there before the takeoff takes over; here it lifts straight up"
+AHEAD = "it sets off 0.3 s later and is 2 m behind; here the orbit crosses the fence before a heartbeat tells of it"
 STICK = "the throttle stick of its simulator is down: in LOITER it sinks; here no stick is held"
 CURVE = "legs of a mission begin and end with less jerk than anything in GUIDED; here both alike"
 
 YAW = "text '6 EKF# IMU# MAG# in-flight yaw alignment complete', time"
 KEPT: Mapping[str, Mapping[str, str]] = {
     "px4-commands": {
+        "mode (16973824, True), time 1": AHEAD,
+        "mode (50593792, True), time 4": AHEAD,
         "mode (50593792, False), time 4": LANDING,
         "mode (50593792, False), time 4 here": LANDING,
         "landed 1, time 2": LANDING,
@@ -56,7 +59,7 @@ KEPT: Mapping[str, Mapping[str, str]] = {
         f"{YAW} 2": "the compass is not simulated",
         "text '6 Mission: # WP', time 1 here": CURVE,
         "height from 110 s": STICK,
-        "place from 123 s": CURVE,
+        "place from 124 s": CURVE,
     },
     "arducopter-signing": {},
 }

@@ -93,6 +93,8 @@ def test_stream_rates_of_px4(pilot: Callable[..., Any]) -> None:
         "DISTANCE_SENSOR": 10,
         "HOME_POSITION": 0.5,
         "MISSION_CURRENT": 1,
+        "SYSTEM_TIME": 1,
+        "TIMESYNC": 10,
         "RADIO_STATUS": 1,
     }
 

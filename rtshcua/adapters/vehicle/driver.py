@@ -251,7 +251,7 @@ class Driver:
             return
         self._watch.answered()
         if message.command == messages.SET_INTERVAL:
-            self._streams.answered(message.result == 0)
+            self._streams.answered(message.result == 0, now_us)
         else:
             self._commander.acknowledge(message.command, message.result, self._seen.up_us)
 

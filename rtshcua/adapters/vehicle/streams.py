@@ -2,12 +2,15 @@
 vehicle has none such.
 """
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.flavour import Message
 
-ANSWER_US = 500_000  # how long one request waits for its acknowledgement
+#: How long one request waits for its acknowledgement; twice as long after each that came to nothing, up to the latter.
+ANSWER_US = 500_000
+LATEST_US = 4_000_000
 QUIET_US = 3_000_000  # a stream that is silent for so long is asked for again
 #: Readiness waits no longer than this for what is needed; and for what the autopilot itself does not have, but somebody
 #: else may send (RADIO_STATUS comes from the radio).
@@ -49,6 +52,8 @@ class Streams:
         self._heard_us: dict[str, int] = {}
         self._asking: str | None = None
         self._asked_us = self._looked_us = 0
+        self._answer_us = ANSWER_US
+        self._late_us: deque[int] = deque()  # when requests were given up whose answers may come yet
         self._since_us: int | None = None
         self._counts = dict.fromkeys(self._wanted, 0)
         self._measured_us: int | None = None
@@ -61,8 +66,13 @@ class Streams:
         if name in self._counts:
             self._counts[name] += 1
 
-    def answered(self, accepted: bool) -> None:
-        """The outstanding request was acknowledged."""
+    def answered(self, accepted: bool, now_us: int) -> None:
+        """A request was acknowledged. An acknowledgement does not say of which message it is."""
+        while self._late_us and now_us - self._late_us[0] > LATEST_US:
+            self._late_us.popleft()
+        if self._late_us:  # of an earlier one, then: a refusal must not be taken for one of what is asked now
+            self._late_us.popleft()
+            return
         if self._asking is not None:
             if not accepted:
                 self._refused.add(self._asking)
@@ -73,10 +83,12 @@ class Streams:
         if self._since_us is None:
             self._since_us = now_us
         if self._asking is not None:
-            if now_us - self._asked_us < ANSWER_US:
+            if now_us - self._asked_us < self._answer_us:
                 return []
             self._queue.append(self._asking)
             self._asking = None
+            self._late_us.append(now_us)
+            self._answer_us = min(2 * self._answer_us, LATEST_US)
         if not self._queue:
             self._measure(now_us)
             if now_us - self._looked_us >= ANSWER_US:

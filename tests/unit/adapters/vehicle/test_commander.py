@@ -97,7 +97,7 @@ class Link:
                     self.streams.heard(name, self.now_us)
             for message in self.streams.due(1, self.now_us):
                 self.asked.append(self.name(message))
-                self.streams.answered(True)
+                self.streams.answered(True, self.now_us)
         return self.asked[before:]
 
     @staticmethod

@@ -24,11 +24,12 @@ class Event(Enum):
     TOUCHED = auto()
     LANDED = auto()
     AUTO_DISARMED = auto()
+    TIPPED = auto()
     CRASHED = auto()
 
 
 class Activity(Enum):
-    """What it does at present; `REST` is to stand on the ground, `TOUCHED` not to know it yet."""
+    """What it does at present; `REST` is to stand on the ground, `TOUCHED` not to know it yet, `WRECK` to lie there."""
 
     REST = auto()
     CLIMB = auto()
@@ -40,3 +41,4 @@ class Activity(Enum):
     DESCEND = auto()
     TOUCHED = auto()
     FALL = auto()
+    WRECK = auto()

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from random import Random
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -22,6 +23,7 @@ from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
 from rtshcua.simulation.parameters import Parameter, Parameters
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plan import MISSION, Item, Plans
+from rtshcua.simulation.reports import Reports
 from rtshcua.simulation.sensors import Sensors
 from rtshcua.simulation.signing import VehicleSigning
 from rtshcua.simulation.streams import Streams
@@ -104,6 +106,8 @@ class Flavour:
     """Does what the fence's action asks for when a breach begins."""
     on_mode_in_breach: Callable[["Autopilot"], None]
     on_breach_cleared: Callable[["Autopilot"], None]
+    on_sticks: Callable[["Autopilot", int], None]
+    """Obeys sticks that steer it east for so many microseconds, or does not mind."""
     target_timeout_us: int | None
     """In GUIDED, how long one position target is good for; then LOITER."""
     tells_fence: bool
@@ -141,6 +145,7 @@ class Autopilot:
             flavour.failsafes, self.vehicle, self.sensors, self.battery, self.parameters.value, self.say
         )
         self.streams = Streams(flavour.streams)
+        self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()})
         self.signing = VehicleSigning(config.signing_key, config.usb, config.utc_us, config.speed)
         self.plans = Plans()
         if flavour.home_item is not None:
@@ -185,7 +190,7 @@ class Autopilot:
                 self.say(mavlink.MAV_SEVERITY_INFO, flavour.texts[event].format(**facts))
         vehicle.events.clear()
         if flavour.beats_on_mode and vehicle.mode is not self._told_mode:
-            self.send(flavour.builders[mavlink.MAVLINK_MSG_ID_HEARTBEAT](self))
+            self.send(self.reports.message(mavlink.MAVLINK_MSG_ID_HEARTBEAT))
         self._told_mode = vehicle.mode
         if vehicle.armed or not flavour.reminds:
             self._remind_us = self.now_us + _REMIND_FIRST_US

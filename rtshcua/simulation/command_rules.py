@@ -28,10 +28,11 @@ def request_message(refused: int, needs_one: bool) -> Handler:
     def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
         if whole(command.p1) == AVAILABLE_MODES:
             return (ACCEPTED if available_modes(a, whole(command.p2)) else refused,)
-        build = a.flavour.builders.get(whole(command.p1))
-        message = None if build is None or whole(command.p1) in a.flavour.only_streamed else build(a)
+        number = whole(command.p1)
+        known = number in a.reports and number not in a.flavour.only_streamed
+        message = a.reports.message(number) if known else None
         a.send(message)
-        return (refused if message is None and (build is None or needs_one) else ACCEPTED,)
+        return (ACCEPTED if message is not None or (known and not needs_one) else refused,)
 
     return handle
 

@@ -45,12 +45,15 @@ class Face:
         """The frames to send now: streams that are due, and what happened since."""
         autopilot = self._autopilot
         for number in autopilot.streams.due(autopilot.now_us):
-            autopilot.send(autopilot.flavour.builders[number](autopilot))
-        frames = self._collect()
-        if autopilot.now_us >= self._radio_due_us:
-            self._radio_due_us = autopilot.now_us + _RADIO_INTERVAL_US
-            frames.append(self._radio.pack(radio_status(autopilot)))
-        return frames
+            autopilot.send(autopilot.reports.message(number))
+        return self._collect()
+
+    def radio_due(self, now_us: int) -> list[bytes]:
+        """The frames that the radio sends now, by the world's time: it runs on while the autopilot's loop halts."""
+        if now_us < self._radio_due_us:
+            return []
+        self._radio_due_us = now_us + _RADIO_INTERVAL_US
+        return [self._radio.pack(radio_status(self._autopilot))]
 
     def _is_for_me(self, message: Message) -> bool:
         system = getattr(message, "target_system", 0)

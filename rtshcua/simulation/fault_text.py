@@ -6,20 +6,31 @@ from dataclasses import MISSING, Field, fields
 from decimal import Decimal
 from typing import Any
 
+from rtshcua.simulation.effects import message_number
 from rtshcua.simulation.faults import (
     BatteryLevel,
     BatteryVoltage,
     Fault,
+    Freeze,
     GpsGlitch,
     GpsJump,
     GpsLoss,
+    Kill,
     LinkDelay,
+    LinkJitter,
     LinkLoss,
     LinkQuality,
+    LinkReorder,
     LinkSilence,
+    MessageSilence,
     Obstacle,
     Pillar,
+    PilotGoto,
     PilotMode,
+    PilotPause,
+    PilotSticks,
+    Stall,
+    Way,
     WindStep,
 )
 from rtshcua.simulation.modes import Mode
@@ -32,12 +43,22 @@ KINDS: Mapping[str, type[Fault]] = {
     "gps-glitch": GpsGlitch,
     "wind": WindStep,
     "link-delay": LinkDelay,
+    "link-jitter": LinkJitter,
+    "link-reorder": LinkReorder,
     "link-loss": LinkLoss,
     "link-silence": LinkSilence,
     "link-quality": LinkQuality,
     "obstacle": Obstacle,
     "pillar": Pillar,
     "pilot": PilotMode,
+    "pilot-mode": PilotMode,
+    "pilot-pause": PilotPause,
+    "pilot-goto": PilotGoto,
+    "pilot-sticks": PilotSticks,
+    "kill": Kill,
+    "stall": Stall,
+    "freeze": Freeze,
+    "mute": MessageSilence,
 }
 
 # How a field's name ends tells its unit; what may be written, and how many of the field's unit it is.
@@ -49,6 +70,7 @@ _UNITS: tuple[tuple[str, Mapping[str, int]], ...] = (
     ("_deg", {"deg": 1}),
     ("", {"%": 100}),
 )
+_WORDS: Mapping[str, type[Mode | Way]] = {"mode": Mode, "way": Way}
 _QUANTITY = re.compile(r"(-?\d+(?:\.\d+)?)(\D*)", re.ASCII)
 
 
@@ -79,11 +101,22 @@ def _key(field: Field[Any]) -> str:
     return field.name.removesuffix(_suffix(field)[0])
 
 
-def _value(field: Field[Any], text: str) -> int | Mode:
-    if field.name == "mode":
-        if text not in {mode.value for mode in Mode}:
-            raise ValueError(f"no such mode: `{text}`; there are {', '.join(Mode)}")
-        return Mode(text)
+def _value(field: Field[Any], text: str) -> int | str:
+    if field.name in _WORDS:
+        if text not in list(_WORDS[field.name]):
+            raise ValueError(f"no such {field.name}: `{text}`; there are {', '.join(_WORDS[field.name])}")
+        return _WORDS[field.name](text)
+    if field.name == "held":
+        if text not in ("yes", "no"):
+            raise ValueError(f"`held` is yes or no, not `{text}`")
+        return text == "yes"
+    if field.name == "shuffle":
+        if not text.isdecimal():
+            raise ValueError(f"`shuffle` is the seed of an order, not `{text}`")
+        return int(text)
+    if field.name == "message":
+        message_number(text)
+        return text
     match = _QUANTITY.fullmatch(text)
     units = _suffix(field)[1]
     if match is None or match[2] not in units:

@@ -1,6 +1,7 @@
 """What can be made to go wrong. `at_us` is the simulation's time, from its start; `for_us` None means for good."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from rtshcua.simulation.modes import Mode
 
@@ -58,27 +59,93 @@ class WindStep:
     gust_mm_s: int = 0
 
 
+class Way(StrEnum):
+    """A direction of the link."""
+
+    BOTH = "both"
+    UP = "up"
+    """To the vehicle."""
+    DOWN = "down"
+    """From the vehicle."""
+
+
 @dataclass(frozen=True, slots=True)
 class LinkDelay:
-    """Every datagram takes this much longer, in both directions."""
+    """Every datagram takes this much longer."""
 
     at_us: int
     delay_us: int
+    for_us: int | None = None
+    way: Way = Way.BOTH
+
+
+@dataclass(frozen=True, slots=True)
+class LinkJitter:
+    """Every datagram takes up to this much longer, each another time; none overtakes another."""
+
+    at_us: int
+    jitter_us: int
+    for_us: int | None = None
+    way: Way = Way.BOTH
+
+
+@dataclass(frozen=True, slots=True)
+class LinkReorder:
+    """This part of the datagrams, in 1/10000, is overtaken by those that are sent in the 60 ms after."""
+
+    at_us: int
+    part: int
+    for_us: int | None = None
+    way: Way = Way.BOTH
 
 
 @dataclass(frozen=True, slots=True)
 class LinkLoss:
-    """This part of the datagrams, in 1/10000, is lost in each direction; RADIO_STATUS tells."""
+    """This part of the datagrams, in 1/10000, is lost; RADIO_STATUS tells."""
 
     at_us: int
     loss: int
+    for_us: int | None = None
+    way: Way = Way.BOTH
 
 
 @dataclass(frozen=True, slots=True)
 class LinkSilence:
-    """Nothing gets through, in either direction."""
+    """Nothing gets through: it is lost, or `held` back until the silence is over and comes in one burst."""
 
     at_us: int
+    for_us: int | None = None
+    way: Way = Way.BOTH
+    held: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """The autopilot's loop halts: its time and its flight stand still, as recorded (arducopter-dropout).
+
+    What was sent meanwhile waits and is answered in one burst. With a `shuffle` other than 0, what it says in the first
+    200 ms after comes at once at their end, in an order that is drawn from that seed.
+    """
+
+    at_us: int
+    for_us: int
+    shuffle: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Freeze:
+    """The measurements stand still at their source: messages go on with old values and old time stamps."""
+
+    at_us: int
+    for_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MessageSilence:
+    """One message of the autopilot, by its MAVLink name, does not come any more."""
+
+    at_us: int
+    message: str
     for_us: int | None = None
 
 
@@ -122,6 +189,52 @@ class PilotMode:
     mode: Mode = Mode.POSITION
 
 
+@dataclass(frozen=True, slots=True)
+class PilotPause:
+    """The pilot stops it from a ground station, and the mode does not change.
+
+    PX4: DO_REPOSITION without a place. ArduCopter: DO_PAUSE_CONTINUE, which has an effect in GUIDED only.
+    """
+
+    at_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class PilotGoto:
+    """The pilot sends it elsewhere from a ground station, with DO_REPOSITION; the place and height are from home.
+
+    PX4: the mode is Hold, as for a target of ours. ArduCopter: GUIDED, likewise.
+    """
+
+    at_us: int
+    north_mm: int
+    east_mm: int
+    up_mm: int
+
+
+@dataclass(frozen=True, slots=True)
+class PilotSticks:
+    """The pilot moves the sticks of the remote control for a while, to steer it east.
+
+    PX4 leaves every automatic mode for Position (COM_RC_OVERRIDE, bit 0, on by default; bit 1, for OFFBOARD, is off).
+    ArduCopter does not mind in GUIDED, AUTO and BRAKE; while it lands it is moved aside at up to 1.25 m/s
+    (LAND_REPOSITION, on by default; `land_run_horizontal_control`), and in LOITER and POSHOLD too.
+    """
+
+    at_us: int
+    for_us: int = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Kill:
+    """The motors stop, wherever it is: disarmed by force. In the air it falls."""
+
+    at_us: int
+
+
+LinkFault = LinkDelay | LinkJitter | LinkReorder | LinkLoss | LinkSilence | LinkQuality
+PilotFault = PilotMode | PilotPause | PilotGoto | PilotSticks | Kill
+AutopilotFault = Stall | Freeze | MessageSilence
 Fault = (
     BatteryLevel
     | GpsLoss
@@ -129,11 +242,9 @@ Fault = (
     | GpsGlitch
     | BatteryVoltage
     | WindStep
-    | LinkDelay
-    | LinkLoss
-    | LinkSilence
-    | LinkQuality
     | Obstacle
     | Pillar
-    | PilotMode
+    | LinkFault
+    | PilotFault
+    | AutopilotFault
 )

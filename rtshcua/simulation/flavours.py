@@ -17,6 +17,7 @@ from rtshcua.simulation.ardupilot import signing as ardupilot_signing
 from rtshcua.simulation.ardupilot import streams as ardupilot_streams
 from rtshcua.simulation.autopilot import Flavour
 from rtshcua.simulation.config import Kind
+from rtshcua.simulation.pilot import copter_sticks, px4_sticks
 from rtshcua.simulation.px4 import arming as px4_arming
 from rtshcua.simulation.px4 import boot as px4_boot
 from rtshcua.simulation.px4 import commands as px4_commands
@@ -62,7 +63,7 @@ FLAVOURS: Mapping[Kind, Flavour] = {
             Event.RETURN_CLIMB: "RTL: start return at {amsl} m ({up} m above destination)\t",
             Event.HOME: "RTL: land at destination\t",
             Event.LANDED: "Landing detected\t",
-            Event.CRASHED: "Attitude failure detected, disarming\t",
+            Event.TIPPED: "Attitude failure detected\t",
             Event.AUTO_DISARMED: "Disarmed by landing\t",
         },
         boot=px4_boot.BOOT,
@@ -73,6 +74,7 @@ FLAVOURS: Mapping[Kind, Flavour] = {
         texts_need_ground_station=True,
         beats_on_mode=False,
         reminds=False,
+        on_sticks=px4_sticks,
         target_timeout_us=1_000_000,
         tells_fence=False,
     ),
@@ -116,6 +118,7 @@ FLAVOURS: Mapping[Kind, Flavour] = {
         texts_need_ground_station=False,
         beats_on_mode=True,
         reminds=True,
+        on_sticks=copter_sticks,
         target_timeout_us=None,
         tells_fence=True,
     ),

@@ -12,6 +12,7 @@ from rtshcua.simulation.place import Point
 
 _FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
 
+_DOWN = frozenset({Activity.REST, Activity.TOUCHED, Activity.WRECK})
 _STEADY = frozenset({Activity.TRACK, Activity.DESCEND, Activity.CIRCLE})
 """Activities that go on until something else is asked for, or the ground comes."""
 
@@ -45,13 +46,18 @@ class Flight(ABC):
 
     @property
     def in_air(self) -> bool:
-        """Whether it has left the ground."""
+        """Whether it has left the ground, and does not know that it came down."""
         return self._activity is not Activity.REST
 
     @property
     def flies(self) -> bool:
         """Whether it is in the air and obeys."""
-        return self._activity is not Activity.REST and self._activity is not Activity.FALL
+        return self._activity not in (Activity.REST, Activity.FALL, Activity.WRECK)
+
+    @property
+    def lies(self) -> bool:
+        """Whether it lies on the ground as it came down."""
+        return self._activity is Activity.WRECK
 
     @property
     def descends(self) -> bool:
@@ -78,7 +84,7 @@ class Flight(ABC):
         Returns the load on the battery, hovering being 1.
         """
         activity, body = self._activity, self.body
-        if activity is Activity.REST or activity is Activity.TOUCHED:
+        if activity in _DOWN:
             self._stand(dt)
             return battery.IDLE if self.armed else battery.REST
         if not powered:

@@ -57,6 +57,11 @@ class Ground:
         self._for_s = 0.0
         return True
 
+    def has_lain(self, dt: float, seconds: float) -> bool:
+        """Lets `dt` seconds pass after a crash; whether so many have."""
+        self._for_s += dt
+        return self._for_s >= seconds
+
     def has_done(self, dt: float, landing: bool) -> bool:
         """Lets `dt` seconds pass while it stands armed; whether it is to disarm, sooner after a flight or `landing`."""
         self._for_s += dt

@@ -64,5 +64,7 @@ class Handling:
     """Whether another mode flies at the cruise speed again."""
     lifts_to_targets: bool = False
     """Whether a target makes it lift off when it stands armed."""
+    crash_disarm_s: float | None = None
+    """How long it lies after a crash until it disarms; never if None."""
     comes_back: bool = False
     """Whether it comes back to where it was when it was told to return (the place), or to hold (the height)."""

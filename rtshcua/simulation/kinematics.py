@@ -5,7 +5,7 @@ no further than it may lean, and learns from where it drifts how much it must le
 """
 
 from dataclasses import dataclass
-from math import atan, atan2, cos, hypot, pi, sin, sqrt, tan
+from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
 
 GRAVITY = 9.80665
 MAX_AIRSPEED = 18.0
@@ -25,6 +25,8 @@ _FOLLOW = 2.0
 """Acceleration asked for by speed that is missing, 1/s."""
 MAX_FALL = 15.0
 YAW_RATE = pi / 2
+TUMBLE_RATE, TIPPED = pi, 80 * pi / 180
+"""How fast what falls tips over, and how far: it comes to lie on its side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +108,8 @@ class Body:
         return sqrt((GRAVITY + self.a_up) ** 2 + self.lean_north**2 + self.lean_east**2) / GRAVITY
 
     def fall(self, dt: float) -> None:
-        """One step without thrust."""
+        """One step without thrust; it tips over."""
+        self.roll += copysign(min(TUMBLE_RATE * dt, max(0.0, TIPPED - abs(self.roll))), self.roll)
         self.a_up = max(-GRAVITY, (-MAX_FALL - self.v_up) / dt)
         self._move(dt, 0.0, 0.0)
         self._rise(dt)
@@ -115,9 +118,11 @@ class Body:
         """What it flew into stops it."""
         self.v_north = self.v_east = self.lean_north = self.lean_east = 0.0
 
-    def stop(self) -> None:
-        """Standing on the ground."""
-        self.up = self.v_north = self.v_east = self.v_up = self.roll = self.pitch = self.a_up = 0.0
+    def stop(self, upright: bool = True) -> None:
+        """Standing on the ground, or lying there as it came down."""
+        self.up = self.v_north = self.v_east = self.v_up = self.a_up = 0.0
+        if upright:
+            self.roll = self.pitch = 0.0
         self.lean_north = self.lean_east = self._trim_north = self._trim_east = 0.0
 
     def turn(self, dt: float, yaw: float) -> None:

@@ -1,29 +1,67 @@
-"""One direction of the link: what is sent arrives later, or not at all."""
+"""One direction of the link: what is sent arrives later, in another order, or not at all."""
 
-from collections import deque
+from heapq import heappop, heappush
+from itertools import count
 from random import Random
+
+OVERTAKEN_US = 60_000
+"""How much later than the rest a datagram comes that others overtake."""
 
 
 class Link:
-    """Datagrams in the order they were sent, with a delay, a loss and a switch for silence."""
+    """Datagrams in the order they were sent, but for what faults ask for. Chance decides, from a seeded source."""
 
     def __init__(self, chance: Random) -> None:
         self.delay_us = 0
+        self.jitter_us = 0
+        """Each datagram takes up to this much longer; those behind it wait, as on a serial line."""
         self.loss = 0
-        """In 1/10000."""
+        """The part that is lost, in 1/10000."""
+        self.reordered = 0
+        """The part that others overtake, in 1/10000."""
         self.silent = False
+        """Whether everything is lost."""
+        self.held = False
+        """Whether everything waits: it comes in one burst, later."""
         self._chance = chance
-        self._under_way: deque[tuple[int, bytes]] = deque()
+        self._order = count()
+        self._free_us = 0
+        self._under_way: list[tuple[int, int, bytes]] = []
+        self._waiting: list[bytes] = []
 
     def send(self, datagram: bytes, now_us: int) -> None:
         """Puts a datagram on its way."""
-        if self.silent or (self.loss and self._chance.randrange(10_000) < self.loss):
+        if self.silent or self._happens(self.loss):
             return
-        self._under_way.append((now_us + self.delay_us, datagram))
+        if self.held:
+            self._waiting.append(datagram)
+        else:
+            self._launch(datagram, now_us)
+
+    def _launch(self, datagram: bytes, now_us: int) -> None:
+        jitter_us = self._chance.randrange(self.jitter_us + 1) if self.jitter_us else 0
+        at_us = max(now_us + self.delay_us + jitter_us, self._free_us)
+        if self._happens(self.reordered):
+            at_us += OVERTAKEN_US
+        else:
+            self._free_us = at_us
+        heappush(self._under_way, (at_us, next(self._order), datagram))
+
+    def release(self, now_us: int, shuffle: Random | None = None) -> None:
+        """Sends what waited, in another order if it is to be shuffled."""
+        self.held = False
+        waited, self._waiting = self._waiting, []
+        if shuffle is not None:
+            shuffle.shuffle(waited)
+        for datagram in waited:
+            self._launch(datagram, now_us)
 
     def due(self, now_us: int) -> list[bytes]:
-        """What has arrived by now. None overtakes another, as on a serial line."""
+        """What has arrived by now."""
         arrived = []
         while self._under_way and self._under_way[0][0] <= now_us:
-            arrived.append(self._under_way.popleft()[1])
+            arrived.append(heappop(self._under_way)[2])
         return arrived
+
+    def _happens(self, part: int) -> bool:
+        return part > 0 and self._chance.randrange(10_000) < part

@@ -10,6 +10,9 @@ from rtshcua.simulation.handling import Handling
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 
+_HARD_M_S = 4.0
+"""Who comes down faster than this breaks."""
+
 
 class Vehicle(Flight):
     """A multirotor on the ground at home, disarmed."""
@@ -39,7 +42,7 @@ class Vehicle(Flight):
         self.takeoff_up = None
         self.destination, self.sent, self.paused = None, False, False
         self._ground.stay()
-        if self._activity in (Activity.REST, Activity.TOUCHED):
+        if self._activity in (Activity.REST, Activity.TOUCHED, Activity.WRECK):
             self._activity, self.landed = Activity.REST, Landed.ON_GROUND
         else:
             self._activity = Activity.FALL
@@ -48,10 +51,10 @@ class Vehicle(Flight):
             self.mode = self.handling.after_landing
 
     def crash(self) -> None:
-        """Has flown into something: it falls, and the motors are off."""
-        if self.armed:
+        """Has flown into something: it falls. The motors are on, for all that the autopilot knows."""
+        if not self.crashed:
             self.crashed = True
-            self.disarm(Event.CRASHED)
+            self._activity = Activity.FALL
             self.body.crash()
 
     def set_mode(self, mode: Mode) -> None:
@@ -97,8 +100,9 @@ class Vehicle(Flight):
 
     def _lift(self, target: Point) -> None:
         """Runs up the motors; when they carry, it flies to `target`, straight up first if that is a takeoff."""
-        self.target = self.destination = target
-        self._ground.run_up()
+        if not self.crashed:
+            self.target = self.destination = target
+            self._ground.run_up()
 
     def hold(self, up: float | None = None) -> None:
         """Stops as soon as it can and stays there, or goes to another height."""
@@ -156,6 +160,11 @@ class Vehicle(Flight):
         elif self.armed and not self.in_air and self.handling.lifts_to_targets and target.up > self.body.up:
             self._lift(target)
 
+    def shift_east(self, metres: float) -> None:
+        """Moves the place that it holds, or lands at."""
+        if self.flies:
+            self.target = Point(self.target.north, self.target.east + metres, self.target.up)
+
     def circle(self, centre: Point, radius: float) -> None:
         """Flies around a place, clockwise seen from above if the radius is positive, until told otherwise."""
         if self.flies:
@@ -171,6 +180,10 @@ class Vehicle(Flight):
                 self._activity = Activity.REST
                 self.landed = Landed.ON_GROUND
                 self.events.append(Event.LANDED)
+        elif self._activity is Activity.WRECK:
+            after_s = self.handling.crash_disarm_s
+            if self.armed and after_s is not None and self._ground.has_lain(dt, after_s):
+                self.disarm(Event.CRASHED)
         elif self._ground.lifting:
             if self._ground.lifts_off(dt):
                 self._lift_off()
@@ -186,9 +199,13 @@ class Vehicle(Flight):
 
     def _touch_down(self) -> None:
         self.touched_m_s = -self.body.v_up
-        self.body.stop()
-        self.events.append(Event.TOUCHED)
-        self._activity = Activity.TOUCHED if self.armed else Activity.REST
+        self.crashed = self.crashed or self.touched_m_s > _HARD_M_S
+        self.body.stop(upright=not self.crashed)
+        self.events += [Event.TOUCHED, Event.TIPPED] if self.crashed and self.armed else [Event.TOUCHED]
+        if not self.armed:
+            self._activity = Activity.REST
+        else:
+            self._activity = Activity.WRECK if self.crashed else Activity.TOUCHED
         self.landed = self.landed if self.armed else Landed.ON_GROUND
         self._ground.touch()
         self.blind = False

@@ -13,11 +13,12 @@ from random import Random
 
 from rtshcua.simulation.autopilot import TICK_US, Autopilot
 from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.effects import effects
+from rtshcua.simulation.effects import Affected, effects
 from rtshcua.simulation.face import Face
 from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.flavours import FLAVOURS
 from rtshcua.simulation.link import Link
+from rtshcua.simulation.loop import Loop
 from rtshcua.simulation.modes import Mode
 
 
@@ -37,7 +38,7 @@ class Truth:
     mode: Mode
     battery: int
     crashed: bool
-    """Whether it flew into something."""
+    """Whether it flew into something, or came down too hard."""
 
 
 class Simulation:
@@ -45,6 +46,7 @@ class Simulation:
 
     def __init__(self, config: SimulationConfig) -> None:
         self._autopilot = Autopilot(FLAVOURS[config.flavour], config)
+        self._loop = Loop(self._autopilot)
         self._face = Face(self._autopilot, config.system)
         self._up = Link(Random(f"{config.seed} uplink"))
         self._down = Link(Random(f"{config.seed} downlink"))
@@ -66,13 +68,14 @@ class Simulation:
 
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
-        autopilot = self._autopilot
-        while autopilot.now_us + TICK_US <= to_us:
-            at_us = autopilot.now_us + TICK_US
+        loop = self._loop
+        while loop.now_us + TICK_US <= to_us:
+            at_us = loop.now_us + TICK_US
             self._happen(at_us)
             self._deliver(at_us)
-            autopilot.tick()
-            for frame in self._face.due():
+            loop.tick()
+            due = [] if loop.halted else self._face.due()
+            for frame in due + self._face.radio_due(at_us):
                 self._down.send(frame, at_us)
         self._now_us = max(self._now_us, to_us)
         return self._down.due(self._now_us)
@@ -89,7 +92,7 @@ class Simulation:
 
     def inject(self, fault: Fault) -> None:
         """Adds a fault; one whose time is over happens at the next tick."""
-        for at_us, effect in effects(fault, self._autopilot, (self._up, self._down)):
+        for at_us, effect in effects(fault, Affected(self._autopilot, self._up, self._down, self._loop)):
             heappush(self._events, (at_us, next(self._order), effect))
 
     def truth(self) -> Truth:
@@ -104,14 +107,14 @@ class Simulation:
             round(body.v_up * 1000),
             *self._autopilot.home.globe(body.north, body.east),
             vehicle.armed,
-            vehicle.in_air,
+            vehicle.in_air and not vehicle.lies,
             vehicle.mode,
             round(self._autopilot.battery.level * 10_000),
             vehicle.crashed,
         )
 
     def _deliver(self, now_us: int) -> None:
-        for datagram in self._up.due(now_us):
+        for datagram in [] if self._loop.halted else self._up.due(now_us):
             for frame in self._face.handle(datagram):
                 self._down.send(frame, now_us)
 

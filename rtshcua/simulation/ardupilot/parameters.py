@@ -85,4 +85,5 @@ def handling(config: SimulationConfig) -> Handling:
         takeoff_up=2.5,
         landed_disarm_s=0.3,
         forgets_speed=True,
+        crash_disarm_s=2.0,  # CRASH_CHECK_TRIGGER_SEC of crash_check.cpp
     )

@@ -7,6 +7,8 @@ from rtshcua.simulation.modes import NEEDS_POSITION
 def reasons(a: Autopilot) -> tuple[str, ...]:
     """Why it would not arm, the mode apart; none if it would."""
     found = []
+    if a.vehicle.crashed:
+        found.append("Attitude failure (roll)")
     if not a.sensors.consistent:
         found.append("system is starting up")
     if a.vehicle.mode in NEEDS_POSITION and not a.sensors.has_position:

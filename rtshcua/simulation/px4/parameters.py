@@ -87,6 +87,8 @@ def handling(config: SimulationConfig) -> Handling:
         land_below=5.0,
         return_up=config.return_mm / 1000,
         takeoff_up=2.5,
+        # a failure of attitude is only warned of after the takeoff, unless CBRK_FLIGHTTERM is changed (failsafe.cpp)
+        crash_disarm_s=None,
         after_takeoff=Mode.LOITER,
         after_landing=Mode.LOITER,
         lifts_to_targets=True,

@@ -78,15 +78,35 @@ def test_the_vehicle_sees_what_it_flies_towards(pilot: Callable[..., Any], flavo
     assert p.last("DISTANCE_SENSOR").current_distance == 4_000, "it points home now"
 
 
-def test_who_flies_into_it_crashes(pilot: Callable[..., Any], flavour: str) -> None:
+def test_who_flies_into_it_falls_and_lies_there_tilted(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, faults=(Standing(0, 30_000, 0, 2_000, 30_000),))
-    p.take_off(10)
-    p.go_to(60, 0, 10)
-    p.until(lambda: not p.truth.armed, seconds=30)
-    p.wait(3)
-    assert (p.truth.crashed, p.truth.up_mm, p.truth.in_air) == (True, 0, False)
+    for number in (30, 33, 245):
+        p.long(511, number, 50_000)
+    p.take_off(20)
+    p.go_to(60, 0, 20)
+    p.until(lambda: p.truth.crashed, seconds=30)
+    p.until(lambda: p.truth.up_mm == 0, seconds=10)
+    p.wait(1)
+    fall = max(f.message.vz for f in p.seen if f.name == "GLOBAL_POSITION_INT")
+    assert fall > 1_000, "it comes down fast"
+    assert abs(p.last("ATTITUDE").roll) > 1.2
     assert 27_000 < p.truth.north_mm < 29_000
-    assert any("disarming" in text.lower() for text in p.texts())
+    # neither knows at once: it is still armed, in the air and in its mode
+    assert (p.truth.armed, p.truth.in_air, p.last("EXTENDED_SYS_STATE").landed_state) == (True, False, 2)
+    p.wait(2)
+    if p.px4:  # and PX4 never does: its failure detector only warns, CBRK_FLIGHTTERM being what it is
+        assert p.texts()[-1] == "Attitude failure detected\t"
+        p.wait(60)
+        assert p.last("EXTENDED_SYS_STATE").landed_state == 2
+        assert p.truth.armed
+        assert p.long(400, 0) == [1]
+        assert p.long(400, 0, 21196) == [0]
+    else:  # crash_check.cpp: 2 s
+        assert "Crash: Disarming: AngErr=80>30, Accel=1.0<3.0" in p.texts()
+    p.wait(1)
+    assert (p.truth.armed, p.last("EXTENDED_SYS_STATE").landed_state) == (False, 1)
+    assert abs(p.last("ATTITUDE").roll) > 1.2
+    assert p.arm() == [1 if p.px4 else 4]
 
 
 def test_over_it_is_free_and_it_may_go_away(pilot: Callable[..., Any]) -> None:

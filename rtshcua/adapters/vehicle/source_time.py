@@ -3,8 +3,9 @@
 A frame with a stamp was measured at its stamp, moved to our clock by `VehicleClock`. A frame of the autopilot without
 one (HEARTBEAT, SYS_STATUS, BATTERY_STATUS, ...) was sent after every frame that has a lower number, so it is no older
 than the latest stamp among those. The sequence number of a frame tells the order of sending, whatever the order of
-arrival. The clock of another component (a radio, a companion computer) is not known: its frame counts as having taken
-as long as the slowest of the autopilot's frames of the last second, and as no younger than the latest stamp.
+arrival. The clock of another component (a radio, a companion computer) is not known: its frame counts as no younger
+than the latest stamp that came before it, and, where the link was seen to let frames overtake others, as having been
+under way as long as the slowest of those within the last second or two.
 
 No frame counts as younger than its arrival, and where there is no bound yet there is no time.
 
@@ -26,7 +27,7 @@ from rtshcua.mavlink.frames import Received
 AHEAD_US: Final = 250_000
 #: After a silence of this length the next frame counts as sent after all before, whatever its number.
 GAP_US: Final = 500_000
-#: The delay of the link is the largest of this long, and of up to twice as long.
+#: The delay of the link is the largest within this time, and at most twice as long.
 WINDOW_US: Final = 1_000_000
 
 _AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
@@ -60,6 +61,7 @@ class SourceTime:
         self._newest = 0
         self._order: list[int | None] = [None] * _NUMBERS  # the same for each number of the last round
         self._delay_us = self._delay_before_us = 0
+        self._held_us = self._held_before_us = 0  # the same of frames that were overtaken
         self._window_us = 0
 
     @property
@@ -71,10 +73,17 @@ class SourceTime:
 
     @property
     def link_delay_us(self) -> int | None:
-        """The largest delay that the autopilot's frames showed within the last second or two, the error of the offset
-        included; None before any stamp could be read.
+        """How long a frame may be under way: the largest delay of the autopilot's frames within the last second or two,
+        the error of the offset included; None before any stamp could be read.
         """
-        return None if self._sent_us is None else max(self._delay_us, self._delay_before_us)
+        if self._sent_us is None:
+            return None
+        return max(self._delay_us, self._delay_before_us, self._held_us, self._held_before_us)
+
+    def due(self, now_us: int) -> tuple[int, ...]:
+        """The `ts1` of the TIMESYNC to send now, in ns, if one is due."""
+        ts1_ns = self.clock.due(now_us)
+        return () if ts1_ns is None else (ts1_ns,)
 
     def of(self, frame: Received, now_us: int) -> int | None:
         """The earliest time at which what a frame says may have been measured, at most `now_us`; None where no bound is
@@ -104,7 +113,7 @@ class SourceTime:
         """Its stamps are of a clock of its own: they tell only whether it measured anew."""
         if self._sent_us is None:
             return None
-        at_us = min(self._sent_us, now_us - max(self._delay_us, self._delay_before_us))
+        at_us = min(self._sent_us, now_us - max(self._held_us, self._held_before_us))
         raw = 0 if stamp is None else getattr(message, stamp.field)
         if raw:
             told = self._told.get((component, name))
@@ -160,8 +169,8 @@ class SourceTime:
         self._until_us = self.clock.next_step_us(now_us)
         if now_us - self._window_us >= WINDOW_US:
             recent = now_us - self._window_us < 2 * WINDOW_US
-            self._delay_before_us = self._delay_us if recent else 0
-            self._delay_us, self._window_us = 0, now_us
+            self._delay_before_us, self._held_before_us = (self._delay_us, self._held_us) if recent else (0, 0)
+            self._delay_us, self._held_us, self._window_us = 0, 0, now_us
 
     def _follow(self, number: int, at_us: int | None, now_us: int) -> int | None:
         """Keep the order of sending, by the frame's number; when this frame was sent, at the earliest."""
@@ -175,18 +184,20 @@ class SourceTime:
             if fresh:
                 self._sent_us = sent_us = at_us
             order[number] = sent_us
-            self._newest, late = number, fresh
+            self._newest = number
         else:  # overtaken: sent after what was numbered before it, and before what was numbered after it
             if fresh:
                 self._sent_us = at_us
-            sent_us, late = order[number], True
+            sent_us = order[number]
             if at_us is not None and (sent_us is None or at_us > sent_us):
                 sent_us = at_us
                 for later in range(number, number + 1 + (newest - number) % _NUMBERS):
                     order[later % _NUMBERS] = max(order[later % _NUMBERS] or at_us, at_us)
+            if sent_us is not None and now_us - sent_us > self._held_us:
+                self._held_us = now_us - sent_us
         self._came_us = now_us
-        if late and sent_us is not None and now_us - sent_us > self._delay_us:
-            self._delay_us = now_us - sent_us
+        if fresh and at_us is not None and now_us - at_us > self._delay_us:
+            self._delay_us = now_us - at_us
         return sent_us
 
     def _find(self, name: str) -> _Stamp | None:

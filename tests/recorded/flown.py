@@ -1,6 +1,7 @@
 """A recorded flight through the driver and the state monitor, as the runtime would have seen it."""
 
 import lzma
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -50,8 +51,9 @@ class Recorded:
     """One flight. `late_us` is when the first frame came, in us after the autopilot's start (the page's second 0).
 
     The recording holds only what the vehicle sent, and to another client. So nothing of it answers what the driver
-    asks: `parameters` and the last mode are told to it instead, and its fence is left alone. `commands` are begun at their second, as if the
-    recorded client's had been ours.
+    asks: `parameters` and the last mode are told to it instead, and its fence is left alone. TIMESYNC is answered after
+    `round_trip_us`, by the time since boot that the recorded stamps show. `commands` are begun at their second, as if
+    the recorded client's had been ours.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Recorded:
     events: list[tuple[float, Event]] = field(default_factory=list)
     states: list[dict[str, int | None]] = field(default_factory=list)
     sent: list[tuple[float, Received]] = field(default_factory=list)
+    round_trip_us: int = 20_000
 
     def __post_init__(self) -> None:
         prepared = prepare(self.policy)
@@ -72,6 +75,8 @@ class Recorded:
         self._reader, self._teller = Codec(0, 0), Codec(1, 1)
         self._beat = b""
         self._now_us = START_US
+        self._boots: deque[int] = deque(maxlen=20)  # boot time minus ours, as the last stamps have it
+        self._clock_answers: deque[tuple[int, int]] = deque()  # when, and `ts1`
         self.states.append(self._state())
         waiting = list(self.commands)
         for entry in self._entries():
@@ -113,6 +118,8 @@ class Recorded:
 
     def _pass(self, to_us: int, waiting: list[tuple[float, Command]]) -> None:
         before_us, self._now_us = self._now_us, to_us
+        while self._clock_answers and self._clock_answers[0][0] <= to_us:
+            self._answer_clock(*self._clock_answers.popleft())
         events, frames = self.driver.tick(to_us)
         self._take(events)
         self._sent(frames)
@@ -143,6 +150,7 @@ class Recorded:
             if received.name == "HEARTBEAT" and received.component == 1:
                 self._beat = frame
         heard = self.driver.receive(frame, self._now_us)
+        self._boots += [boot_us - self._now_us for boot_us in map(_boot_us, heard.frames) if boot_us]
         self._take(heard.events)
         self._sent(heard.answers)
 
@@ -152,7 +160,9 @@ class Recorded:
             self.sent.append((round(self.second, 2), received))
             if received.name == "COMMAND_LONG" and received.message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
                 self._tell_mode()
-            if received.name == "PARAM_REQUEST_READ" and received.message.param_id in self.parameters:
+            elif received.name == "TIMESYNC" and self._boots:
+                self._clock_answers.append((self._now_us + self.round_trip_us, received.message.ts1))
+            elif received.name == "PARAM_REQUEST_READ" and received.message.param_id in self.parameters:
                 self._answer(received.message.param_id)
 
     def _tell_mode(self) -> None:
@@ -162,9 +172,24 @@ class Recorded:
         if self._beat:
             self._receive(self._beat)
 
+    def _answer_clock(self, at_us: int, ts1_ns: int) -> None:
+        boot_us = at_us - self.round_trip_us // 2 + max(self._boots)
+        answer = mavlink.MAVLink_timesync_message(boot_us * 1_000, ts1_ns)
+        self._take(self.driver.receive(Codec(1, 1).pack(answer), self._now_us).events)
+
     def _answer(self, name: str) -> None:
         value = mavlink.MAVLink_param_value_message(name.encode(), self.parameters[name], 9, 1, 0)
         self._take(self.driver.receive(Codec(1, 1).pack(value), self._now_us).events)
+
+
+def _boot_us(frame: Received) -> int:
+    """When it was measured, of those messages that are sent as soon as that; 0 of others."""
+    match frame.name:
+        case "GLOBAL_POSITION_INT":
+            return int(frame.message.time_boot_ms) * 1_000
+        case "GPS_RAW_INT" | "ESTIMATOR_STATUS":
+            return int(frame.message.time_usec)
+    return 0
 
 
 def command(token: int, kind: MotionKind, *geo: int, altitude: int = 0, speed: int = 0) -> Command:

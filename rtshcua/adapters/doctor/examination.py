@@ -47,6 +47,10 @@ class Examination(Driver):
             self.facts.hear(frame, now_us, utc_us)
             if frame.name == "PARAM_VALUE" and frame.system == self._system and self.parameters is not None:
                 self.parameters.take(frame.message)
+        clock = self.source.clock
+        if clock.answered_us is not None:
+            self.facts.answered = True
+            self.facts.round_trip_us, self.facts.clock_error_us = clock.round_trip_us, clock.error_us
         self._note(heard.events)
         return heard
 
@@ -76,7 +80,6 @@ class Examination(Driver):
         send: list[Any] = self.parameters.due(self._system, now_us)
         if self._asked_us is None or now_us - self._asked_us >= _ASK_US:
             self._asked_us = now_us
-            send.append(messages.time_sync(now_us * 1_000))
             send += [messages.request(self._system, name) for name in _ONCE if name not in self.facts.streams]
         return events, frames + self._pack(send, now_us, events)
 

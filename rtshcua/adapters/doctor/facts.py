@@ -58,7 +58,8 @@ class Facts:
     talkers: dict[tuple[int, int], Talker] = field(default_factory=dict)
     streams: dict[str, Stream] = field(default_factory=dict)
     texts: list[str] = field(default_factory=list)
-    round_trips_us: list[int] = field(default_factory=list)
+    round_trip_us: int | None = None  # of TIMESYNC, the median
+    clock_error_us: int | None = None  # by how much, at the most, its stamps are taken for older than they are
     ahead_us: int | None = None  # how far the vehicle's UTC is ahead of ours
     answered: bool = False  # it answered something that we asked
     values: dict[int, int | None] = field(default_factory=dict)  # of the policy's signals, by state slot
@@ -83,9 +84,6 @@ class Facts:
         match frame.name:
             case "COMMAND_ACK" | "PARAM_VALUE" | "AUTOPILOT_VERSION":
                 self.answered = True
-            case "TIMESYNC" if frame.message.tc1 and frame.message.ts1 <= now_us * 1_000:
-                self.answered = True
-                self.round_trips_us.append(now_us - frame.message.ts1 // 1_000)
             case "SYSTEM_TIME" if frame.message.time_unix_usec:
                 self.ahead_us = frame.message.time_unix_usec - utc_us
 

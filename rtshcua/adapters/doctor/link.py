@@ -96,11 +96,11 @@ def _others(facts: Facts, *, named: bool) -> Iterator[Finding]:
 
 
 def _round_trip(facts: Facts) -> Finding:
-    times = sorted(facts.round_trips_us)
-    if not times:
-        return Finding("link/round-trip", Verdict.UNKNOWN, "TIMESYNC is not answered")
-    median = times[len(times) // 2]
-    found = f"{median // 1_000} ms there and back"
+    median, error = facts.round_trip_us, facts.clock_error_us
+    if median is None or error is None:
+        found = "TIMESYNC is not answered, so nobody knows how old its reports are"
+        return Finding("link/round-trip", Verdict.STOP, found, "answers", "a router on the way may drop TIMESYNC (111)")
+    found = f"{median // 1_000} ms there and back; its clock is known to {-(-error // 1_000)} ms"
     if median <= _SLOW_US:
         return Finding("link/round-trip", Verdict.OK, found)
     return Finding("link/round-trip", Verdict.STOP if median > _TOO_SLOW_US else Verdict.WARN, found, "at most 200 ms")

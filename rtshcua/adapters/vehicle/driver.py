@@ -18,6 +18,7 @@ from rtshcua.adapters.vehicle.manoeuvre import Aids, Manoeuvre
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.preflight import HEEDED, Preflight
 from rtshcua.adapters.vehicle.progress import Brakes
+from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, Streams
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Texts
@@ -72,6 +73,7 @@ class Driver:
         self._texts = Texts()
         self._announcer = Announcer()
         self.link = Link(frames, verifier, system)
+        self.source = SourceTime()
         self._flavour: Flavour | None = None
         self._seen = Observed()
         self._system = 0
@@ -107,7 +109,8 @@ class Driver:
         if self._preflight is None or self._seen.airborne:
             return self.link.crowd or self._seen.unready
         preflight = self._preflight
-        return self.link.crowd or preflight.astray or self._seen.unready or preflight.unready or self._mute
+        waits = self.link.crowd or self.source.unready or self._mute or preflight.astray
+        return waits or self._seen.unready or preflight.unready
 
     @property
     def _mute(self) -> str | None:
@@ -145,6 +148,7 @@ class Driver:
             self._beat_us = now_us
             send.append(messages.heartbeat())
         self._seen.pass_time(now_us)
+        send += map(messages.time_sync, self.source.due(now_us))
         send += self._streams.due(self._system, now_us)
         send += self._prepare(now_us)
         self._hear(self._texts.due(now_us), events)
@@ -211,6 +215,7 @@ class Driver:
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; False if a manoeuvre sees nothing new in it."""
         name, message, component = frame.name, frame.message, frame.component
+        at_us = self.source.of(frame, now_us)
         if component == _AUTOPILOT:
             self._spoken.add(name)
         elif name in self._spoken:
@@ -221,12 +226,12 @@ class Driver:
         self._streams.heard(name, now_us)
         if name in self._telemetry.carriers:
             values = self._telemetry.read(name, message, component, partial(self._vouched, name, now_us))
-            if values:
-                events.append(Readings(now_us, values))
+            if values and at_us is not None:
+                events.append(Readings(at_us, values))
         if component != _AUTOPILOT or name not in self._heeded:
             return False
         before = self._seen.mode
-        self._seen.take(name, message, now_us)
+        self._seen.take(name, message, now_us, at_us)
         crashed = self._crash.look(self._seen, now_us)
         if crashed is not None:
             events.append(Crashed(now_us, crashed))
@@ -334,7 +339,9 @@ class Driver:
         seen = self._seen
         if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us) or self._mute:
             return False
-        return seen.airborne or self._preflight is None or self._preflight.unready is None
+        return (
+            seen.airborne or (self.source.unready or (self._preflight is not None and self._preflight.unready)) is None
+        )
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""

@@ -44,8 +44,8 @@ _RESTS_ON: Mapping[str, Mapping[str, int]] = {
 
 
 class Estimator:
-    """The last report, by `flags` and when it came. A height is above home, so it means nothing before there is one:
-    the estimator must have had a position once.
+    """The last report, by `flags` and when it was made. A height is above home, so it means nothing before there is
+    one: the estimator must have had a position once.
     """
 
     def __init__(self, report: str = "") -> None:
@@ -54,10 +54,12 @@ class Estimator:
         self._at_us: int | None = None
         self._homed = False
 
-    def take(self, flags: int, now_us: int) -> None:
-        """A report came."""
-        self._flags, self._at_us = flags, now_us
-        self._homed = self._homed or self.position(now_us)
+    def take(self, flags: int, at_us: int) -> None:
+        """A report came that was made at `at_us` (see `source_time`); one that is older than the last is set aside."""
+        if self._at_us is not None and at_us < self._at_us:
+            return
+        self._flags, self._at_us = flags, at_us
+        self._homed = self._homed or self.position(at_us)
 
     def vouches(self, bits: int, now_us: int) -> bool:
         """Whether a report that is not stale has all these flags, and no sign of being astray."""

@@ -5,7 +5,7 @@ from math import acos, cos, degrees, hypot, isfinite
 from typing import Any
 
 from rtshcua.adapters.vehicle import datum, health
-from rtshcua.adapters.vehicle.estimator import Estimator
+from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
 
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _ON_GROUND = 1  # MAV_LANDED_STATE
@@ -27,10 +27,10 @@ class Observed:
     """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
-    so now. `target` is where the autopilot says that it flies to: latitude, longitude, mm above mean sea level.
-    `began` is the place where it last stood. `descent` is how fast it sinks and `tilt` how many degrees it leans,
-    whoever vouches for that. `beats` counts heartbeats; `up_us` is link time, see `LinkWatch`. `notes` collects what an
-    operator should know.
+    so now, of a position that is not old. `target` is where the autopilot says that it flies to: latitude, longitude,
+    mm above mean sea level. `began` is the place where it last stood. `descent` is how fast it sinks and `tilt` how
+    many degrees it leans, whoever vouches for that. `beats` counts heartbeats; `up_us` is link time, see `LinkWatch`.
+    `notes` collects what an operator should know.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -53,6 +53,7 @@ class Observed:
     unwell: tuple[str, ...] = ()
     heartbeat_us: int | None = None
     beats: int = 0
+    made_us: dict[str, int] = field(default_factory=dict)  # when the last of each message was made
     now_us: int = 0
     up_us: int = 0
     critical: bool = False
@@ -66,8 +67,14 @@ class Observed:
         """The messages that `take` looks at."""
         return (*_HEEDED, self.estimator.report)
 
-    def take(self, name: str, message: Any, now_us: int) -> None:
-        """Take in one message of the autopilot's component."""
+    def take(self, name: str, message: Any, now_us: int, at_us: int | None) -> None:
+        """Take in one message of the autopilot's component that was made at `at_us` (None: nobody knows), but for one
+        that is older than the last of its name.
+        """
+        if at_us is not None:
+            if at_us < self.made_us.get(name, at_us):
+                return
+            self.made_us[name] = at_us
         match name:
             case "HEARTBEAT":
                 self.mode = message.custom_mode
@@ -77,7 +84,7 @@ class Observed:
                 self._judge(message.system_status)
             case "EXTENDED_SYS_STATE":
                 self.landed_state = message.landed_state
-            case "GLOBAL_POSITION_INT":
+            case "GLOBAL_POSITION_INT" if at_us is not None and now_us - at_us <= STALE_US:
                 self._place(message, now_us)
             case "POSITION_TARGET_GLOBAL_INT":
                 if message.coordinate_frame in _ABOVE_SEA and isfinite(message.alt):
@@ -89,15 +96,17 @@ class Observed:
             case "SYS_STATUS":
                 self.prearm = health.would_arm(message)
                 self.unwell = health.unwell(message)
-            case self.estimator.report:
-                self.estimator.take(message.flags, now_us)
+            case self.estimator.report if at_us is not None:
+                self.estimator.take(message.flags, at_us)
                 self.located = self.located and self.estimator.position(now_us)
                 self.levelled = self.levelled and self.estimator.height(now_us)
 
     def pass_time(self, now_us: int) -> None:
-        """Time goes by: what the estimator last said grows old."""
+        """Time goes by: where it was, and what the estimator last said, grows old."""
         self.now_us = now_us
-        if self.located or self.levelled:
+        if now_us - self.made_us.get("GLOBAL_POSITION_INT", now_us) > STALE_US:
+            self.located, self.levelled, self.speed = False, False, None
+        elif self.located or self.levelled:
             self.located = self.located and self.estimator.position(now_us)
             self.levelled = self.levelled and self.estimator.height(now_us)
 

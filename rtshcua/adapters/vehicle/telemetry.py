@@ -17,8 +17,6 @@ _WITHIN_STALE = 4
 
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
-#: Messages that go on being sent when their sensor has nothing new, and the field with the time of the measurement.
-_MEASURED = {"GPS_RAW_INT": "time_usec", "GPS2_RAW": "time_usec"}
 
 
 def _always(_: str) -> bool:
@@ -53,7 +51,6 @@ class Telemetry:
         vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
         self._first: dict[tuple[int, str], Any] = {}
-        self._measured: dict[tuple[int, str], int] = {}
         self._projection = policy.projection
         self._sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
         self._by_message: dict[str, list[tuple[Signal, SignalSource]]] = {}
@@ -83,8 +80,8 @@ class Telemetry:
     ) -> tuple[tuple[int, int | None], ...]:
         """(slot, canonical integer) of every signal that this message carries; None is "reported as not known".
 
-        So is a value that rests on a field of the autopilot's which is not `vouched` for. A measurement that was
-        reported before makes nothing younger: of its repetition only what is not known counts.
+        So is a value that rests on a field of the autopilot's which is not `vouched` for. When it was measured is not
+        said here: see `source_time`.
         """
         carried = self._by_message.get(name)
         if carried is None or not self._is_first(name, message, component):
@@ -101,19 +98,10 @@ class Telemetry:
                 values += [(signal.slot, x), (signal.slot + 1, y)]
             else:
                 values.append((signal.slot, _number(source, message)))
-        if name in _MEASURED and self._is_repeated(name, message, component):
-            values = [(slot, value) for slot, value in values if value is None]
         if component == _AUTOPILOT:
             self._own.update(slot for slot, _ in values)
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
-
-    def _is_repeated(self, name: str, message: Any, component: int) -> bool:
-        """Whether the sensor measured this before; a time of 0 says nothing."""
-        at = getattr(message, _MEASURED[name])
-        before = self._measured.get((component, name))
-        self._measured[component, name] = at
-        return bool(at) and at == before
 
     def _is_first(self, name: str, message: Any, component: int) -> bool:
         """Whether this comes from the lowest instance of its sensor that the component was heard to have."""

@@ -60,6 +60,7 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     assert stops(found) == set()
     assert found["autopilot/version"].verdict is Verdict.OK
     assert found["link/answers"].verdict is found["link/round-trip"].verdict is Verdict.OK
+    assert found["link/round-trip"].found == "0 ms there and back; its clock is known to 3 ms"
     assert found["signal/battery"].found.startswith("`battery`: BATTERY_STATUS every ")
     assert {slug for slug in found if slug.startswith("settings/")} >= {
         "px4": {"settings/gf_action", "settings/nav_dll_act"},
@@ -102,6 +103,20 @@ def test_a_vehicle_that_answers_nothing() -> None:
     assert "link/answers" in stops(found)
     assert "--signing-key" in found["link/answers"].advice
     assert found["autopilot/version"].verdict is found["settings/unread"].verdict is Verdict.UNKNOWN
+
+
+@FLAVOURS
+def test_a_vehicle_whose_clock_is_not_known(flavour: str) -> None:
+    codec = Codec(0, 0)
+
+    def without_time(vehicle: VirtualVehicle) -> None:
+        vehicle.lose = lambda frame: any(each.name == "TIMESYNC" for each in codec.parse(frame))
+
+    found = examine(case.simulated(flavour), prepare=without_time)
+    assert "link/round-trip" in stops(found)
+    assert found["link/round-trip"].found == "TIMESYNC is not answered, so nobody knows how old its reports are"
+    assert found["link/answers"].verdict is Verdict.OK
+    assert any(slug.startswith("signal/") for slug in stops(found)), "no signal is known"
 
 
 def test_a_signal_that_nobody_sends() -> None:

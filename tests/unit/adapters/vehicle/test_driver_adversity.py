@@ -64,7 +64,7 @@ def test_nothing_more_is_sent_after_release(flyer: Make) -> None:
     moving: list[str] = []
     one.vehicle.lose = lambda frame: moving.extend(f.name for f in Codec(1, 1).parse(frame)) or False
     one.wait(10)
-    assert set(moving) == {"HEARTBEAT"}
+    assert set(moving) == {"HEARTBEAT", "TIMESYNC"}
 
 
 def test_refused_arming_fails_with_the_reason(flyer: Make, flavour: str) -> None:

@@ -12,7 +12,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Said, TakenOver
+from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Ready, Said, TakenOver
 from virtual.policy import POLICY, PROJECTION
 
 S = 1_000_000
@@ -30,6 +30,7 @@ class Bench:
         self.driver = Driver(POLICY, self.frames)
         self.codec = Codec(1, 1)
         self.now_us = S
+        self.answers = True  # TIMESYNC; it was started when our clock was
         self.events: list[Event] = []
         self.sent: list[Any] = []
         self.beat(0)
@@ -44,6 +45,9 @@ class Bench:
             self.events += events
             sent = [Codec(0, 0).parse(frame)[0] for frame in frames]
             self.sent += sent
+            for frame in sent:
+                if frame.name == "TIMESYNC" and self.answers:
+                    self.hear(mavlink.MAVLink_timesync_message(self.now_us * 1_000, frame.message.ts1))
             if any(each.name == "COMMAND_LONG" and each.message.command == 512 for each in sent):
                 self.answer()
 
@@ -72,7 +76,7 @@ class Bench:
 
     def place(self, height: int = 0, amsl: int = 488_000) -> None:
         self.hear(mavlink.MAVLink_global_position_int_message(
-            0, PROJECTION.latitude, PROJECTION.longitude, amsl + height, height, 0, 0, 0, 0,
+            self.now_us // 1_000, PROJECTION.latitude, PROJECTION.longitude, amsl + height, height, 0, 0, 0, 0,
         ))  # fmt: skip
 
     def health(self, ill: int = 0, present: int = SENSORS) -> None:
@@ -83,6 +87,7 @@ class Bench:
 
     def well(self) -> None:
         """On the ground, with everything that is needed."""
+        self.tick()
         self.landed(1)
         self.hear(mavlink.MAVLink_gps_raw_int_message(1, 3, 0, 0, 0, 0, 0, 0, 0, 0))
         self.estimator(0x33F)
@@ -103,6 +108,7 @@ def test_each_reason_in_its_turn(autopilot: int) -> None:
     report = "ESTIMATOR_STATUS" if autopilot == PX4 else "EKF_STATUS_REPORT"
     reasons = [one.driver.unready]
     for step in (
+        lambda: None,
         lambda: one.landed(1),
         lambda: one.hear(mavlink.MAVLink_gps_raw_int_message(1, 3, 0, 0, 0, 0, 0, 0, 0, 0)),
         lambda: one.estimator(0x0A7),
@@ -116,6 +122,7 @@ def test_each_reason_in_its_turn(autopilot: int) -> None:
         one.tick()
         reasons.append(one.driver.unready)
     assert reasons == [
+        "its clock is not known yet: no TIMESYNC answer",
         "it does not say whether it is on the ground",
         "no 3D position fix",
         f"its estimator says nothing (no {report})",
@@ -128,11 +135,24 @@ def test_each_reason_in_its_turn(autopilot: int) -> None:
     ]
 
 
+@BOTH
+def test_without_a_clock_nothing_is_known_and_it_is_not_ready(autopilot: int) -> None:
+    one = Bench(autopilot)
+    one.answers = False
+    one.well()
+    one.tick(5)
+    assert one.driver.unready == "its clock is not known yet: no TIMESYNC answer"
+    assert not [event for event in one.events if isinstance(event, Readings | Ready)]
+    asked = [frame for frame in one.sent if frame.name == "TIMESYNC"]
+    assert len(asked) > 30, "ten times a second at first"
+
+
 def test_it_is_asked_why_it_would_not_arm_and_not_too_often() -> None:
     one = Bench(ARDUPILOT)
     one.well()
     for _ in range(250):
         one.estimator(0x33F)
+        one.place()
         one.health(0x1000_0000)
         one.tick()
     asked = [frame for frame in one.sent if frame.name == "COMMAND_LONG" and frame.message.command == 401]

@@ -44,6 +44,15 @@ def test_a_report_that_is_old_vouches_for_nothing() -> None:
     assert estimator.missing(S + STALE_US + 1) == "its estimator fell silent (no ESTIMATOR_STATUS)"
 
 
+def test_a_report_that_was_overtaken_is_set_aside() -> None:
+    estimator = Estimator("ESTIMATOR_STATUS")
+    estimator.take(0x025, 2 * S)
+    estimator.take(0x33F, S)
+    assert not estimator.position(2 * S)
+    estimator.take(0x33F, 2 * S)
+    assert estimator.position(2 * S), "of two that bear the same time the later counts"
+
+
 def test_it_says_what_is_missing() -> None:
     estimator = Estimator("ESTIMATOR_STATUS")
     estimator.take(0x0E5, S)

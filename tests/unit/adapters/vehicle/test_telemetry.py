@@ -8,10 +8,17 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.preflight import distance_from_home
+from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
+from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.mavlink.frames import Received
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
+from rtshcua.onboard.ports import Readings
+from rtshcua.onboard.runtime.monitor import StateMonitor
 from virtual.policy import BATTERY, FIX, HEIGHT, LINK, POLICY, POSITION_X, PROJECTION, WIND
 
+S = 1_000_000
 HOME = (PROJECTION.latitude, PROJECTION.longitude)
 
 
@@ -133,22 +140,59 @@ def gps(fix: int, at_us: int) -> Any:
     return mavlink.MAVLink_gps_raw_int_message(at_us, fix, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
+class Held:
+    """What the state monitor holds of frames that come in order; the vehicle was started when our clock was."""
+
+    def __init__(self, policy: Policy) -> None:
+        prepared = prepare(policy)
+        assert not isinstance(prepared, Malformed)
+        self._telemetry, self._source, self._monitor = Telemetry(policy), SourceTime(), StateMonitor(prepared)
+        self._number = 0
+
+    def hear(self, message: Any, now_us: int) -> tuple[int | None, int]:
+        """The fix, and its age."""
+        for ts1 in self._source.due(now_us):
+            self._of(mavlink.MAVLink_timesync_message(now_us * 1_000, ts1), now_us)
+        at_us = self._of(message, now_us)
+        assert at_us is not None
+        self._monitor.update(Readings(at_us, self._telemetry.read(message.get_type(), message)))
+        state = self._monitor.state(now_us)
+        return state.values[FIX], state.ages[FIX]
+
+    def _of(self, message: Any, now_us: int) -> int | None:
+        self._number = (self._number + 1) % 256
+        return self._source.of(Received(message, message.get_type(), 1, 1, self._number, False, b""), now_us)
+
+
 def test_a_measurement_that_is_repeated_makes_nothing_younger() -> None:
     """A receiver that hangs: the autopilot goes on reporting its last measurement, and its fix, for ever."""
-    telemetry = Telemetry(POLICY)
-    assert telemetry.read("GPS_RAW_INT", gps(3, 5)) == ((FIX, 3),)
-    assert telemetry.read("GPS_RAW_INT", gps(3, 5)) == ()
-    assert telemetry.read("GPS_RAW_INT", gps(3, 6)) == ((FIX, 3),)
-    for _ in range(2):
-        assert telemetry.read("GPS_RAW_INT", gps(3, 0)) == ((FIX, 3),), "a time of 0 says nothing"
+    held = Held(POLICY)
+    assert held.hear(gps(3, S), S)[0] == 3
+    for now_us in range(S, 60 * S, S // 5):
+        fix, age_us = held.hear(gps(3, S), now_us)
+        assert (fix, 0 <= age_us - (now_us - S) < 20_000) == (3, True)
+    assert held.hear(gps(3, 60 * S), 60 * S)[1] < 20_000
+
+
+def test_a_time_of_0_says_nothing() -> None:
+    held = Held(POLICY)
+    for now_us in range(S, 10 * S, S // 5):
+        fix, age_us = held.hear(gps(3, 0), now_us)
+        assert (fix, age_us < S + 20_000) == (3, True), "as old as the last answer to TIMESYNC"
 
 
 def test_that_there_is_no_fix_counts_however_often_it_is_said() -> None:
-    fix = replace(POLICY.signals[2], sources=(SignalSource("GPS_RAW_INT", ("fix_type",), 1, 1, (0, 1, 2)),))
-    telemetry = Telemetry(replace(POLICY, signals=(*POLICY.signals[:2], fix, *POLICY.signals[3:])))
-    assert telemetry.read("GPS_RAW_INT", gps(3, 5)) == ((FIX, 3),)
-    assert telemetry.read("GPS_RAW_INT", gps(1, 5)) == ((FIX, None),)
-    assert telemetry.read("GPS_RAW_INT", gps(1, 5)) == ((FIX, None),)
+    """ArduPilot's time of a lost fix is that of the last one."""
+    assert Held(POLICY).hear(gps(1, S), S)[0] == 1
+    unknown = replace(POLICY.signals[2], sources=(SignalSource("GPS_RAW_INT", ("fix_type",), 1, 1, (0, 1, 2)),))
+    for policy, none in (
+        (POLICY, 1),
+        (replace(POLICY, signals=(*POLICY.signals[:2], unknown, *POLICY.signals[3:])), None),
+    ):
+        held = Held(policy)
+        assert held.hear(gps(3, S), S)[0] == 3
+        for _ in range(2):
+            assert held.hear(gps(1, S), S + 100_000)[0] == none
 
 
 def test_what_the_estimator_does_not_vouch_for_is_not_known() -> None:

@@ -37,6 +37,15 @@ class Peer:
         (frame,) = self.codec.parse(self.socket.recv(65_535))
         return frame.name
 
+    def answers_time(self, link: UdpVehicle) -> None:
+        """Answer the first TIMESYNC that comes."""
+        while True:
+            (frame,) = self.codec.parse(self.socket.recv(65_535))
+            if frame.name == "TIMESYNC":
+                break
+        self.send(mavlink.MAVLink_timesync_message(1, frame.message.ts1))
+        poll(link)
+
 
 @pytest.fixture
 def link() -> Iterator[UdpVehicle]:
@@ -90,6 +99,7 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
     poll(link)
     poll(link)
     assert vehicle.hears() == "HEARTBEAT"
+    vehicle.answers_time(link)
     stranger.beat()
     stranger.send(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, 99))
     assert [event for event in poll(link) if not isinstance(event, LinkLost)] == [], "silence is no word of it"

@@ -1,0 +1,214 @@
+"""When the vehicle measured what a frame says, on our monotonic clock: the earliest that it may have been.
+
+A frame with a stamp was measured at its stamp, moved to our clock by `VehicleClock`. A frame of the autopilot without
+one (HEARTBEAT, SYS_STATUS, BATTERY_STATUS, ...) was sent after every frame that has a lower number, so it is no older
+than the latest stamp among those. The sequence number of a frame tells the order of sending, whatever the order of
+arrival. The clock of another component (a radio, a companion computer) is not known: its frame counts as no younger
+than the latest stamp that came before it, and, where the link was seen to let frames overtake others, as having been
+under way as long as the slowest of those within the last second or two.
+
+No frame counts as younger than its arrival, and where there is no bound yet there is no time.
+
+Stamps are found by the name of their field. `time_boot_ms` counts ms since boot in 32 bits, and wraps after 49 days.
+`time_usec` is us since boot, or UNIX time when it is that large; the last SYSTEM_TIME of the autopilot holds both, and
+translates. In GPS_RAW_INT it is when the fix was measured (ArduPilot: `last_fix_time_ms`), in HOME_POSITION when
+home was set. 0 says nothing: PX4 sends it while the receiver tells no UTC (streams/GPS_RAW_INT.hpp). A stamp that does
+not advance is the same measurement again, and keeps the time that it was given first.
+"""
+
+from typing import Any, Final, NamedTuple
+
+from rtshcua.adapters.vehicle.vehicle_clock import VehicleClock
+from rtshcua.mavlink import dialect
+from rtshcua.mavlink.frames import Received
+
+#: A stamp that lies ahead of us by no more than this shows that the clocks ran apart, one that lies farther ahead is
+#: none of this clock's.
+AHEAD_US: Final = 250_000
+#: After a silence of this length the next frame counts as sent after all before, whatever its number.
+GAP_US: Final = 500_000
+#: The delay of the link is the largest within this time, and at most twice as long.
+WINDOW_US: Final = 1_000_000
+
+_AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
+_UNIX_US: Final = 10**15  # 2001; as a time since boot it would be 31 years
+_WRAP, _HALF = 1 << 32, 1 << 31
+_NUMBERS, _AHEAD = 256, 128
+_FIELDS: Final = ("time_boot_ms", "time_boot_us", "time_usec")
+_LENGTHS: Final = {"ms": 1_000, "us": 1}
+
+
+class _Stamp(NamedTuple):
+    """A message's field with its time, how many us one of it is, and whether it has 32 bits."""
+
+    field: str
+    us: int
+    short: bool
+
+
+class SourceTime:
+    """Takes every frame of the vehicle's system in the order of coming; holds a fixed amount, and never raises."""
+
+    def __init__(self) -> None:
+        self.clock = VehicleClock()
+        self._stamps: dict[str, _Stamp | None] = {}
+        self._offset_us: int | None = None
+        self._until_us = 0  # the offset holds until then
+        self._unix_us: int | None = None  # UNIX time minus time since boot
+        self._told: dict[tuple[int, str], tuple[int, int]] = {}  # the last stamp of a message, and its time
+        self._sent_us: int | None = None  # the last frame was sent at this time or later
+        self._came_us = 0
+        self._newest = 0
+        self._order: list[int | None] = [None] * _NUMBERS  # the same for each number of the last round
+        self._delay_us = self._delay_before_us = 0
+        self._held_us = self._held_before_us = 0  # the same of frames that were overtaken
+        self._window_us = 0
+
+    @property
+    def unready(self) -> str | None:
+        """What stands against trusting any age, in words."""
+        if self.clock.answered_us is None:
+            return "its clock is not known yet: no TIMESYNC answer"
+        return None
+
+    @property
+    def link_delay_us(self) -> int | None:
+        """How long a frame may be under way: the largest delay of the autopilot's frames within the last second or two,
+        the error of the offset included; None before any stamp could be read.
+        """
+        if self._sent_us is None:
+            return None
+        return max(self._delay_us, self._delay_before_us, self._held_us, self._held_before_us)
+
+    def due(self, now_us: int) -> tuple[int, ...]:
+        """The `ts1` of the TIMESYNC to send now, in ns, if one is due."""
+        ts1_ns = self.clock.due(now_us)
+        return () if ts1_ns is None else (ts1_ns,)
+
+    def of(self, frame: Received, now_us: int) -> int | None:
+        """The earliest time at which what a frame says may have been measured, at most `now_us`; None where no bound is
+        known. To be called once for every frame of the vehicle's system.
+        """
+        message, name, _, component, number, _, _ = frame
+        stamp = self._stamps[name] if name in self._stamps else self._find(name)
+        if component != _AUTOPILOT:
+            return self._of_another(name, message, component, stamp, now_us)
+        if now_us >= self._until_us:
+            self._refresh(now_us)
+        at_us: int | None = None
+        if stamp is not None:
+            at_us = self._at(name, getattr(message, stamp.field), stamp, now_us)
+            if name == "SYSTEM_TIME" and message.time_unix_usec >= _UNIX_US and message.time_boot_ms:
+                self._unix_us = message.time_unix_usec - message.time_boot_ms * 1_000
+        elif name == "TIMESYNC":
+            self._synchronise(message, now_us)
+            if self._offset_us is not None:  # a request of its own holds its time in `ts1`
+                at_us = self._checked(self._offset_us + (message.tc1 or message.ts1) // 1_000, now_us)
+        sent_us = self._follow(number, at_us, now_us)
+        return sent_us if at_us is None else at_us
+
+    def _of_another(
+        self, name: str, message: Any, component: int, stamp: _Stamp | None, now_us: int
+    ) -> int | None:  # fmt: skip
+        """Its stamps are of a clock of its own: they tell only whether it measured anew."""
+        if self._sent_us is None:
+            return None
+        at_us = min(self._sent_us, now_us - max(self._held_us, self._held_before_us))
+        raw = 0 if stamp is None else getattr(message, stamp.field)
+        if raw:
+            told = self._told.get((component, name))
+            if told is not None and told[0] == raw:
+                return told[1]
+            self._told[component, name] = (raw, at_us)
+        return at_us
+
+    def _at(self, name: str, raw: int, stamp: _Stamp, now_us: int) -> int | None:
+        """A stamp of the autopilot's on our clock; None if it cannot be read."""
+        offset_us = self._offset_us
+        if offset_us is None or not raw:
+            return None
+        told = self._told.get((_AUTOPILOT, name))
+        if told is not None and told[0] == raw:
+            return told[1]
+        boot, us = raw, stamp.us
+        short = stamp.short
+        if not short and raw >= _UNIX_US:
+            if self._unix_us is None:
+                return None
+            boot, us, short = (raw - self._unix_us) // 1_000 % _WRAP, 1_000, True
+        if short:
+            up = (now_us - offset_us) // us
+            ago = (up - boot) % _WRAP
+            boot = up - (ago if ago < _HALF else ago - _WRAP)
+        at_us = self._checked(offset_us + boot * us, now_us)
+        if at_us is not None and (told is None or at_us > told[1]):
+            self._told[_AUTOPILOT, name] = (raw, at_us)
+        return at_us
+
+    def _checked(self, at_us: int, now_us: int) -> int | None:
+        """Nothing comes before it was sent: a stamp that lies ahead speaks against the offset, or for nothing."""
+        ahead_us = at_us - now_us
+        if ahead_us <= 0:
+            return at_us
+        if ahead_us > AHEAD_US:
+            self.clock.doubt(now_us)
+            return None
+        self.clock.reduce(ahead_us, now_us)
+        self._refresh(now_us)
+        return now_us
+
+    def _synchronise(self, message: Any, now_us: int) -> None:
+        if self.clock.answer(message.tc1, message.ts1, now_us):
+            self._told.clear()
+            self._sent_us = None
+            self._order = [None] * _NUMBERS
+        self._refresh(now_us)
+
+    def _refresh(self, now_us: int) -> None:
+        self._offset_us = self.clock.offset_us(now_us)
+        self._until_us = self.clock.next_step_us(now_us)
+        if now_us - self._window_us >= WINDOW_US:
+            recent = now_us - self._window_us < 2 * WINDOW_US
+            self._delay_before_us, self._held_before_us = (self._delay_us, self._held_us) if recent else (0, 0)
+            self._delay_us, self._held_us, self._window_us = 0, 0, now_us
+
+    def _follow(self, number: int, at_us: int | None, now_us: int) -> int | None:
+        """Keep the order of sending, by the frame's number; when this frame was sent, at the earliest."""
+        sent_us, newest, order = self._sent_us, self._newest, self._order
+        fresh = at_us is not None and (sent_us is None or at_us > sent_us)
+        ahead = (number - newest) % _NUMBERS
+        if 0 < ahead < _AHEAD or now_us - self._came_us > GAP_US:
+            if ahead > 1:
+                for skipped in range(newest + 1, newest + ahead):
+                    order[skipped % _NUMBERS] = sent_us
+            if fresh:
+                self._sent_us = sent_us = at_us
+            order[number] = sent_us
+            self._newest = number
+        else:  # overtaken: sent after what was numbered before it, and before what was numbered after it
+            if fresh:
+                self._sent_us = at_us
+            sent_us = order[number]
+            if at_us is not None and (sent_us is None or at_us > sent_us):
+                sent_us = at_us
+                for later in range(number, number + 1 + (newest - number) % _NUMBERS):
+                    order[later % _NUMBERS] = max(order[later % _NUMBERS] or at_us, at_us)
+            if sent_us is not None and now_us - sent_us > self._held_us:
+                self._held_us = now_us - sent_us
+        self._came_us = now_us
+        if fresh and at_us is not None and now_us - at_us > self._delay_us:
+            self._delay_us = now_us - at_us
+        return sent_us
+
+    def _find(self, name: str) -> _Stamp | None:
+        """By the name of its field; a message that is addressed to somebody holds a time of whoever asks (PING)."""
+        fields = dialect.load().messages[name].fields
+        found: _Stamp | None = None
+        if "target_system" not in fields:
+            for each in _FIELDS:
+                field = fields.get(each)
+                if field is not None and not field.length and field.unit in _LENGTHS:
+                    found = _Stamp(each, _LENGTHS[field.unit], field.type == "uint32_t")
+                    break
+        self._stamps[name] = found
+        return found

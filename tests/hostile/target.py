@@ -42,9 +42,16 @@ class Target:
         if greet:
             for message in greeting(flavour):
                 self.receive(self.says(message))
-            self.driver.tick(0)
+            self._synchronise(self.driver.tick(0)[1])
             self.sent.clear()
             self.events.clear()
+
+    def _synchronise(self, frames: list[bytes]) -> None:
+        """Answer TIMESYNC, so that what it reports has an age and is taken in; it has been up for a second."""
+        for frame in frames:
+            for each in self._codec.parse(frame):
+                if each.name == "TIMESYNC":
+                    self.receive(self.says(mavlink.MAVLink_timesync_message(1_000_000_000, each.message.ts1)))
 
     def says(self, message: Any, ahead_us: int = 0) -> bytes:
         """A frame of the vehicle's own."""

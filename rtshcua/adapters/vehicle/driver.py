@@ -216,6 +216,8 @@ class Driver:
         """Take in one frame; False if a manoeuvre sees nothing new in it."""
         name, message, component = frame.name, frame.message, frame.component
         at_us = self.source.of(frame, now_us)
+        if self.source.stepped:
+            self._seen.made_us.clear()
         if component == _AUTOPILOT:
             self._spoken.add(name)
         elif name in self._spoken:

@@ -18,13 +18,10 @@ not advance is the same measurement again, and keeps the time that it was given 
 
 from typing import Any, Final, NamedTuple
 
-from rtshcua.adapters.vehicle.vehicle_clock import VehicleClock
+from rtshcua.adapters.vehicle.vehicle_clock import APART_US, VehicleClock
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.frames import Received
 
-#: A stamp that lies ahead of us by no more than this shows that the clocks ran apart, one that lies farther ahead is
-#: none of this clock's.
-AHEAD_US: Final = 250_000
 #: After a silence of this length the next frame counts as sent after all before, whatever its number.
 GAP_US: Final = 500_000
 #: The delay of the link is the largest within this time, and at most twice as long.
@@ -51,6 +48,8 @@ class SourceTime:
 
     def __init__(self) -> None:
         self.clock = VehicleClock()
+        self.stepped = False
+        """Whether the last frame showed that the vehicle's clock was set: times from before it mean nothing."""
         self._stamps: dict[str, _Stamp | None] = {}
         self._offset_us: int | None = None
         self._until_us = 0  # the offset holds until then
@@ -90,6 +89,7 @@ class SourceTime:
         known. To be called once for every frame of the vehicle's system.
         """
         message, name, _, component, number, _, _ = frame
+        self.stepped = False
         stamp = self._stamps[name] if name in self._stamps else self._find(name)
         if component != _AUTOPILOT:
             return self._of_another(name, message, component, stamp, now_us)
@@ -141,8 +141,13 @@ class SourceTime:
             ago = (up - boot) % _WRAP
             boot = up - (ago if ago < _HALF else ago - _WRAP)
         at_us = self._checked(offset_us + boot * us, now_us)
-        if at_us is not None and (told is None or at_us > told[1]):
-            self._told[_AUTOPILOT, name] = (raw, at_us)
+        if at_us is None:
+            return None
+        if told is not None and at_us < told[1]:
+            if not 0 < (raw - told[0]) % _WRAP < _HALF:
+                return at_us  # overtaken
+            at_us = told[1]  # measured later, though the clocks were seen to run apart
+        self._told[_AUTOPILOT, name] = (raw, at_us)
         return at_us
 
     def _checked(self, at_us: int, now_us: int) -> int | None:
@@ -150,7 +155,7 @@ class SourceTime:
         ahead_us = at_us - now_us
         if ahead_us <= 0:
             return at_us
-        if ahead_us > AHEAD_US:
+        if ahead_us > APART_US:  # none of this clock's
             self.clock.doubt(now_us)
             return None
         self.clock.reduce(ahead_us, now_us)
@@ -158,7 +163,8 @@ class SourceTime:
         return now_us
 
     def _synchronise(self, message: Any, now_us: int) -> None:
-        if self.clock.answer(message.tc1, message.ts1, now_us):
+        self.stepped = self.clock.answer(message.tc1, message.ts1, now_us)
+        if self.stepped:
             self._told.clear()
             self._sent_us = None
             self._order = [None] * _NUMBERS

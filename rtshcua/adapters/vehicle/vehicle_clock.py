@@ -34,6 +34,8 @@ STEP_US, DRIFT_US = 250_000, 2_500
 _OUTSTANDING: Final = 64
 #: A doubt that follows an answer so soon has to wait, lest a message whose stamps are wrong has us ask without end.
 _REST_US: Final = 500_000
+#: A bound that proves wrong by no more than this shows that the clocks ran apart, by more that one of them was set.
+APART_US: Final = 500_000
 #: ArduPilot reckons with the UART's rate where there is none (SITL over TCP), and is early by some ms.
 _NOTABLE_US: Final = 20_000
 #: requests under way at first; with more the link is not asked any faster for it
@@ -92,7 +94,7 @@ class VehicleClock:
         return EACH_US
 
     def answer(self, tc1_ns: int, ts1_ns: int, now_us: int) -> bool:
-        """An answer came. True if nothing holds any more that was concluded before: its clock went forward at once."""
+        """An answer came. True if nothing holds any more that was concluded before: its clock was set forward."""
         sent_us = self._asked.pop(ts1_ns, None)
         if sent_us is None or tc1_ns <= 0 or now_us < sent_us:
             return False
@@ -101,11 +103,11 @@ class VehicleClock:
         self._trips.append(now_us - sent_us)
         held_us = self.offset_us(now_us)
         least_us, most_us = sent_us + -tc1_ns // 1_000, now_us + 1 - tc1_ns // 1_000
-        stepped = held_us is not None and most_us < held_us
-        if held_us is None or stepped or least_us - _drift_us(now_us - sent_us) > held_us:
+        wrong_us = 0 if held_us is None else held_us - most_us
+        if held_us is None or wrong_us > 0 or least_us - _drift_us(now_us - sent_us) > held_us:
             self._least_us, self._since_us = least_us, sent_us
         self.error_us = most_us - (self.offset_us(now_us) or 0)
-        return stepped
+        return wrong_us > APART_US
 
     def offset_us(self, now_us: int) -> int | None:
         """Ours minus the vehicle's, at the least; None before the first answer."""

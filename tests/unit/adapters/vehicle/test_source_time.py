@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference.stamped_link import LinkKind, StampedVehicle
-from rtshcua.adapters.vehicle.source_time import AHEAD_US, GAP_US, SourceTime
-from rtshcua.adapters.vehicle.vehicle_clock import DRIFT_US, EACH_US, STEP_US
+from rtshcua.adapters.vehicle.source_time import GAP_US, SourceTime
+from rtshcua.adapters.vehicle.vehicle_clock import APART_US, DRIFT_US, EACH_US, STEP_US
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.decode import kind_of
 from rtshcua.mavlink.frames import Received
@@ -219,7 +219,7 @@ def test_a_stamp_far_ahead_is_none_of_this_clocks_and_has_it_ask_soon() -> None:
     now_us = 12_500_000
     assert ear.source.clock.due(now_us) is None
     sent = ear.place(12_490_000, now_us)
-    assert ear.hear(gps(now_us - ear.offset_us + AHEAD_US + 100_000), now_us) == sent
+    assert ear.hear(gps(now_us - ear.offset_us + APART_US + 100_000), now_us) == sent
     assert ear.source.clock.due(now_us) is not None
 
 
@@ -230,12 +230,29 @@ def test_clocks_that_ran_apart_faster_than_allowed_make_ages_older_not_younger()
     assert ear.place(10_100_000, 10_120_000) == 10_100_000 - ahead_us
 
 
+def test_a_small_correction_costs_no_good_frame() -> None:
+    """The clock ran 300 ms fast within a second: what is measured later is never given an earlier time."""
+    ear = Ear()
+    for step in range(6):
+        ear.synchronise(10 * S + step * 100_000)
+    before = ear.place(11 * S, 11 * S)
+    ear.offset_us -= 300_000
+    ear.synchronise(11_600_000)
+    assert not ear.source.stepped
+    times = [ear.place(now_us - 50_000, now_us) for now_us in range(11_650_000, 13 * S, 50_000)]
+    assert times == sorted(times)
+    assert before is not None
+    assert times[0] is not None
+    assert before <= times[0] <= 11_600_000
+
+
 def test_a_vehicle_whose_clock_was_set_forward_is_not_believed_to_be_young() -> None:
     ear = Ear()
     for step in range(6):
         ear.synchronise(10 * S + step * 100_000)
     ear.offset_us -= 5 * S
     ear.synchronise(12 * S)
+    assert ear.source.stepped
     assert ear.source.unready is None
     assert ear.place(9 * S, 12 * S + 1) == 9 * S - DRIFT_US, "3 s on the way"
 

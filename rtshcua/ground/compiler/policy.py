@@ -23,7 +23,7 @@ from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.ground.compiler.rules import Rules
 from rtshcua.ground.compiler.slots import Slots
 from rtshcua.ground.compiler.zones import ZoneTable
-from rtshcua.model.flat.policy import Airspace, Policy, Rule, Vehicle, WithoutEvidence
+from rtshcua.model.flat.policy import SILENCE_US, AfterSilence, Airspace, Policy, Rule, Vehicle, WithoutEvidence
 from rtshcua.model.ir.places import GeoJson, VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.policies import Rule as RuleDecl
@@ -91,6 +91,7 @@ def lower_policy(
     lowered_rules = Rules(context, numbers, roles, conditions, contracts, table).lowered(policy)
     contingency = contracts.chain(policy.contingency)
     airspace = _airspace(policy, zones, table)
+    silence = policy.without_link
     if len(context.report.found) > before:
         return None
     flat = Policy(
@@ -114,6 +115,8 @@ def lower_policy(
         monitors=tuple(conditions.monitors.all),
         phases=tuple(conditions.sets.phases),
         without_evidence=int(WithoutEvidence[policy.without_evidence.upper()]),
+        silence_us=SILENCE_US if silence is None else silence.limit.value,
+        after_silence=int(AfterSilence.CONTINGENCY if silence is None else AfterSilence[silence.then.upper()]),
     )
     if not fits(context, policy, flat):
         return None

@@ -103,7 +103,8 @@ ITEMS = {
     "use": _WITHOUT_COLUMN,
     "airspace": _style("inside", "outside", aligned=False),
     "contingency": _WITHOUT_COLUMN,
-    "without": _WITHOUT_COLUMN,
+    "without_evidence": _WITHOUT_COLUMN,
+    "without_link": _WITHOUT_COLUMN,
     # of missions
     "intent": _PART,
     "proposed": _PART,

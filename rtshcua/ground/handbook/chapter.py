@@ -18,7 +18,7 @@ from rtshcua.ground.handbook.model import (
 from rtshcua.ground.handbook.rights import asked_of, rights, rule_names
 from rtshcua.ground.handbook.subject import Subject
 from rtshcua.ground.handbook.words.places import told_vehicle
-from rtshcua.ground.handbook.words.rules import told_airspace, told_evidence, told_rule
+from rtshcua.ground.handbook.words.rules import told_airspace, told_evidence, told_rule, told_silence
 from rtshcua.ground.handbook.words.signals import told_members, told_sources, told_type, told_unknown
 from rtshcua.ground.handbook.words.skills import (
     AS_LINK,
@@ -30,7 +30,7 @@ from rtshcua.ground.handbook.words.skills import (
     told_timing,
 )
 from rtshcua.ground.handbook.zones import zones
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import AfterSilence, Policy
 from rtshcua.model.ir.skills import Clause, SkillDecl
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
@@ -70,6 +70,7 @@ def chapter(
         airspace=told_airspace(declaration.airspace),
         contingency=told_chain(declaration.contingency, subject.names),
         evidence=told_evidence(declaration.without_evidence),
+        silence=told_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),
         skills=tuple(
             _skill(subject, subject.symbols.skills[each.name], each.name in changed.skills) for each in policy.contracts
         ),

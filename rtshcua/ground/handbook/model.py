@@ -230,6 +230,7 @@ class Chapter:
     airspace: str
     contingency: tuple[str, ...]
     evidence: str
+    silence: str
     skills: tuple[SkillTold, ...]
     signals: tuple[SignalTold, ...]
     states: tuple[Fact, ...]

@@ -12,7 +12,7 @@ _QUOTED = 60
 
 class Difference(NamedTuple):
     """One thing that differs: in a few words, and what it is (`rule`, `order`, `airspace`, `contingency`, `evidence`,
-    `vehicle`, `zone`, `skill`, `signal`).
+    `silence`, `vehicle`, `zone`, `skill`, `signal`).
 
     A `rule` has its texts, empty where there is none; what has fields has its name, and which of them differ: all of
     them, where it is new or gone.
@@ -47,6 +47,8 @@ def _differences(old: Meaning, new: Meaning) -> Iterator[Difference]:
         yield Difference("the contingency", "contingency")
     if old.without_evidence() != new.without_evidence():
         yield Difference("what is done without evidence", "evidence")
+    if old.without_link() != new.without_link():
+        yield Difference("what flies after a silence of the vehicle", "silence")
     vehicle = _fields(old.vehicle(), new.vehicle())
     if vehicle:
         yield Difference(f"the vehicle ({', '.join(vehicle)})", "vehicle", fields=vehicle)

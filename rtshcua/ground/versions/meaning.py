@@ -102,6 +102,10 @@ class Meaning:
         """What a flight does while its records are not kept."""
         return self._policy.without_evidence
 
+    def without_link(self) -> Part:
+        """What follows after a long silence of the vehicle, and after how long."""
+        return self._policy.silence_us, self._policy.after_silence
+
     def _contract(self, contract: Contract) -> Fields:
         own = contract.parameters
         return {

@@ -46,6 +46,17 @@ class WithoutEvidence(IntEnum):
     REFUSE = 1  # what runs may finish, and no further step begins
 
 
+class AfterSilence(IntEnum):
+    """What follows when the vehicle is heard again, its state is fresh, and it was silent for too long."""
+
+    CONTINUE = 0  # the step goes on, as long as all that must hold holds
+    CONTINGENCY = 1  # the mission is given up: the contingency flies
+
+
+#: the longest silence after which a flight simply goes on, where a policy does not say it, us
+SILENCE_US = 30_000_000
+
+
 class MonitorKind(IntEnum):
     """What a temporal monitor remembers of its condition."""
 
@@ -113,7 +124,8 @@ class Policy(Flat, frozen=True):
     `sets` are membership sets of enumeration values or zone indexes. `tables` map each declared zone's index to a
     derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
     mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
-    SHA-256 of each. `without_evidence` is a `WithoutEvidence`.
+    SHA-256 of each. `without_evidence` is a `WithoutEvidence`. After a silence of the vehicle longer than `silence_us`,
+    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing.
     """
 
     name: str
@@ -136,3 +148,5 @@ class Policy(Flat, frozen=True):
     monitors: tuple[Monitor, ...] = ()
     phases: tuple[str, ...] = ()
     without_evidence: int = 0
+    silence_us: int = SILENCE_US
+    after_silence: int = AfterSilence.CONTINGENCY

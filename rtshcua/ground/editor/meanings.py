@@ -45,8 +45,8 @@ KEYWORDS: Mapping[str, str] = {
     "through": "The sources that may speak for the role: `agent`, `operator`, `onboard`, `reflex`.",
     "airspace": "Where the vehicle may be at all: inside of all of the first zones, outside of the others.",
     "contingency": "What flies when a step is denied in the air.",
-    "without": "`without evidence land` or `refuse`: what becomes of a flight whose records are not kept. `without link for 30 s "
-    "contingency` or `continue`: what follows when the vehicle was silent for longer.",
+    "without": "`without evidence land` or `refuse`: what becomes of a flight whose records are not kept. `without"
+    " link for 30 s contingency` or `continue`: what follows when the vehicle was silent for longer.",
     "template": "Rules with parameters, which policies `use`.",
     "use": "Puts the rules of a template into the policy, with these arguments.",
     "any": "Every skill, or after `by` every role.",

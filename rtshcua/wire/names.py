@@ -19,7 +19,7 @@ class Artefact:
 
 
 ROOT: Final = Artefact("rtshcua/root", 1)
-POLICY: Final = Artefact("rtshcua/policy", 3)  # 3: with what to do without evidence
+POLICY: Final = Artefact("rtshcua/policy", 4)  # 4: with what flies after a long silence of the vehicle
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 1)

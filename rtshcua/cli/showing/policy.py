@@ -4,7 +4,7 @@ from rtshcua.adapters.loop import WAIT_US
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.contract import show_contract
 from rtshcua.cli.showing.page import Page
-from rtshcua.model.flat.policy import Policy, WithoutEvidence
+from rtshcua.model.flat.policy import AfterSilence, Policy, WithoutEvidence
 from rtshcua.model.flat.signal import Signal
 from rtshcua.onboard.runtime.bounds import falling_us
 from rtshcua.onboard.runtime.flight import Limits
@@ -13,6 +13,11 @@ from rtshcua.onboard.runtime.flight import Limits
 _WITHOUT_EVIDENCE: dict[int, str] = {
     WithoutEvidence.LAND: "evidence land: while records are not kept the mission is given up",
     WithoutEvidence.REFUSE: "evidence refuse: while records are not kept no further step begins",
+}
+#: what `without link` says, and means
+_AFTER_SILENCE: dict[int, str] = {
+    AfterSilence.CONTINUE: "continue: after a longer silence the step goes on, if all that must hold holds",
+    AfterSilence.CONTINGENCY: "contingency: after a longer silence the mission is given up, and the contingency flies",
 }
 _HOUR_US = 3_600_000_000
 _MINUTE_US = 60_000_000
@@ -34,6 +39,10 @@ def show_policy(page: Page, policy: Policy) -> None:
     page.row("position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this")
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
     page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
+    if vehicle.without:
+        page.row(
+            "without", f"{', '.join(vehicle.without)}: not fitted; clauses `where fitted` that read it are left out"
+        )
     page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
     page.row("roles", ", ".join(policy.roles))
     page.rows("sources", policy.sources)
@@ -49,6 +58,8 @@ def show_policy(page: Page, policy: Policy) -> None:
         most = words.duration(-(-falling_us(policy, None, Limits(), WAIT_US) // _MINUTE_US) * _MINUTE_US)
         page.row("", f"at most {most} until it is down, or given up after the last tries")
     page.row("without", _WITHOUT_EVIDENCE.get(policy.without_evidence, f"evidence: {policy.without_evidence}?"))
+    then = _AFTER_SILENCE.get(policy.after_silence, f"{policy.after_silence}?")
+    page.row("without", f"link for {words.duration(policy.silence_us)} {then}")
 
     if policy.monitors:
         page.head("Temporal monitors: what conditions of the past look at")

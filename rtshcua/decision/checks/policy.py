@@ -9,8 +9,8 @@ from rtshcua.decision.checks.rules import airspace, rules
 from rtshcua.decision.checks.vehicle import signals, vehicle
 from rtshcua.decision.checks.zones import zones
 from rtshcua.decision.scope import scope_of
-from rtshcua.model.flat.limits import MAX_CONTRACTS, MAX_MEMBERS, MAX_ROLES, MAX_SETS
-from rtshcua.model.flat.policy import Policy, WithoutEvidence
+from rtshcua.model.flat.limits import MAX_CONTRACTS, MAX_MEMBERS, MAX_ROLES, MAX_SETS, MAX_SILENCE
+from rtshcua.model.flat.policy import AfterSilence, Policy, WithoutEvidence
 
 
 def problems(policy: Policy) -> Iterator[str]:
@@ -34,3 +34,5 @@ def problems(policy: Policy) -> Iterator[str]:
     yield from rules(policy, scope)
     yield from at("airspace", airspace(policy.airspace, policy))
     yield from within("without evidence", policy.without_evidence, WithoutEvidence.LAND, WithoutEvidence.REFUSE)
+    yield from within("silence", policy.silence_us, 1, MAX_SILENCE)
+    yield from within("after silence", policy.after_silence, AfterSilence.CONTINUE, AfterSilence.CONTINGENCY)

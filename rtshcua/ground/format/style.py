@@ -77,6 +77,7 @@ ITEMS = {
     "elevation": _PART,
     "return_at": _PART,
     "brakes": _PART,
+    "not_fitted": _PART,
     # of skills and steps
     "climb_to": _PART,
     "fly_to": _PART,
@@ -103,7 +104,8 @@ ITEMS = {
     "use": _WITHOUT_COLUMN,
     "airspace": _style("inside", "outside", aligned=False),
     "contingency": _WITHOUT_COLUMN,
-    "without": _WITHOUT_COLUMN,
+    "without_evidence": _WITHOUT_COLUMN,
+    "without_link": _WITHOUT_COLUMN,
     # of missions
     "intent": _PART,
     "proposed": _PART,

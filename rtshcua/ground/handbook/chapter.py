@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from rtshcua.ground.compiler.fitted import applies
 from rtshcua.ground.handbook.changes import Changes, changes
 from rtshcua.ground.handbook.model import (
     CaseTold,
@@ -18,19 +19,20 @@ from rtshcua.ground.handbook.model import (
 from rtshcua.ground.handbook.rights import asked_of, rights, rule_names
 from rtshcua.ground.handbook.subject import Subject
 from rtshcua.ground.handbook.words.places import told_vehicle
-from rtshcua.ground.handbook.words.rules import told_airspace, told_evidence, told_rule
+from rtshcua.ground.handbook.words.rules import told_airspace, told_evidence, told_rule, told_silence
 from rtshcua.ground.handbook.words.signals import told_members, told_sources, told_type, told_unknown
 from rtshcua.ground.handbook.words.skills import (
     AS_LINK,
     told_chain,
     told_clause,
+    told_left_out,
     told_motion,
     told_parameter,
     told_record,
     told_timing,
 )
 from rtshcua.ground.handbook.zones import zones
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import AfterSilence, Policy
 from rtshcua.model.ir.skills import Clause, SkillDecl
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
@@ -70,6 +72,7 @@ def chapter(
         airspace=told_airspace(declaration.airspace),
         contingency=told_chain(declaration.contingency, subject.names),
         evidence=told_evidence(declaration.without_evidence),
+        silence=told_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),
         skills=tuple(
             _skill(subject, subject.symbols.skills[each.name], each.name in changed.skills) for each in policy.contracts
         ),
@@ -101,8 +104,11 @@ def _rule(subject: Subject, number: int, changed: Changes) -> RuleTold:
 def _skill(subject: Subject, skill: SkillDecl, changed: bool) -> SkillTold:
     names = asked_of(subject, [skill])
 
+    without = frozenset(subject.policy.vehicle.without)
+    parts = (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
+
     def clauses(some: tuple[Clause, ...]) -> tuple[str, ...]:
-        return tuple(told_clause(each, names) for each in some)
+        return tuple(told_clause(each, names) for each in some if applies(each, without))
 
     return SkillTold(
         name=skill.name.text,
@@ -115,6 +121,9 @@ def _skill(subject: Subject, skill: SkillDecl, changed: bool) -> SkillTold:
         require=clauses(skill.require),
         assume=clauses(skill.assume),
         maintain=clauses(skill.maintain),
+        left_out=tuple(
+            told_left_out(part, each, names) for part, some in parts for each in some if not applies(each, without)
+        ),
         fallback=told_chain(skill.fallback, names),
         as_link=AS_LINK if skill.name.text in _last_links(subject) else "",
         record=told_record(skill),

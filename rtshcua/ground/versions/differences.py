@@ -12,7 +12,7 @@ _QUOTED = 60
 
 class Difference(NamedTuple):
     """One thing that differs: in a few words, and what it is (`rule`, `order`, `airspace`, `contingency`, `evidence`,
-    `vehicle`, `zone`, `skill`, `signal`).
+    `silence`, `sensor`, `vehicle`, `zone`, `skill`, `signal`).
 
     A `rule` has its texts, empty where there is none; what has fields has its name, and which of them differ: all of
     them, where it is new or gone.
@@ -40,6 +40,12 @@ def compared(old: Policy, new: Policy) -> tuple[Difference, ...]:
 
 
 def _differences(old: Meaning, new: Meaning) -> Iterator[Difference]:
+    # what is no longer watched comes first: a finding tells of few differences
+    for name in sorted(new.without() - old.without()):
+        words = f"looser: the vehicle is now without the signal `{name}`, and clauses `where fitted` on it are left out"
+        yield Difference(words, "sensor", name)
+    for name in sorted(old.without() - new.without()):
+        yield Difference(f"the vehicle is no longer without the signal `{name}`", "sensor", name)
     yield from _rules(old.rules(), new.rules())
     if old.airspace() != new.airspace():
         yield Difference("the airspace", "airspace")
@@ -47,6 +53,8 @@ def _differences(old: Meaning, new: Meaning) -> Iterator[Difference]:
         yield Difference("the contingency", "contingency")
     if old.without_evidence() != new.without_evidence():
         yield Difference("what is done without evidence", "evidence")
+    if old.without_link() != new.without_link():
+        yield Difference("what flies after a silence of the vehicle", "silence")
     vehicle = _fields(old.vehicle(), new.vehicle())
     if vehicle:
         yield Difference(f"the vehicle ({', '.join(vehicle)})", "vehicle", fields=vehicle)

@@ -13,6 +13,7 @@ FULL = 10_000  # 1/10000: a full charge
 DAY = 86_400_000_000  # us
 
 MAX_SLOTS = 72  # with which no request is larger than 1 KiB
+MAX_SILENCE = 3_600_000_000  # us: after which silence of the vehicle a policy may decide at the latest
 MAX_STALE = (1 << 32) - 2  # us, about 71 minutes: the ages of a request saturate just above
 MAX_ROLES = 64
 MAX_ZONES = 4_096  # declared and derived

@@ -46,6 +46,17 @@ class WithoutEvidence(IntEnum):
     REFUSE = 1  # what runs may finish, and no further step begins
 
 
+class AfterSilence(IntEnum):
+    """What follows when the vehicle is heard again, its state is fresh, and it was silent for too long."""
+
+    CONTINUE = 0  # the step goes on, as long as all that must hold holds
+    CONTINGENCY = 1  # the mission is given up: the contingency flies
+
+
+#: the longest silence after which a flight simply goes on, where a policy does not say it, us
+SILENCE_US = 30_000_000
+
+
 class MonitorKind(IntEnum):
     """What a temporal monitor remembers of its condition."""
 
@@ -84,7 +95,7 @@ class Vehicle(Flat, frozen=True):
     `return_altitude` (mm above home) is the height that a return climbs to, if it is lower, before it flies home.
     Told to stop, it goes on for at most `reaction_us` and then loses at least `braking` mm/s of its speed in a second;
     with `braking` 0 that is not declared. `north`, `east`, `down` are the slots of the signals of its velocity over
-    ground, -1 each without `braking`.
+    ground, -1 each without `braking`. `without` are the names of the signals whose sensors are not fitted, ascending.
     """
 
     name: str
@@ -105,6 +116,21 @@ class Vehicle(Flat, frozen=True):
     north: int = -1
     east: int = -1
     down: int = -1
+    without: tuple[str, ...] = ()
+
+
+class LeftOut(Flat, frozen=True):
+    """A clause `where fitted` that a contract does not have, for the vehicle is without a signal that it reads.
+
+    `part` is `require`, `assume` or `maintain`. Nothing is decided by it; it is there to be read.
+    """
+
+    skill: int
+    part: str
+    text: str
+    source: int
+    start: int
+    end: int
 
 
 class Policy(Flat, frozen=True):
@@ -113,7 +139,9 @@ class Policy(Flat, frozen=True):
     `sets` are membership sets of enumeration values or zone indexes. `tables` map each declared zone's index to a
     derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
     mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
-    SHA-256 of each. `without_evidence` is a `WithoutEvidence`.
+    SHA-256 of each. `without_evidence` is a `WithoutEvidence`. After a silence of the vehicle longer than `silence_us`,
+    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing. `left_out` are the clauses that
+    do not apply to the vehicle.
     """
 
     name: str
@@ -136,3 +164,6 @@ class Policy(Flat, frozen=True):
     monitors: tuple[Monitor, ...] = ()
     phases: tuple[str, ...] = ()
     without_evidence: int = 0
+    silence_us: int = SILENCE_US
+    after_silence: int = AfterSilence.CONTINGENCY
+    left_out: tuple[LeftOut, ...] = ()

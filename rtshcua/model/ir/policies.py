@@ -63,9 +63,17 @@ class Airspace(Node):
     outside: tuple[Name, ...]
 
 
+class Silence(Node):
+    """`without link for 30 s contingency`: what follows when the vehicle was silent for longer than `limit`."""
+
+    limit: Quantity
+    then: Literal["contingency", "continue"]
+
+
 class PolicyDecl(Node):
-    """`policy name version 7 { ... }`. `contingency` flies when a step is denied in the air, and `without_evidence`
-    says what becomes of a flight while its records are not kept.
+    """`policy name version 7 { ... }`. `contingency` flies when a step is denied in the air, `without_evidence` says
+    what becomes of a flight while its records are not kept, and `without_link` after a long silence of the vehicle:
+    None means `SILENCE_US` in `model/flat/policy.py`, then the contingency.
     """
 
     name: Name
@@ -76,3 +84,4 @@ class PolicyDecl(Node):
     uses: tuple[Use, ...] = ()
     delegations: tuple[Delegation, ...] = ()
     without_evidence: Literal["land", "refuse"] = "land"
+    without_link: Silence | None = None

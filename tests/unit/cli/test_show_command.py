@@ -201,6 +201,20 @@ def test_what_is_done_without_evidence(number: int, said: str) -> None:
     assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
 
 
+@pytest.mark.parametrize(
+    ("silence_us", "then", "said"),
+    [
+        (30_000_000, 1, "link for 30 s contingency: "),
+        (90_000_000, 0, "link for 90 s continue: "),
+        (1, 7, "link for 1 us 7?"),
+    ],
+)
+def test_what_flies_after_a_silence(silence_us: int, then: int, said: str) -> None:
+    page = Page()
+    show_policy(page, replace(case.policy(), silence_us=silence_us, after_silence=then))
+    assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
+
+
 def test_a_bundle_that_makes_no_sense(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     policy = case.policy()
     broken = replace(policy, contingency=tuple(replace(link, skill=99) for link in policy.contingency))

@@ -18,7 +18,7 @@ from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation, pre
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.watch import watch
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
-from rtshcua.model.flat.limits import MAX_RULES, MAX_SLOTS, MAX_STALE, MAX_ZONES
+from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STALE, MAX_ZONES
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Policy, RuleKind
 from rtshcua.model.flat.zone import CIRCLE, MAX_COORDINATE, MAX_VERTICES, POLYGON, Zone
@@ -188,6 +188,11 @@ POLICIES: list[tuple[Policy, str]] = [
     (contract(HOVER, record=("buffered",)), "skill `hover`: recorded as `buffered`, which is for reflexes alone"),
     (replace(P, without_evidence=2), "without evidence 2 is not in 0..1"),
     (replace(P, without_evidence=-1), "without evidence -1 is not in 0..1"),
+    (replace(P, silence_us=0), f"silence 0 is not in 1..{MAX_SILENCE}"),
+    (replace(P, silence_us=-1), f"silence -1 is not in 1..{MAX_SILENCE}"),
+    (replace(P, silence_us=MAX_SILENCE + 1), f"silence {MAX_SILENCE + 1} is not in 1..{MAX_SILENCE}"),
+    (replace(P, after_silence=2), "after silence 2 is not in 0..1"),
+    (replace(P, after_silence=-1), "after silence -1 is not in 0..1"),
 ]
 
 

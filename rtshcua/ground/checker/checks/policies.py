@@ -11,7 +11,7 @@ from rtshcua.ground.checker.lookup import find_skill, find_zone
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.uses import brought_about
 from rtshcua.model.flat.contract import SourceKind
-from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.limits import MAX_SILENCE, MAX_VALUE
 from rtshcua.model.ir.policies import PolicyDecl, Rule
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension
@@ -36,6 +36,8 @@ def check(context: Context) -> None:
             for name in (*policy.airspace.inside, *policy.airspace.outside):
                 find_zone(context, name)
         _contingency(context, policy)
+        if policy.without_link is not None:
+            quantity(context, policy.without_link.limit, Dimension.DURATION, most=MAX_SILENCE)
     for rule in context.samples:
         _rule(context, rule)
 

@@ -113,6 +113,17 @@ def told_evidence(without: str) -> str:
     return "If the records of a flight cannot be kept, the mission is given up and the vehicle comes down."
 
 
+def told_silence(limit_us: int, then: str) -> str:
+    """What follows after a long silence of the vehicle."""
+    again = "when it is heard again and its state is fresh"
+    if then == "continue":
+        follows = f"the step goes on {again}, as long as all that it needs holds"
+    else:
+        follows = f"the mission is given up {again}, and the contingency flies"
+    limit = display(limit_us, Dimension.DURATION)
+    return f"If the vehicle was silent for longer than {limit}, {follows}. A shorter silence ends nothing."
+
+
 def _origin(origin: Node, names: Vocabulary) -> str:
     match origin:
         case Use():

@@ -8,7 +8,7 @@ from rtshcua.ground.language.build.base import Part
 from rtshcua.ground.language.build.skills import Skills
 from rtshcua.model.ir.expression import Condition, Quantity
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, Rule, TemplateDecl, Use
+from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, Rule, Silence, TemplateDecl, Use
 from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
 
 Names = tuple[Name, ...]
@@ -62,9 +62,13 @@ class Policies(Skills):
         """`contingency hover for 10 s, return_home, emergency_land`."""
         return Part("contingency", span, links)
 
-    def without(self, span: Span, otherwise: Any) -> Part:
+    def without_evidence(self, span: Span, otherwise: Any) -> Part:
         """`without evidence refuse`."""
-        return Part("without", span, otherwise)
+        return Part("without evidence", span, otherwise)
+
+    def without_link(self, span: Span, limit: Quantity, then: Any) -> Part:
+        """`without link for 30 s contingency`."""
+        return Part("without link", span, Silence(span=span, limit=limit, then=then))
 
     def use(self, span: Span, template: Name, arguments: tuple[ArgumentValue, ...] | None) -> Use:
         """`use low_flight(bridge_a, top = 30 m)`."""
@@ -95,7 +99,8 @@ class Policies(Skills):
                 contingency=found["contingency"].value if "contingency" in found else (),
                 uses=tuple(use for use in given if isinstance(use, Use)),
                 delegations=tuple(each for each in given if isinstance(each, Delegation)),
-                without_evidence=found["without"].value if "without" in found else "land",
+                without_evidence=found["without evidence"].value if "without evidence" in found else "land",
+                without_link=found["without link"].value if "without link" in found else None,
             ),
             name,
         )

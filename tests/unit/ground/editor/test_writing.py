@@ -35,7 +35,7 @@ def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
     [
         (HEAD, ["zone", "policy", "mission", "import", "test", "nominal"], ["pond", "permit", "and"]),
         (HEAD + "zo", ["zone"], ["permit"]),
-        (POLICY, ["permit", "forbid", "airspace", "contingency", "without evidence"], ["zone", "pond", "deadline"]),
+        (POLICY, ["permit", "forbid", "airspace", "contingency", "without"], ["zone", "pond", "deadline"]),
         (POLICY + "permit ", ["look", "goto", "any"], ["pond", "quad", "operator"]),
         (POLICY + "permit look, ho", ["hover", "goto"], ["pond"]),
         (POLICY + "permit look by ", ["role", "any"], ["look"]),

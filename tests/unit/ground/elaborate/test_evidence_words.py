@@ -1,4 +1,4 @@
-"""How durable records are to be, and what is done without them, from the words of the language to the flat form."""
+"""How durable records are to be, and what is done without them or without the link, from the words to the flat form."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,7 @@ from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import Compiled
 from rtshcua.model.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.mission import Invocation
-from rtshcua.model.flat.policy import WithoutEvidence
+from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.request import STEP
 
@@ -89,13 +89,53 @@ def test_without_evidence(compile_text: Compile, site: str, without: str, expect
     assert policy.without_evidence == expected
 
 
-@pytest.mark.parametrize("without", ["without evidence", "without evidence fly", "without refuse"])
+@pytest.mark.parametrize(
+    ("without", "silence_us", "expected"),
+    [
+        ("", 30_000_000, AfterSilence.CONTINGENCY),
+        ("without link for 5 s contingency", 5_000_000, AfterSilence.CONTINGENCY),
+        ("without link for 30 s continue", 30_000_000, AfterSilence.CONTINUE),
+        ("without evidence refuse  without link for 1 h continue", 3_600_000_000, AfterSilence.CONTINUE),
+    ],
+)
+def test_without_link(compile_text: Compile, site: str, without: str, silence_us: int, expected: AfterSilence) -> None:
+    policy = compiled(compile_text, site, without=without).policy
+    assert policy is not None
+    assert (policy.silence_us, policy.after_silence) == (silence_us, expected)
+
+
+@pytest.mark.parametrize(
+    ("limit", "code"), [("0 s", "E0319"), ("-1 s", "E0319"), ("61 min", "E1003"), ("30 m", "E0310")]
+)
+def test_the_silence_is_a_time_above_zero_and_bounded(compile_text: Compile, site: str, limit: str, code: str) -> None:
+    without = f"without link for {limit} contingency"
+    found = compile_text(site + TEXT.format(record="", block="", without=without)).diagnostics
+    assert [each.code.id for each in found] == [code]
+
+
+@pytest.mark.parametrize(
+    "without",
+    [
+        "without evidence",
+        "without evidence fly",
+        "without refuse",
+        "without link contingency",
+        "without link for 30 s",
+        "without link for 30 s land",
+    ],
+)
 def test_no_other_word(compile_text: Compile, site: str, without: str) -> None:
     found = compile_text(site + TEXT.format(record="", block="", without=without)).diagnostics
     assert found[0].code.id == "E0101"
 
 
-def test_once(compile_text: Compile, site: str) -> None:
-    twice = "without evidence land  without evidence refuse"
+@pytest.mark.parametrize(
+    "twice",
+    [
+        "without evidence land  without evidence refuse",
+        "without link for 30 s continue  without link for 30 s continue",
+    ],
+)
+def test_once(compile_text: Compile, site: str, twice: str) -> None:
     found = compile_text(site + TEXT.format(record="", block="", without=twice)).diagnostics
     assert found[0].code.id == "E0106"

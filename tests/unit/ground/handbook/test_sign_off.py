@@ -13,7 +13,7 @@ from rtshcua.ground.handbook.handbook import Part, handbook
 from rtshcua.ground.handbook.model import ChangeTold, Handbook
 from rtshcua.ground.handbook.page import page
 from rtshcua.ground.handbook.words.differences import ELSE
-from rtshcua.model.flat.policy import WithoutEvidence
+from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.outcome import Reason
 
 EVERYTHING = Path(__file__).with_name("everything.rts")
@@ -93,6 +93,11 @@ def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], Part]
     assert told["the airspace"].after[0].startswith("The vehicle may only be inside of `yard` and outside of `works`")
     assert "comes down" in told["what is done without evidence"].before[0]
     assert "may finish" in told["what is done without evidence"].after[0]
+    told = changes(everything, silence_us=30_000_000, after_silence=int(AfterSilence.CONTINGENCY))
+    (silence,) = told.values()
+    assert silence.what == "what flies after a silence of the vehicle"
+    assert "longer than 30 s, the mission is given up" in silence.before[0]
+    assert "longer than 45 s, the step goes on" in silence.after[0]
     told = changes(everything, contingency=policy.contingency[1:])
     assert told["the contingency"].before == ("`return_home`, then `emergency_land`",)
     assert told["the contingency"].after[0].startswith("`hover` with `time` 10 s for at most 10 s, then `return_home`")

@@ -14,7 +14,7 @@ from rtshcua.ground.handbook.subject import within
 from rtshcua.ground.handbook.words.cases import told_nominal
 from rtshcua.ground.handbook.words.conditions import told_condition
 from rtshcua.ground.handbook.words.places import places_of, told_band, told_shape, told_times, told_vehicle
-from rtshcua.ground.handbook.words.rules import told_airspace, told_delegation, told_evidence, told_rule
+from rtshcua.ground.handbook.words.rules import told_airspace, told_delegation, told_evidence, told_rule, told_silence
 from rtshcua.ground.handbook.words.signals import told_members, told_sources, told_type, told_unknown
 from rtshcua.ground.handbook.words.skills import (
     told_chain,
@@ -172,6 +172,9 @@ def tell_policy(policy: PolicyDecl, names: Vocabulary) -> object:
         told_airspace(policy.airspace),
         told_chain(policy.contingency, names),
         told_evidence(policy.without_evidence),
+        None
+        if policy.without_link is None
+        else told_silence(policy.without_link.limit.value, policy.without_link.then),
     )
 
 

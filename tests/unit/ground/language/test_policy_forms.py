@@ -21,10 +21,16 @@ def test_policy(plain: Plain, unit: Read) -> None:
       airspace inside city, field outside school
       contingency hover for 10 s, land
     }
-    policy q version 1 { airspace outside z  without evidence refuse }
+    policy q version 1 { airspace outside z  without evidence refuse  without link for 1 min continue }
     """
     first, second = plain(unit(text).policies)
-    assert second == {"name": "q", "version": 1, "airspace": {"outside": ["z"]}, "without_evidence": "refuse"}
+    assert second == {
+        "name": "q",
+        "version": 1,
+        "airspace": {"outside": ["z"]},
+        "without_evidence": "refuse",
+        "without_link": {"limit": (60_000_000, "duration"), "then": "continue"},
+    }
     less = {"kind": "comparison", "operator": "<", "left": "&x"}
     assert first == {
         "name": "p",

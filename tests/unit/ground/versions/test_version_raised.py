@@ -144,6 +144,16 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
         ("inside field outside school", "inside field", "the airspace"),
         ("contingency home, down", "contingency home for 2 min, down", "the contingency"),
         ("contingency home, down", "contingency home, down without evidence refuse", "what is done without evidence"),
+        (
+            "contingency home, down",
+            "contingency home, down without link for 31 s contingency",
+            "what flies after a silence of the vehicle",
+        ),
+        (
+            "contingency home, down",
+            "contingency home, down without link for 30 s continue",
+            "what flies after a silence of the vehicle",
+        ),
         ("reserve 15 %", "reserve 16 %", "the vehicle (reserve)"),
         ("position error 3 m energy 100 % = 18 min", "position error 4 m energy 100 % = 19 min",
          "the vehicle (position error, energy)"),

@@ -83,6 +83,8 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _equal(terms, value)
         case tree.Member(argument, index, members):
             return _member(argument, index, tables.sets[members])
+        case tree.Known(index):
+            return _known(index)
         case tree.Inside(zone):
             return _inside(tables.zones[zone], tables.known)
         case tree.InsideArgument(cell, table):
@@ -95,6 +97,13 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _monitored(monitor)
         case _:
             return _in_window(Daytime(node.start, node.end, tables.utc_offset_us))
+
+
+def _known(index: int) -> Condition:
+    def run(at: Environment) -> Truth:
+        return known(TRUE, at.slots[index][2])
+
+    return run
 
 
 def _both(left: Condition, right: Condition) -> Condition:

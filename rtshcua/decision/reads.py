@@ -16,7 +16,7 @@ def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Moni
         code = left.pop().code
         for at in range(0, len(code), 3):
             op = code[at]
-            if op in (Op.SIGNAL, Op.SIGNAL_IN):
+            if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN):
                 slots.add(code[at + 1])
             elif op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT):
                 slots.update(where(vehicle))

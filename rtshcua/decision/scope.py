@@ -23,6 +23,10 @@ class Scope(NamedTuple):
     monitors: int
     phases: int | None
 
+    def slot(self, slot: int) -> str | None:
+        """A slot of any kind."""
+        return None if 0 <= slot < len(self.kinds) else f"there is no slot {slot}"
+
     def number(self, slot: int) -> str | None:
         """A slot that holds a number (an enumeration's ordinal is one)."""
         if not 0 <= slot < len(self.kinds):

@@ -41,6 +41,12 @@ class Member(NamedTuple):
     members: int
 
 
+class Known(NamedTuple):
+    """State slot `at` has a value; unknown while it has none."""
+
+    at: int
+
+
 class Inside(NamedTuple):
     """The vehicle is inside zone `zone`."""
 
@@ -100,7 +106,9 @@ class Not(NamedTuple):
     operand: "Node"
 
 
-Atom: TypeAlias = AtMost | Equal | Member | Inside | InsideArgument | PointInside | InWindow | InPhase | Monitored
+Atom: TypeAlias = (
+    AtMost | Equal | Member | Known | Inside | InsideArgument | PointInside | InWindow | InPhase | Monitored
+)
 Node: TypeAlias = Atom | Both | Either | Not
 
 
@@ -228,6 +236,8 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
             problem, node = scope.enumeration(a) or scope.set_of_members(b), Member(False, a, b)
         case Op.ARGUMENT_IN:
             problem, node = scope.choice_or_zone(a) or scope.set_of_members(b), Member(True, a, b)
+        case Op.KNOWN:
+            problem, node = scope.slot(a) or _unused(b), Known(a)
         case Op.POSITION_IN:
             problem, node = scope.zone(a) or _unused(b), Inside(a)
         case Op.POSITION_IN_ARGUMENT:

@@ -89,6 +89,8 @@ WINDOW_LENGTH = _code("E0321", "window-length", "a temporal window is longer tha
 BAD_DIVISION = _code("E0322", "bad-division", "a value is divided by zero, or by what is not known at compile time")
 PHASE_NAME = _code("E0323", "phase-name", "the mission's phase is compared with something that names no phase")
 
+TURNED_KNOWN = _code("E0324", "turned-known", "`is known` stands under `not` or an edge, and is never false")
+
 # E04: signals and the dialect
 UNKNOWN_MESSAGE = _code("E0401", "unknown-message", "the dialect has no such message")
 UNKNOWN_FIELD = _code("E0402", "unknown-field", "the message has no such field")
@@ -104,6 +106,10 @@ WELL_KNOWN_SIGNAL = _code(
 )
 UNKNOWN_ENUM = _code("E0411", "unknown-enum", "the dialect has no such enumeration")
 FIELD_ENUM = _code("E0412", "field-enum", "the field's values are those of another enumeration")
+NOT_FITTED = _code("E0413", "not-fitted", "a condition reads a signal of a sensor that the vehicle is without")
+NEEDED_SIGNAL = _code(
+    "E0414", "needed-signal", "a vehicle is said to be without a signal that no flight can do without"
+)
 
 # E05: zones and geometry
 BAD_POLYGON = _code("E0501", "bad-polygon", "the corners do not make a simple polygon with an area")

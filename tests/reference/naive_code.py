@@ -95,6 +95,8 @@ def atom(op: int, a: int, b: int, world: World) -> Truths:
         case Op.SIGNAL_IN:
             value = world.slots[a]
             return U if value is None else T if value in policy.sets[b] else F
+        case Op.KNOWN:
+            return U if world.slots[a] is None else T
         case Op.ARGUMENT_IN:
             return T if world.arguments[a] in policy.sets[b] else F
         case Op.POSITION_IN:

@@ -60,7 +60,7 @@ def atom(of: Random, contract: Contract | None, reach: Reach) -> Code:
     for parameter in contract.parameters if contract else ():
         cells[parameter.kind].append(parameter.cell)
     zone = of.randrange(len(flat.ZONES))
-    kinds = ["compare", "compare", "position", "fix", "time", *(k for k in (ZONE, CHOICE, PLACE) if cells[k])]
+    kinds = ["compare", "compare", "position", "fix", "known", "time", *(k for k in (ZONE, CHOICE, PLACE) if cells[k])]
     kinds += ["monitor"] * (2 * (reach.monitors > 0)) + ["phase"] * reach.phased
     match of.choice(kinds):
         case "compare":
@@ -71,6 +71,8 @@ def atom(of: Random, contract: Contract | None, reach: Reach) -> Code:
             return (Op.POSITION_IN, zone, 0)
         case "fix":
             return (Op.SIGNAL_IN, flat.FIX, of.randrange(len(flat.POLICY.sets)))
+        case "known":
+            return (Op.KNOWN, of.randrange(flat.POLICY.slots), 0)
         case "time":
             return (Op.TIME_IN, of.randrange(24) * flat.H, of.randrange(25) * flat.H)
         case "monitor":

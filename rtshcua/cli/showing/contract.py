@@ -27,6 +27,11 @@ def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
     """The fields but for the parameters, by the words of the language; a name is empty where it goes on."""
     during = f" during {', '.join(contract.phases)}" if contract.phases else ", in any phase"
     chain = [f"{n} {words.link(policy, link)}" for n, link in enumerate(contract.fallback)]
+    left_out = [
+        f"{clause.part} {clause.text}: the vehicle is without a sensor for it"
+        for clause in policy.left_out
+        if policy.contracts[clause.skill].name == contract.name
+    ]
     return [
         ("motion", words.motion(contract)),
         ("class", TimingClass(contract.timing_class).name.lower()),
@@ -37,6 +42,7 @@ def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
         *_list("require", _texts(contract.require)),
         *_list("assume", _texts(contract.assume)),
         *_list("maintain", _texts(contract.maintain)),
+        *(_list("left out", left_out) if left_out else ()),
         *_list("fallback", chain),
         ("energy", f"at most {words.ratio(contract.energy)}"),
         ("record", ", ".join(contract.record) or _NOTHING),

@@ -39,6 +39,10 @@ def show_policy(page: Page, policy: Policy) -> None:
     page.row("position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this")
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
     page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
+    if vehicle.without:
+        page.row(
+            "without", f"{', '.join(vehicle.without)}: not fitted; clauses `where fitted` that read it are left out"
+        )
     page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
     page.row("roles", ", ".join(policy.roles))
     page.rows("sources", policy.sources)

@@ -1,8 +1,9 @@
 """The vehicle and its signals."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
-from rtshcua.decision.checks.indexes import at, within
+from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.model.flat.limits import DAY, FULL, MAX_DURATION, MAX_SLOTS, MAX_SPEED, MAX_STALE, MAX_VALUE
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, SignalSource
@@ -40,6 +41,7 @@ def _source(source: SignalSource, kind: int) -> Iterator[str]:
 def vehicle(policy: Policy) -> Iterator[str]:
     """What is wrong with a policy's vehicle."""
     yield from at("vehicle", _numbers(policy.vehicle))
+    yield from at("vehicle", _without(policy))
     kinds = {signal.slot: signal.kind for signal in policy.signals}
     for name, slot, kind in (
         ("position", policy.vehicle.position, POSITION),
@@ -51,6 +53,22 @@ def vehicle(policy: Policy) -> Iterator[str]:
     ):
         if slot != -1 and kinds.get(slot) != kind:
             yield f"vehicle: slot {slot} is no {name}"
+
+
+def _without(policy: Policy) -> Iterator[str]:
+    """The sensors that it lacks are named in order, and nothing reads them; without any, no clause is left out."""
+    names = policy.vehicle.without
+    if any(one >= other for one, other in pairwise(names)):
+        yield "the signals that it is without are not ascending"
+    for signal in policy.signals:
+        if signal.name in names:
+            yield f"it is without the signal `{signal.name}`, which the policy reads"
+    for clause in policy.left_out:
+        if not names:
+            yield f"`{clause.text}` is left out, and it is without no signal"
+        yield from index("skill", clause.skill, len(policy.contracts))
+        if clause.part not in ("require", "assume", "maintain"):
+            yield f"`{clause.text}` is left out of `{clause.part}`, which no contract has"
 
 
 def _numbers(vehicle: Vehicle) -> Iterator[str]:

@@ -6,7 +6,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.truth import AND, FALSE, NOT, OR, TRUE, Truth
 from rtshcua.ground.analysis.atoms import MOST, Atom, Chosen, Linear, Local, Monitor, Phase
 from rtshcua.ground.analysis.box import Box
-from rtshcua.ground.analysis.places import PointIn, VehicleIn, VehicleInArgument
+from rtshcua.ground.analysis.places import PointIn, There, VehicleIn, VehicleInArgument
 from rtshcua.ground.analysis.space import Space
 
 
@@ -78,6 +78,8 @@ def _atom(node: tree.Node, space: Space) -> Atom:
             return Linear(terms, value, value)
         case tree.Member(argument, index, members):
             return Chosen((argument, index), space.tables.sets[members])
+        case tree.Known(slot):
+            return There(slot, space)
         case tree.Inside(zone):
             return VehicleIn(zone, space)
         case tree.InsideArgument(cell, table):

@@ -86,6 +86,36 @@ class VehicleIn(Atom):
         return self._existing.split(box)
 
 
+class There(Atom):
+    """A slot has a value. Whether the vehicle's position does, its box keeps for all zones together."""
+
+    def __init__(self, slot: int, space: Space) -> None:
+        known = space.tables.known
+        self._located = slot in (known.x, known.y)
+        self._cells: tuple[Cell, ...] = ((False, known.x), (False, known.y)) if self._located else ((False, slot),)
+
+    def enter(self, box: Box, space: Space) -> None:
+        """The slot; of the position both."""
+        for cell in self._cells:
+            box.cells.setdefault(cell, initial(cell, space))
+        if self._located:
+            box.located = max(space.slots[index][2] for _, index in self._cells)
+
+    def truth(self, box: Box) -> Truth:
+        """True where it is there, else unknown."""
+        gap = box.located if self._located else box.cells[self._cells[0]][2]
+        return TRUE if gap == PRESENT else UNKNOWN if gap == ABSENT else TRUE | UNKNOWN
+
+    def split(self, box: Box) -> list[Box]:
+        """By whether it is there."""
+        there, missing = box.copy(), box.copy()
+        for cell in self._cells:
+            there.cells[cell], missing.cells[cell] = present(box.cells[cell]), absent(box.cells[cell])
+        if self._located:
+            there.located, missing.located = PRESENT, ABSENT
+        return [there, missing]
+
+
 class VehicleInArgument(Atom):
     """The vehicle is inside the zone that a table gives for a zone that was given."""
 

@@ -1,6 +1,7 @@
 """Conditions are well typed, all through, and what is observed over time can be."""
 
 from rtshcua.ground.checker.comparisons import check_comparison, check_one_of, check_within
+from rtshcua.ground.checker.knowing import check_known, check_unturned
 from rtshcua.ground.checker.parts import Part, children, walk
 from rtshcua.ground.checker.phases import is_about_phase
 from rtshcua.ground.checker.places import check_inside
@@ -13,6 +14,7 @@ from rtshcua.model.ir.expression import (
     ForLast,
     Inside,
     Junction,
+    Known,
     Near,
     Not,
     OneOf,
@@ -33,7 +35,10 @@ def check_condition(scope: Scope, node: Condition, *, observed: bool = False) ->
             check_one_of(scope, node)
         case Inside():
             check_inside(scope, node)
+        case Known():
+            check_known(scope, node)
         case Not():
+            check_unturned(scope, node)
             check_condition(scope, node.operand, observed=observed)
         case Junction():
             for operand in node.operands:
@@ -41,6 +46,8 @@ def check_condition(scope: Scope, node: Condition, *, observed: bool = False) ->
         case ForLast() | WithinLast() | Near() | Edge():
             if not isinstance(node, Edge):
                 check_window(scope, node.window)
+            if isinstance(node, Edge):
+                check_unturned(scope, node)
             if not observed:
                 check_observable(scope, node)
             for operand in (node.left, node.right) if isinstance(node, Near) else (node.operand,):

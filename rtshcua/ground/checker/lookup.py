@@ -10,6 +10,7 @@ from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
+from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.ir.tests import NominalDecl
 
@@ -24,6 +25,11 @@ def find_skill(context: Context, name: Name) -> SkillDecl | None:
 def find_zone(context: Context, name: Name) -> ZoneDecl | None:
     """The zone of that name."""
     return _find(context, name, context.symbols.zones, ZoneDecl)
+
+
+def find_signal(context: Context, name: Name) -> SignalDecl | None:
+    """The signal of that name."""
+    return _find(context, name, context.symbols.signals, SignalDecl)
 
 
 def find_policy(context: Context, name: Name) -> PolicyDecl | None:

@@ -12,6 +12,7 @@ from rtshcua.model.ir.expression import (
     Grow,
     Inside,
     Junction,
+    Known,
     Near,
     Not,
     OneOf,
@@ -32,7 +33,7 @@ def children(node: Part) -> tuple[Part, ...]:
             return node.operands
         case Within():
             return (node.subject, node.range.low, node.range.high)
-        case OneOf():
+        case OneOf() | Known():
             return (node.subject,)
         case Inside():
             return (node.subject, node.region)

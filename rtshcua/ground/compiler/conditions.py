@@ -33,6 +33,7 @@ from rtshcua.model.ir.expression import (
     Grow,
     Inside,
     Junction,
+    Known,
     Near,
     Not,
     OneOf,
@@ -118,6 +119,8 @@ class Conditions:
                 self._near(code, node, place, safe)
             case Inside():
                 self._inside(code, node, place, safe)
+            case Known():
+                self._known(code, node)
             case Comparison() | Within() | OneOf():
                 self._compared(code, node, place)
 
@@ -136,6 +139,14 @@ class Conditions:
                     numbers.between(code, node)
             case OneOf():
                 members.one_of(code, node)
+
+    def _known(self, code: Code, node: Known) -> None:
+        """Each slot of the signal has a value; a position has two."""
+        slot = self._slots.of(node.subject.name)
+        code.add(Op.KNOWN, slot)
+        if self._slots.width(node.subject.name) > 1:
+            code.add(Op.KNOWN, slot + 1)
+            code.add(Op.AND)
 
     def _near(self, code: Code, node: Near, place: Place, safe: bool) -> None:
         """One of two is true now, and the other was at some moment of the window."""

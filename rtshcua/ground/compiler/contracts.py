@@ -8,6 +8,7 @@ from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.files import Files
+from rtshcua.ground.compiler.fitted import applies
 from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.model.durability import WORDS
 from rtshcua.model.flat.code import Clause
@@ -23,7 +24,7 @@ from rtshcua.model.flat.contract import (
     Parameter,
     TimingClass,
 )
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import LeftOut, Vehicle
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
@@ -55,7 +56,7 @@ def cells_of(skill: SkillDecl) -> dict[str, int]:
 
 
 class Contracts:
-    """Lowers the skills of one policy; `numbers` are their indexes."""
+    """Lowers the skills of one policy; `numbers` are their indexes, `left_out` the clauses left out."""
 
     def __init__(
         self,
@@ -72,6 +73,7 @@ class Contracts:
         self._zones = zones
         self._files = files
         self._vehicle = vehicle
+        self.left_out: list[LeftOut] = []
 
     def contract(self, skill: SkillDecl) -> Contract:
         """One skill's contract, its defaults filled in."""
@@ -83,7 +85,8 @@ class Contracts:
         cells = cells_of(skill)
         place = Place(self._context.scope_of(skill), cells, strict=True)
         require, assume, maintain = (
-            self._clauses(clauses, place) for clauses in (skill.require, skill.assume, skill.maintain)
+            self._clauses(part, clauses, place, skill)
+            for part, clauses in (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
         )
         motion = skill.motion
         return Contract(
@@ -141,8 +144,14 @@ class Contracts:
                 cells.append(argument)
         return tuple(cells)
 
-    def _clauses(self, clauses: Sequence[ClauseDecl], place: Place) -> tuple[Clause, ...]:
-        return tuple(self._conditions.clause(clause.condition, place) for clause in clauses)
+    def _clauses(self, part: str, clauses: Sequence[ClauseDecl], place: Place, skill: SkillDecl) -> tuple[Clause, ...]:
+        """The clauses that apply to the vehicle; the others are noted."""
+        without = frozenset(self._vehicle.without)
+        for clause in clauses:
+            if not applies(clause, without):
+                of_skill = self._numbers[skill.name.text]
+                self.left_out.append(LeftOut(of_skill, part, *self._files.place(clause.span)))
+        return tuple(self._conditions.clause(clause.condition, place) for clause in clauses if applies(clause, without))
 
     def _parameter(self, argument: Argument, cell: int) -> Parameter:
         declared, type = argument.declaration, argument.type

@@ -9,6 +9,7 @@ _PUSHES = frozenset(
         Op.ARGUMENT,
         Op.SIGNAL_IN,
         Op.ARGUMENT_IN,
+        Op.KNOWN,
         Op.POSITION_IN,
         Op.POSITION_IN_ARGUMENT,
         Op.ARGUMENT_POINT_IN,

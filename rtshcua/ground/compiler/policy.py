@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.vehicles import deceleration
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.places import POSITION_SIGNAL
 from rtshcua.ground.checker.scope import signal_type
-from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, SPEED, Type
-from rtshcua.ground.compiler import local_time
+from rtshcua.ground.checker.types import Type
+from rtshcua.ground.checker.well_known import WELL_KNOWN, read_by_all
+from rtshcua.ground.compiler import fitted, local_time
 from rtshcua.ground.compiler.belonging import belongs
 from rtshcua.ground.compiler.conditions import Conditions
 from rtshcua.ground.compiler.contracts import Contracts
@@ -28,12 +28,6 @@ from rtshcua.model.ir.places import GeoJson, VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.policies import Rule as RuleDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
-
-#: the signals that every decision reads, in the order of their slots: where the vehicle is, how high, how much energy
-WELL_KNOWN: Mapping[str, Type] = {POSITION_SIGNAL: POSITION, "height": HEIGHT, "battery": RATIO}
-
-#: the signals of the velocity over ground (NED), which a vehicle that `brakes` is watched by
-VELOCITY: Mapping[str, Type] = dict.fromkeys(("velocity.north", "velocity.east", "velocity.down"), SPEED)
 
 #: whoever flies the vehicle; a rule `by any` is about this role too, where no rule names it
 OPERATOR = "operator"
@@ -66,10 +60,11 @@ def lower_policy(
     """
     before = len(context.report.found)
     skills = _skills(context, policy, files)
-    read = WELL_KNOWN if vehicle.braking is None else {**WELL_KNOWN, **VELOCITY}
+    read = read_by_all(vehicle)
     if not _well_known(context, policy, read, files) or not belongs(context, policy, skills, vehicle, files):
         return None
     declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
+    fitted.check_policy(context, policy, vehicle, skills)
     local_time.check_policy(context, policy, vehicle, skills, declared)
     table = Files(context.report, names)
     slots = Slots(context)
@@ -116,6 +111,7 @@ def lower_policy(
         phases=tuple(conditions.sets.phases),
         without_evidence=int(WithoutEvidence[policy.without_evidence.upper()]),
         silence_us=SILENCE_US if silence is None else silence.limit.value,
+        left_out=tuple(contracts.left_out),
         after_silence=int(AfterSilence.CONTINGENCY if silence is None else AfterSilence[silence.then.upper()]),
     )
     if not fits(context, policy, flat):
@@ -223,4 +219,5 @@ def _vehicle(
         north=north,
         east=east,
         down=down,
+        without=tuple(sorted({name.text for name in vehicle.without})),
     )

@@ -32,6 +32,11 @@ class Slots:
             self.count += 2 if signal.kind == POSITION else 1
         return slot
 
+    def width(self, name: str) -> int:
+        """How many slots a signal has that was asked for."""
+        slot = self._slots[name]
+        return next(2 if each.kind == POSITION else 1 for each in self.signals if each.slot == slot)
+
     def _lowered(self, declared: SignalDecl, slot: int) -> Signal:
         type = signal_type(self._context.symbols, declared)
         assert type is not None

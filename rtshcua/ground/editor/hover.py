@@ -151,7 +151,10 @@ def _skill(view: View, skill: SkillDecl) -> Iterator[str]:
     yield kind + ", ".join(times)
     for word, clauses in (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain)):
         if clauses:
-            yield f"{word} " + " and ".join(f"`{' '.join(view.slice(each.span).split())}`" for each in clauses)
+            yield f"{word} " + " and ".join(
+                f"`{' '.join(view.slice(each.span).split())}`{' where fitted' if each.where_fitted else ''}"
+                for each in clauses
+            )
     if skill.fallback:
         yield "fallback " + ", ".join(f"`{view.slice(link.span)}`" for link in skill.fallback)
 

@@ -45,8 +45,10 @@ KEYWORDS: Mapping[str, str] = {
     "through": "The sources that may speak for the role: `agent`, `operator`, `onboard`, `reflex`.",
     "airspace": "Where the vehicle may be at all: inside of all of the first zones, outside of the others.",
     "contingency": "What flies when a step is denied in the air.",
-    "without": "`without evidence land` or `refuse`: what becomes of a flight whose records are not kept. `without link for 30 s "
-    "contingency` or `continue`: what follows when the vehicle was silent for longer.",
+    "without": "`without evidence land` or `refuse`: what becomes of a flight whose records are not kept. `without"
+    " link for 30 s contingency` or `continue`: what follows when the vehicle was silent for longer. In a vehicle:"
+    " signals whose sensors are not fitted.",
+    "fitted": "`where fitted`: the clause is left out for a vehicle without a sensor for what it reads.",
     "template": "Rules with parameters, which policies `use`.",
     "use": "Puts the rules of a template into the policy, with these arguments.",
     "any": "Every skill, or after `by` every role.",
@@ -66,6 +68,7 @@ KEYWORDS: Mapping[str, str] = {
     "and": "True if both are; false if one is; else unknown.",
     "or": "True if one is; false if both are; else unknown.",
     "not": "Turns true and false round; unknown stays.",
+    "known": "`position is known`: true while the signal has a value, else unknown; never false.",
     "rising": "True where the condition is true now and was false at the observation before.",
     "falling": "True where the condition is false now and was true at the observation before.",
     "within": "`c within the last 5 s`: it was true at any moment; `a within 5 s of b`: both, so near.",

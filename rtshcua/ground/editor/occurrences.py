@@ -66,7 +66,7 @@ class _Walk(Conditions):
             case NominalDecl() | TestDecl():
                 yield from self.case(node)
             case VehicleDecl():
-                pass
+                yield from self.names(node.without, Sort.DECLARED)
 
     def _enum(self, enum: EnumDecl) -> Iterator[Occurrence]:
         if enum.dialect is not None:

@@ -70,6 +70,7 @@ _BEHIND = {
     "during": Wanted.PHASE, "inside": Wanted.ZONE, "outside": Wanted.ZONE, "airspace": Wanted.ZONE,
     "when": Wanted.VALUE, "require": Wanted.VALUE, "assume": Wanted.VALUE, "maintain": Wanted.VALUE,
     "and": Wanted.VALUE, "or": Wanted.VALUE, "not": Wanted.VALUE, "rising": Wanted.VALUE, "falling": Wanted.VALUE,
+    "without": Wanted.SIGNAL,
     "given": Wanted.SIGNAL, "table": Wanted.SIGNAL, "because": Wanted.REASON, "motion": Wanted.PARAMETER,
     "by": Wanted.SOURCE, "union": Wanted.ZONE, "difference": Wanted.ZONE, "grow": Wanted.ZONE,
     "policy": Wanted.NOTHING, "mission": Wanted.NOTHING, "skill": Wanted.NOTHING, "zone": Wanted.NOTHING,

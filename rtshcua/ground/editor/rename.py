@@ -8,7 +8,7 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.symbols import WORDS
-from rtshcua.ground.compiler.policy import VELOCITY, WELL_KNOWN
+from rtshcua.ground.checker.well_known import VELOCITY, WELL_KNOWN
 from rtshcua.ground.editor.consequences import Judged, Renamed, consequence, judged
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.navigation import declared_at, references, targets

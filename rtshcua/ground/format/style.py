@@ -77,6 +77,7 @@ ITEMS = {
     "elevation": _PART,
     "return_at": _PART,
     "brakes": _PART,
+    "not_fitted": _PART,
     # of skills and steps
     "climb_to": _PART,
     "fly_to": _PART,

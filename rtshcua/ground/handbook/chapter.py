@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from rtshcua.ground.compiler.fitted import applies
 from rtshcua.ground.handbook.changes import Changes, changes
 from rtshcua.ground.handbook.model import (
     CaseTold,
@@ -24,6 +25,7 @@ from rtshcua.ground.handbook.words.skills import (
     AS_LINK,
     told_chain,
     told_clause,
+    told_left_out,
     told_motion,
     told_parameter,
     told_record,
@@ -102,8 +104,11 @@ def _rule(subject: Subject, number: int, changed: Changes) -> RuleTold:
 def _skill(subject: Subject, skill: SkillDecl, changed: bool) -> SkillTold:
     names = asked_of(subject, [skill])
 
+    without = frozenset(subject.policy.vehicle.without)
+    parts = (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
+
     def clauses(some: tuple[Clause, ...]) -> tuple[str, ...]:
-        return tuple(told_clause(each, names) for each in some)
+        return tuple(told_clause(each, names) for each in some if applies(each, without))
 
     return SkillTold(
         name=skill.name.text,
@@ -116,6 +121,9 @@ def _skill(subject: Subject, skill: SkillDecl, changed: bool) -> SkillTold:
         require=clauses(skill.require),
         assume=clauses(skill.assume),
         maintain=clauses(skill.maintain),
+        left_out=tuple(
+            told_left_out(part, each, names) for part, some in parts for each in some if not applies(each, without)
+        ),
         fallback=told_chain(skill.fallback, names),
         as_link=AS_LINK if skill.name.text in _last_links(subject) else "",
         record=told_record(skill),

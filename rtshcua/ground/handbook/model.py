@@ -84,7 +84,10 @@ class ParameterTold:
 
 @dataclass(frozen=True, slots=True)
 class SkillTold:
-    """A contract; `as_link` is what is otherwise where a chain ends in it, empty for any other skill."""
+    """A contract; `as_link` is what is otherwise where a chain ends in it, empty for any other skill.
+
+    `left_out` are the clauses that do not count, for the vehicle is without a sensor.
+    """
 
     name: str
     note: str
@@ -94,6 +97,7 @@ class SkillTold:
     require: tuple[str, ...]
     assume: tuple[str, ...]
     maintain: tuple[str, ...]
+    left_out: tuple[str, ...]
     fallback: tuple[str, ...]
     as_link: str
     record: str

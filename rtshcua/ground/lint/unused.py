@@ -11,7 +11,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.checker.context import Parametric
 from rtshcua.ground.checker.symbols import WORDS, Declaration
-from rtshcua.ground.compiler.policy import WELL_KNOWN
+from rtshcua.ground.checker.well_known import WELL_KNOWN
 from rtshcua.ground.lint.mentions import mentions
 from rtshcua.ground.lint.subject import Subject
 from rtshcua.model.ir.program import Unit

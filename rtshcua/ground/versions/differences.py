@@ -12,7 +12,7 @@ _QUOTED = 60
 
 class Difference(NamedTuple):
     """One thing that differs: in a few words, and what it is (`rule`, `order`, `airspace`, `contingency`, `evidence`,
-    `silence`, `vehicle`, `zone`, `skill`, `signal`).
+    `silence`, `sensor`, `vehicle`, `zone`, `skill`, `signal`).
 
     A `rule` has its texts, empty where there is none; what has fields has its name, and which of them differ: all of
     them, where it is new or gone.
@@ -40,6 +40,12 @@ def compared(old: Policy, new: Policy) -> tuple[Difference, ...]:
 
 
 def _differences(old: Meaning, new: Meaning) -> Iterator[Difference]:
+    # what is no longer watched comes first: a finding tells of few differences
+    for name in sorted(new.without() - old.without()):
+        words = f"looser: the vehicle is now without the signal `{name}`, and clauses `where fitted` on it are left out"
+        yield Difference(words, "sensor", name)
+    for name in sorted(old.without() - new.without()):
+        yield Difference(f"the vehicle is no longer without the signal `{name}`", "sensor", name)
     yield from _rules(old.rules(), new.rules())
     if old.airspace() != new.airspace():
         yield Difference("the airspace", "airspace")

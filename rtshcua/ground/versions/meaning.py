@@ -106,6 +106,10 @@ class Meaning:
         """What follows after a long silence of the vehicle, and after how long."""
         return self._policy.silence_us, self._policy.after_silence
 
+    def without(self) -> frozenset[str]:
+        """The signals whose sensors the vehicle lacks."""
+        return frozenset(self._policy.vehicle.without)
+
     def _contract(self, contract: Contract) -> Fields:
         own = contract.parameters
         return {
@@ -169,7 +173,7 @@ class Meaning:
     def _operands(self, op: int, a: int, b: int, zones: frozenset[int]) -> tuple[Part, ...]:
         policy = self._policy
         match op:
-            case Op.SIGNAL:
+            case Op.SIGNAL | Op.KNOWN:
                 return (self._slots[a],)
             case Op.SIGNAL_IN:
                 return self._slots[a], policy.sets[b]

@@ -6,7 +6,7 @@ from rtshcua.decision.verdict import Decisive
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
-from rtshcua.model.flat.signal import Signal
+from rtshcua.model.flat.signal import POSITION, Signal
 from rtshcua.model.flat.situation import State
 
 
@@ -25,7 +25,7 @@ def reads(clause: Decisive, policy: Policy, contract: Contract, arguments: tuple
     code = _code(clause)
     for at in range(0, len(code), 3):
         op, a = code[at], code[at + 1]
-        if op in (Op.SIGNAL, Op.SIGNAL_IN):
+        if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN):
             _signal(found, a, policy, state)
         elif op in (Op.ARGUMENT, Op.ARGUMENT_IN, Op.ARGUMENT_POINT_IN):
             _argument(found, a, contract, arguments)
@@ -54,10 +54,14 @@ def _where(found: dict[str, Read], policy: Policy, state: State) -> None:
 
 
 def _signal(found: dict[str, Read], slot: int, policy: Policy, state: State) -> None:
-    signal = next(each for each in policy.signals if each.slot == slot)
-    width = 2 if signal.slot == policy.vehicle.position else 1
+    signal = next(each for each in policy.signals if slot - _width(each) < each.slot <= slot)
+    slot, width = signal.slot, _width(signal)
     stale = max(state.ages[slot : slot + width]) > signal.stale_us
     found.setdefault(signal.name, Read(signal.name, signal, state.values[slot : slot + width], stale))
+
+
+def _width(signal: Signal) -> int:
+    return 2 if signal.kind == POSITION else 1
 
 
 def _argument(found: dict[str, Read], cell: int, contract: Contract, arguments: tuple[int, ...]) -> None:

@@ -29,6 +29,7 @@ class Op(IntEnum):
     NE = 21
     SIGNAL_IN = 24  # enumerated slot a is a member of set b of the policy
     ARGUMENT_IN = 25  # enumerated or zone-valued argument cell a is a member of set b
+    KNOWN = 26  # state slot a has a value: true, else unknown
     POSITION_IN = 28  # the vehicle (position and height) is inside zone a
     POSITION_IN_ARGUMENT = 29  # ... inside the zone that table b gives for the zone in argument cell a
     ARGUMENT_POINT_IN = 30  # the point in argument cells a, a + 1 (x, y in mm) is inside zone b, at any height

@@ -95,7 +95,7 @@ class Vehicle(Flat, frozen=True):
     `return_altitude` (mm above home) is the height that a return climbs to, if it is lower, before it flies home.
     Told to stop, it goes on for at most `reaction_us` and then loses at least `braking` mm/s of its speed in a second;
     with `braking` 0 that is not declared. `north`, `east`, `down` are the slots of the signals of its velocity over
-    ground, -1 each without `braking`.
+    ground, -1 each without `braking`. `without` are the names of the signals whose sensors are not fitted, ascending.
     """
 
     name: str
@@ -116,6 +116,21 @@ class Vehicle(Flat, frozen=True):
     north: int = -1
     east: int = -1
     down: int = -1
+    without: tuple[str, ...] = ()
+
+
+class LeftOut(Flat, frozen=True):
+    """A clause `where fitted` that a contract does not have, for the vehicle is without a signal that it reads.
+
+    `part` is `require`, `assume` or `maintain`. Nothing is decided by it; it is there to be read.
+    """
+
+    skill: int
+    part: str
+    text: str
+    source: int
+    start: int
+    end: int
 
 
 class Policy(Flat, frozen=True):
@@ -125,7 +140,8 @@ class Policy(Flat, frozen=True):
     derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
     mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
     SHA-256 of each. `without_evidence` is a `WithoutEvidence`. After a silence of the vehicle longer than `silence_us`,
-    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing.
+    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing. `left_out` are the clauses that
+    do not apply to the vehicle.
     """
 
     name: str
@@ -150,3 +166,4 @@ class Policy(Flat, frozen=True):
     without_evidence: int = 0
     silence_us: int = SILENCE_US
     after_silence: int = AfterSilence.CONTINGENCY
+    left_out: tuple[LeftOut, ...] = ()

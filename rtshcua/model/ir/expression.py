@@ -110,6 +110,13 @@ class Inside(Node, kw_only=True):
     negated: bool
 
 
+class Known(Node, kw_only=True):
+    """`subject is known`: true while the signal has a value, unknown while it has none; never false."""
+
+    kind: Literal["known"] = "known"
+    subject: Reference
+
+
 class Not(Node, kw_only=True):
     """Kleene negation."""
 
@@ -160,4 +167,4 @@ class Edge(Node, kw_only=True):
     operand: "Condition"
 
 
-Condition = Comparison | Within | OneOf | Inside | Not | Junction | ForLast | WithinLast | Near | Edge
+Condition = Comparison | Within | OneOf | Inside | Known | Not | Junction | ForLast | WithinLast | Near | Edge

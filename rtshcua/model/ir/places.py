@@ -93,7 +93,8 @@ class VehicleDecl(Node):
 
     `endurance` is the hover time of a full battery, `reserve` the charge that must remain after landing at home,
     `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC.
-    `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by.
+    `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by. `without` are the
+    signals of sensors that are not fitted on it.
     """
 
     name: Name
@@ -110,3 +111,4 @@ class VehicleDecl(Node):
     elevation_within: Quantity | None = None  # how far the real elevation of the ground at home may differ
     return_altitude: Quantity | None = None  # `return at 30 m`: the autopilot's return climbs to it before it flies
     braking: Braking | None = None
+    without: tuple[Name, ...] = ()

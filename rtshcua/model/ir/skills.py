@@ -49,9 +49,14 @@ class LinkDecl(Node):
 
 
 class Clause(Node):
-    """One condition of `require`, `assume` or `maintain`; a top-level `and` is already split into clauses."""
+    """One condition of `require`, `assume` or `maintain`; a top-level `and` is already split into clauses.
+
+    `where_fitted` (`assume obstacle.distance > 3 m where fitted`): for a vehicle without a signal that it reads, it is
+    left out.
+    """
 
     condition: Condition
+    where_fitted: bool = False
 
 
 class SkillDecl(Node):

@@ -1,11 +1,14 @@
-"""E0310, E0319, E0502, E1003: what a vehicle declares of itself."""
+"""E0106, E0201, E0204, E0310, E0319, E0414, E0502, E1003: what a vehicle declares of itself."""
 
 from rtshcua.decision.checks.vehicle import MAX_POSITION_ERROR, MAX_REACTION
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import elevation, on_globe, quantity
+from rtshcua.ground.checker.lookup import find_signal
+from rtshcua.ground.checker.well_known import WELL_KNOWN, read_by_all
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
-from rtshcua.model.ir.places import Braking
+from rtshcua.model.ir.places import Braking, VehicleDecl
 from rtshcua.model.quantity import Dimension
 
 MAX_OFFSET_US = 14 * 3_600_000_000  # local times are at most 14 h from UTC
@@ -32,9 +35,36 @@ def check(context: Context) -> None:
         quantity(context, vehicle.return_altitude, Dimension.ALTITUDE, positive=False)
         if vehicle.braking is not None:
             _braking(context, vehicle.braking)
+        _without(context, vehicle)
         offset = vehicle.utc_offset
         if offset is not None and abs(offset.value) > MAX_OFFSET_US:
             context.report.add(codes.NUMBER_SIZE, offset.span, "local times are at most 14 h before or after UTC")
+
+
+def _without(context: Context, vehicle: VehicleDecl) -> None:
+    """What it is without are signals, each named once, and none that is always read."""
+    needed = read_by_all(vehicle)
+    first: dict[str, Span] = {}
+    for name in vehicle.without:
+        if name.text in first:
+            context.report.add(
+                codes.WRITTEN_TWICE,
+                name.span,
+                f"`{name.text}` is written twice in what `{vehicle.name.text}` is without",
+                help="keep one of them",
+                labels=[(first[name.text], "first written here")],
+            )
+        first.setdefault(name.text, name.span)
+        if name.text in needed:
+            why = "every decision reads it" if name.text in WELL_KNOWN else "a vehicle that `brakes` is watched by it"
+            context.report.add(
+                codes.NEEDED_SIGNAL,
+                name.span,
+                f"no vehicle can be without the signal `{name.text}`: {why}",
+                help="leave it out of `without`" + ("" if name.text in WELL_KNOWN else ", or leave `brakes` out"),
+            )
+        else:
+            find_signal(context, name)
 
 
 def deceleration(braking: Braking) -> int:

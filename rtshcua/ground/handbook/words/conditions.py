@@ -11,6 +11,7 @@ from rtshcua.model.ir.expression import (
     ForLast,
     Inside,
     Junction,
+    Known,
     Near,
     Not,
     OneOf,
@@ -44,6 +45,8 @@ def told_condition(condition: Condition, names: Vocabulary) -> str:
             return f"{told_value(condition.subject, names)} is {named([each.text for each in condition.names], 'or')}"
         case Inside():
             return _inside(condition, names)
+        case Known():
+            return f"{told_value(condition.subject, names)} is known"
         case Not():
             return f"it is not so that {_operand(condition.operand, names)}"
         case Junction():
@@ -81,7 +84,7 @@ def _operand(condition: Condition, names: Vocabulary) -> str:
     one kind of list alone, of `and` or of `or`, and a sentence can be read back in one way only.
     """
     words = told_condition(condition, names)
-    simple = isinstance(condition, Comparison | Within | OneOf | Inside)
+    simple = isinstance(condition, Comparison | Within | OneOf | Inside | Known)
     return bracketed(words) if simple else f"({words})"
 
 

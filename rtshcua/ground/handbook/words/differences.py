@@ -9,7 +9,7 @@ from typing import Final
 
 from rtshcua.decision.outline import rings
 from rtshcua.ground.handbook.words.missions import told_cells
-from rtshcua.ground.handbook.words.places import utc
+from rtshcua.ground.handbook.words.places import told_fitted, utc
 from rtshcua.ground.handbook.words.rules import told_evidence, told_limits, told_silence
 from rtshcua.ground.handbook.words.values import degrees, time_of_day
 from rtshcua.ground.handbook.words.vocabulary import listed, name, named
@@ -45,6 +45,8 @@ def _told(one: Difference, policy: Policy) -> tuple[str, ...]:
             return (told_evidence(WithoutEvidence(policy.without_evidence).name.lower()),)
         case "silence":
             return (told_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),)
+        case "sensor":
+            return (told_fitted(one.name, one.name not in policy.vehicle.without),)
         case "order":
             kind = RuleKind[one.name.upper()]
             return tuple(name(rule.text) for rule in policy.rules if rule.kind == kind)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
 from rtshcua.ground.handbook.words.values import coordinates, quantity, time_of_day
-from rtshcua.ground.handbook.words.vocabulary import listed, name
+from rtshcua.ground.handbook.words.vocabulary import listed, name, named
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import (
     Circle,
@@ -99,6 +99,13 @@ def utc(us: int) -> str:
     return f"{moment:%Y-%m-%d %H:%M}{':' if seconds else ''}{seconds}{fraction} UTC"
 
 
+def told_fitted(signal: str, fitted: bool) -> str:
+    """Whether the sensor of a signal is on the vehicle, and what follows."""
+    if fitted:
+        return f"The vehicle reports {name(signal)}, and every clause on it counts."
+    return f"The vehicle does not report {name(signal)}: clauses that count only where it is fitted are left out."
+
+
 def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     """The figures of a vehicle, each with what it is."""
     yield "Identity", vehicle.identity
@@ -122,3 +129,6 @@ def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     if vehicle.utc_offset is not None:
         offset = vehicle.utc_offset.value
         yield "Local time", f"UTC {'-' if offset < 0 else '+'}{time_of_day(abs(offset))}"
+    if vehicle.without:
+        signals = named([each.text for each in vehicle.without])
+        yield "Not fitted", f"sensors for {signals}; clauses that count only where they are fitted are left out"

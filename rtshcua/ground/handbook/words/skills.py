@@ -32,6 +32,12 @@ AS_LINK: Final = (
     "As the last link of a chain it needs nothing: neither rules nor charge are asked. Asked for as a step, it is held "
     "against the rules (`degrade` too) and the charge as any other."
 )
+#: when a clause of each kind counts
+_PARTS: Final = {
+    "require": "before it begins",
+    "assume": "before it begins, and all the while it runs",
+    "maintain": "for the whole planned path, and all the while it runs",
+}
 #: docs/log-format.md, section 4
 _DURABLE: Final = {
     "buffered": "its record is handed to the writer before it begins",
@@ -113,7 +119,13 @@ def told_record(skill: SkillDecl) -> str:
 
 def told_clause(clause: Clause, names: Vocabulary) -> str:
     """One condition of a contract."""
-    return told_condition(clause.condition, names)
+    words = told_condition(clause.condition, names)
+    return f"{words} (where the vehicle has the sensors for it)" if clause.where_fitted else words
+
+
+def told_left_out(part: str, clause: Clause, names: Vocabulary) -> str:
+    """A condition that does not count for the vehicle, and when it would count for another."""
+    return f"{told_condition(clause.condition, names)} ({_PARTS[part]})"
 
 
 def told_link(link: LinkDecl, names: Vocabulary) -> str:

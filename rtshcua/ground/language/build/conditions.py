@@ -15,6 +15,7 @@ from rtshcua.model.ir.expression import (
     Grow,
     Inside,
     Junction,
+    Known,
     Near,
     Not,
     OneOf,
@@ -86,6 +87,10 @@ class Conditions(Literals):
         """`subject outside region`."""
         return Inside(span=span, subject=subject, region=region, negated=True)
 
+    def known(self, span: Span, subject: Reference) -> Known:
+        """`subject is known`."""
+        return Known(span=span, subject=subject)
+
     def grow(self, span: Span, zone: Reference, margin: Value) -> Grow:
         """`grow(zone, margin)`."""
         return Grow(span=span, zone=zone, margin=margin)
@@ -122,8 +127,8 @@ class Conditions(Literals):
         """`a or b or c`."""
         return self.nested(Junction(span=span, operator="or", operands=operands), *operands)
 
-    def clauses(self, condition: Condition) -> tuple[Clause, ...]:
+    def clauses(self, condition: Condition, where_fitted: bool = False) -> tuple[Clause, ...]:
         """Splits a top-level `and`, so that a refusal can name the one operand that decided."""
         if isinstance(condition, Junction) and condition.operator == "and":
-            return tuple(clause for operand in condition.operands for clause in self.clauses(operand))
-        return (Clause(span=condition.span, condition=condition),)
+            return tuple(clause for operand in condition.operands for clause in self.clauses(operand, where_fitted))
+        return (Clause(span=condition.span, condition=condition, where_fitted=where_fitted),)

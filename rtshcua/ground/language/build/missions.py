@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
 from rtshcua.ground.language.build.tests import Tests
@@ -54,6 +55,14 @@ class Builder(Tests):
 
     def _overrides(self, skill: Name, span: Span, given: tuple[Part, ...]) -> Overrides:
         found = {key: part.value for key, part in self.parts("the step", skill, given).items()}
+        for part in given:
+            if part.key in ("require", "assume", "maintain") and any(clause.where_fitted for clause in part.value):
+                self.report(
+                    SYNTAX,
+                    "`where fitted` says nothing in a step, whose mission names its vehicle",
+                    part.span,
+                    "leave `where fitted` out; if the vehicle is without the sensor, leave the clause out",
+                )
         validity, phases = found.get("valid", (None, ()))
         return Overrides(
             span=span,

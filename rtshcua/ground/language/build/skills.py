@@ -1,5 +1,6 @@
 """Skill contracts."""
 
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 from rtshcua.diagnostics.codes import SYNTAX
@@ -18,6 +19,10 @@ class Choice(NamedTuple):
     span: Span
     name: Name
     default: Name | None
+
+
+#: parts of a skill that may be written several times: all of them hold
+_CLAUSES = ("require", "assume", "maintain")
 
 
 class Skills(Vehicles):
@@ -114,17 +119,21 @@ class Skills(Vehicles):
         """`grace 500 ms`."""
         return Part("grace", span, time)
 
-    def require(self, span: Span, condition: Condition) -> Part:
+    def require(self, span: Span, condition: Condition, fitted: bool | None) -> Part:
         """`require battery > 35 %`."""
-        return Part("require", span, self.clauses(condition))
+        return Part("require", span, self.clauses(condition, fitted is True))
 
-    def assume(self, span: Span, condition: Condition) -> Part:
+    def assume(self, span: Span, condition: Condition, fitted: bool | None) -> Part:
         """`assume wind.speed < 10 m/s`."""
-        return Part("assume", span, self.clauses(condition))
+        return Part("assume", span, self.clauses(condition, fitted is True))
 
-    def maintain(self, span: Span, condition: Condition) -> Part:
+    def maintain(self, span: Span, condition: Condition, fitted: bool | None) -> Part:
         """`maintain height <= 60 m`."""
-        return Part("maintain", span, self.clauses(condition))
+        return Part("maintain", span, self.clauses(condition, fitted is True))
+
+    def where_fitted(self, span: Span) -> bool:
+        """`where fitted`, after a condition."""
+        return True
 
     def fallback(self, span: Span, links: tuple[LinkDecl, ...]) -> Part:
         """`fallback hover for 20 s, return_home, emergency_land`."""
@@ -151,7 +160,7 @@ class Skills(Vehicles):
     def skill(self, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *given: Part) -> None:
         """`skill hover() { ... }`."""
         self.undotted(name, "skill")
-        found = {key: part.value for key, part in self.parts("skill", name, given).items()}
+        found = {key: part.value for key, part in self.parts("skill", name, _joined(given)).items()}
         validity, phases = found.get("valid", (None, ()))
         self.declare(
             SkillDecl(
@@ -174,3 +183,15 @@ class Skills(Vehicles):
             ),
             name,
         )
+
+
+def _joined(given: Sequence[Part]) -> list[Part]:
+    """The parts of a skill, with all of its clauses of one kind in one part: at the first, in source order."""
+    joined: dict[str, Part] = {}
+    for part in given:
+        first = joined.get(part.key)
+        if first is not None and part.key in _CLAUSES:
+            joined[part.key] = Part(part.key, first.span, (*first.value, *part.value))
+        else:
+            joined[part.key if part.key in _CLAUSES else f"{part.key} {part.span.start}"] = part
+    return list(joined.values())

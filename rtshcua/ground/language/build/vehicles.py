@@ -71,6 +71,10 @@ class Vehicles(Zones):
         """`brakes from 12 m/s in 6 s after 500 ms`."""
         return Part("brakes", span, Braking(span=span, speed=speed, time=time, reaction=reaction))
 
+    def not_fitted(self, span: Span, names: tuple[Name, ...]) -> Part:
+        """`without obstacle.distance, link.quality`."""
+        return Part("without", span, names)
+
     def vehicle(self, span: Span, name: Name, *given: Part) -> None:
         """`vehicle quad { ... }`."""
         self.undotted(name, "vehicle")
@@ -100,6 +104,7 @@ class Vehicles(Zones):
                 elevation_within=elevation_within,
                 return_altitude=found["return"].value if "return" in found else None,
                 braking=found["brakes"].value if "brakes" in found else None,
+                without=found["without"].value if "without" in found else (),
             ),
             name,
         )

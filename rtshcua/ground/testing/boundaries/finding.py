@@ -20,7 +20,7 @@ from rtshcua.ground.testing.boundaries.values import always
 from rtshcua.ground.testing.coverage.universe import ENERGY
 
 #: what has no limit, only sides: all of them are asked for in the scene as it is (`blocks`)
-_WHOLE = (tree.Member, tree.Monitored, tree.InPhase)
+_WHOLE = (tree.Member, tree.Known, tree.Monitored, tree.InPhase)
 #: the limit of what a skill needs, in words
 _CHARGE = "the charge that is needed"
 
@@ -138,6 +138,8 @@ def _told(asked: _Asked, scene: Scene) -> str:
             return " and ".join(_number(term, scene) for term in terms) or "a number"
         case tree.Member(argument, at, _):
             return _number(Variable(argument, at), scene)
+        case tree.Known(at):
+            return _number(Variable(False, at), scene)
         case tree.Monitored():
             return "the condition over time"
         case tree.InPhase():

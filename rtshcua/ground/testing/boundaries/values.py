@@ -82,6 +82,8 @@ def variables(parts: Iterable[Part], invocation: PreparedInvocation) -> Sequence
                     found |= {Variable(False, term.at) for term in terms if not term.argument}
                 case tree.Member(False, at, _):
                     found.add(Variable(False, at))
+                case tree.Known(at):
+                    found.add(Variable(False, vehicle.position if at == vehicle.position + 1 else at))
                 case tree.Inside() | tree.InsideArgument():
                     found |= {Variable(False, vehicle.position), Variable(False, vehicle.height)}
                 case _:

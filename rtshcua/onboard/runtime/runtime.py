@@ -69,10 +69,15 @@ class Runtime:
         return self._conduct.aloft
 
     @property
+    def linked(self) -> bool:
+        """Whether the vehicle is heard."""
+        return not self._conduct.link.down
+
+    @property
     def homeward(self) -> bool:
         """Whether the command that flies brings the vehicle home or down, and its link is not lost."""
         active = self._conduct.dispatcher.active
-        return active is not None and active.homeward and not self._conduct.link.down
+        return active is not None and active.homeward and self.linked
 
     def view(self, now: Now) -> View:
         """What a display may show."""

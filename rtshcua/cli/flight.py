@@ -41,6 +41,7 @@ EXIT_CODES = {
     Ending.RECALLED: ExitCode.ABORTED,
     Ending.REFUSED: ExitCode.REFUSED,
     Ending.STOOD_DOWN: ExitCode.STOOD_DOWN,
+    Ending.CRASHED: ExitCode.CRASHED,
     Ending.LINK_LOST: ExitCode.LINK,
     Ending.INTERRUPTED: ExitCode.INTERRUPTED,
     Ending.EVIDENCE_LOST: ExitCode.FULL,
@@ -51,6 +52,13 @@ _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
 
 _LANDING = "interrupted: it falls back and lands first, and the log is closed then"
+_SILENT = (
+    "interrupted: the vehicle is silent; it falls back as soon as it is heard again, and is given up if it stays silent. "
+    "Ctrl-C twice more within 3 s leaves it"
+)
+_CRASHED = (
+    "CRASHED: the vehicle came down as no landing does; nothing more is sent. Keep away from its rotors and battery"
+)
 _ON_GROUND = "interrupted on the ground: nothing is sent, and the log is closed"
 _KNOWING = (
     "it is brought down; Ctrl-C once more within 3 s tells it to land where it is, stops watching, and closes the log"
@@ -122,6 +130,8 @@ class Flight:
         self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
         if ending is Ending.REFUSED and self._vehicle.driver.unready is not None:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
+        if ending is Ending.CRASHED:
+            self._feed.post(Note(_CRASHED))
         missing = self._close(ending)
         self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=not missing)
         if not missing:
@@ -153,7 +163,7 @@ class Flight:
         while True:
             match self._interrupts.wish():
                 case Wish.LAND:
-                    self._feed.post(Note(_LANDING if self._runtime.aloft else _ON_GROUND))
+                    self._feed.post(Note(self._what_follows()))
                     also.append(Interrupted(self._clock.now().monotonic_us))
                 case Wish.KNOW:
                     self._feed.post(Note(_KNOWING))
@@ -170,6 +180,12 @@ class Flight:
             if ending is not None:
                 return ending
             also = []
+
+    def _what_follows(self) -> str:
+        """What comes of the first request to stop."""
+        if not self._runtime.aloft:
+            return _ON_GROUND
+        return _LANDING if self._runtime.linked else _SILENT
 
     def _backlog(self) -> list[Event]:
         """What the vehicle said while this was put together, so that the runtime begins with the present."""

@@ -205,6 +205,7 @@ class Ending(StrEnum):
     REFUSED = "refused"  # nothing ever flew: refused on the ground
     RECALLED = "recalled"  # an operator called it back; it fell back first
     STOOD_DOWN = "stood-down"  # the pilot or the autopilot took over
+    CRASHED = "crashed"  # the vehicle came down as no landing does; nothing more is sent
     LINK_LOST = "link-lost"  # the vehicle went silent
     INTERRUPTED = "interrupted"  # the operator stopped it; it fell back first
     EVIDENCE_LOST = "evidence-lost"  # nothing could be recorded any more

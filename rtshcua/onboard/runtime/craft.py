@@ -5,13 +5,12 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Craft:
-    """Whether it is ready, armed and in the air (None: it has not said), ever flew, and since when its link is lost."""
+    """Whether it is ready, armed and in the air (None: it has not said), and whether it ever flew."""
 
     ready: bool = False
     armed: bool | None = None
     airborne: bool | None = None
     flown: bool = False
-    lost_since_us: int | None = None
 
     @property
     def last_seen(self) -> str:

@@ -31,10 +31,12 @@ class Fallback:
         self._dispatcher = dispatcher
         self._limits = limits
         self._chain = Chain(CONTINGENCY_LINK, -1, START)
+        self._holds = True
 
-    def begin(self, kind: int, step: int) -> None:
-        """Start a step's chain, or the contingency (`step` is -1)."""
+    def begin(self, kind: int, step: int, holds: bool = True) -> None:
+        """Start a step's chain, or the contingency (`step` is -1); `holds`: also the links of it that hold."""
         self._chain = Chain(kind, step, START)
+        self._holds = holds
 
     def land(self) -> None:
         """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
@@ -44,7 +46,7 @@ class Fallback:
         """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one."""
         policy = self._loaded.bundle.policy
         for index, link in enumerate(policy.contingency):
-            if policy.contracts[link.skill].motion.kind == MotionKind.HOLD:
+            if self._motion(link) == MotionKind.HOLD:
                 key = (CONTINGENCY_LINK, -1, index)
                 answer = self._admission.ask(now, state, key)
                 if answer is not None and answer.permit:
@@ -60,12 +62,17 @@ class Fallback:
             self._dispatcher.end(now, "time-over")
         while (choice := self._choose(state, now)) is not None:
             self._chain.after = choice.index
+            if not self._holds and self._motion(choice.link) == MotionKind.HOLD:
+                continue
             if self._fly(now, state, choice.index, choice.link, insist=False):
                 return Progress.ON_ITS_WAY
         if self._chain.kind == FALLBACK_LINK:
-            self.begin(CONTINGENCY_LINK, -1)
+            self.begin(CONTINGENCY_LINK, -1, self._holds)
             return self.turn(now, state)
         return self._insist(now, state)
+
+    def _motion(self, link: Link) -> int:
+        return self._loaded.bundle.policy.contracts[link.skill].motion.kind
 
     def _choose(self, state: State, now: Now) -> Choice | None:
         policy, chain = self._loaded.policy, self._chain

@@ -22,13 +22,19 @@ class Stage(StrEnum):
 class Limits(Frozen):
     """How long the runtime waits for the world, in us.
 
-    `ready_us` for a vehicle that is ready, `silent_us` for a lost link to come back. The last link of the contingency
-    has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us` bounds how long a deferred step is
-    left without asking again when nothing was received.
+    `ready_us` for a vehicle that is ready. `silent_us` for a lost link to come back: on the ground, or once somebody
+    asked this program to stop; in the air that, and as long as the vehicle can fly. When the link is back, `fresh_us`
+    for fresh state: longer than a link must be silent to count as lost, so that nothing is judged after one message and
+    no more. A link that comes and goes is waited for `flapping_us` in all, from when it was back first.
+
+    The last link of the contingency has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us`
+    bounds how long a deferred step is left without asking again when nothing was received.
     """
 
     ready_us: int = 120_000_000
     silent_us: int = 30_000_000
+    fresh_us: int = 1_500_000
+    flapping_us: int = 5_000_000
     retry_us: int = 2_000_000
     tries: int = 5
     again_us: int = 100_000

@@ -1,4 +1,6 @@
-"""What each event means: it changes what is known, and sometimes the stage; what follows is `Conduct.turn`'s."""
+"""What each event means: it changes what is known, and sometimes the stage; what follows is `Turns.turn`'s."""
+
+from collections.abc import Sequence
 
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
@@ -6,6 +8,7 @@ from rtshcua.onboard.ports import (
     AirState,
     Anchored,
     ClockStepped,
+    Crashed,
     Ending,
     Event,
     EvidenceFailed,
@@ -33,6 +36,26 @@ from rtshcua.wire.request import FALLBACK_LINK
 MOST_SAID = 200
 
 
+#: what is taken over before a crash or a takeover: it changes no stage, and tells how it came to that
+_TOLD = (Readings, Sent, ClockStepped, Said, Noted)
+
+
+def last_words_first(events: Sequence[Event]) -> Sequence[Event]:
+    """Events in the order in which they are to be taken over: as they came, unless one of them is a crash or a
+    takeover. Nothing that came with it ends the run in another way, then, whichever the vehicle said first.
+    """
+    for event in events:
+        if isinstance(event, (Crashed, TakenOver)):
+            return sorted(events, key=_rank)
+    return events
+
+
+def _rank(event: Event) -> int:
+    if isinstance(event, _TOLD):
+        return 0
+    return 1 if isinstance(event, Crashed) else 2 if isinstance(event, TakenOver) else 3
+
+
 class Happenings:
     """Takes events over into a `Conduct`, and records those that matter."""
 
@@ -52,6 +75,7 @@ class Happenings:
             case Ready():
                 conduct.craft.ready = True
             case AirState():
+                conduct.link.air_reported()
                 self._air(now, event)
             case Sent():
                 conduct.dispatcher.sent(event.token, event.at_us)
@@ -59,14 +83,13 @@ class Happenings:
                 self._succeeded(now, event.token)
             case Failed():
                 self._failed(now, event)
-            case TakenOver():
-                self._journal.effect(now, "taken-over", detail=event.how)
-                conduct.stand_down(now, Ending.STOOD_DOWN)
+            case TakenOver() | Crashed():
+                self._ended(now, event)
             case LinkLost() | LinkBack():
-                self._link(now, lost=isinstance(event, LinkLost))
+                self._link(now, event)
             case Interrupted():
                 self._journal.effect(now, "interrupted")
-                conduct.break_off(now, Ending.INTERRUPTED)
+                conduct.stop(now)
             case EvidenceFailed() | EvidenceKept():
                 self._evidence(now, event)
             case ClockStepped():
@@ -134,9 +157,12 @@ class Happenings:
         if not conduct.dispatcher.flies(event.token):
             return
         detail = f"{event.reason}: {event.text}" if event.text else event.reason
-        if conduct.craft.lost_since_us is not None:
+        if conduct.link.down:
             detail += "; the link is silent: what the vehicle does is not known"
         conduct.dispatcher.end(now, "failed", detail)
+        if conduct.stage is Stage.DECIDING and conduct.aloft:
+            # It was a hold: whatever the vehicle does, it does not wait where it should.
+            conduct.fall_back(FALLBACK_LINK, holds=False)
         if conduct.stage is not Stage.RUNNING:
             return
         if event.reason == WITHHELD and not conduct.recording:
@@ -146,13 +172,21 @@ class Happenings:
         else:
             conduct.end(now, Ending.ABORTED if conduct.craft.flown else Ending.REFUSED)
 
-    def _link(self, now: Now, *, lost: bool) -> None:
-        conduct = self._conduct
-        if lost == (conduct.craft.lost_since_us is not None):
-            return
-        conduct.craft.lost_since_us = now.monotonic_us if lost else None
+    def _ended(self, now: Now, event: TakenOver | Crashed) -> None:
+        crashed = isinstance(event, Crashed)
+        self._journal.effect(now, "crashed" if crashed else "taken-over", detail=event.how)
+        self._conduct.stand_down(now, Ending.CRASHED if crashed else Ending.STOOD_DOWN)
+
+    def _link(self, now: Now, event: LinkLost | LinkBack) -> None:
+        conduct, link = self._conduct, self._conduct.link
+        if isinstance(event, LinkLost):
+            takes_off = conduct.dispatcher.active is not None and conduct.craft.airborne is not True
+            if not link.lost(now.monotonic_us, takes_off=takes_off):
+                return
+            self._journal.effect(now, "link-lost", detail=event.why)
+        elif (down_us := link.back(now.monotonic_us)) is not None:
+            self._journal.effect(now, "link-back", detail=f"after {down_us // 1_000} ms")
         conduct.fresh = True
-        self._journal.effect(now, "link-lost" if lost else "link-back")
 
     def _evidence(self, now: Now, event: EvidenceFailed | EvidenceKept) -> None:
         """Recorded once a gap: the record may fail like the others, and be taken up when the sink can write again."""

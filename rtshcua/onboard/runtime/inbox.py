@@ -8,7 +8,7 @@ from base64 import b64encode
 from typing import Final
 
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Presented, Reply
+from rtshcua.onboard.ports import Ending, Presented, Reply
 from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.flight import Stage
 from rtshcua.onboard.runtime.journal import Journal
@@ -57,7 +57,7 @@ class Inbox:
             conduct.admission.answered(receipt, now)
         elif receipt.kind == RECALL:
             self._journal.effect(now, "recall", detail=envelope)
-            conduct.recall(now)
+            conduct.call_back(now, Ending.RECALLED)
         else:
             self._journal.effect(now, "replacement", kind=STEP, step=receipt.step, detail=envelope)
             conduct.replaced(receipt.step)

@@ -41,6 +41,17 @@ class StateMonitor:
             self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
             self._unseen.add(slot)
 
+    def current(self, now_us: int) -> frozenset[int]:
+        """The slots that were reported, and are not stale."""
+        limits, stamps = self._policy.limits, self._stamps
+        return frozenset(
+            slot for slot, stamp in enumerate(stamps) if stamp is not None and now_us - stamp <= limits[slot].stale_us
+        )
+
+    def unreported(self, slots: frozenset[int], since_us: int) -> frozenset[int]:
+        """Those of `slots` nothing of which was measured after `since_us`."""
+        return frozenset(slot for slot in slots if (self._stamps[slot] or 0) <= since_us)
+
     def hides(self, readings: Readings) -> bool:
         """Whether these readings replace a value that nobody has looked at: frames came faster than steps were made."""
         unseen = self._unseen

@@ -22,6 +22,10 @@ class Patience:
         """Another step is waited for from now on."""
         self._grace = Grace()
 
+    def stood(self, us: int) -> None:
+        """For so long nothing was judged: no grace ran meanwhile. The step's deadline did."""
+        self._grace.stood(us)
+
     def may_wait(self, invocation: Invocation, answer: Answer, released_us: int, now_us: int) -> bool:
         """Whether asking again can help: not past the deadline, but for an approval, which has a time of its own.
 

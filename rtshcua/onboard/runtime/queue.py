@@ -21,6 +21,11 @@ class InvocationQueue:
         return self._steps[self._index] if self._index < len(self._steps) else None
 
     @property
+    def at_last(self) -> bool:
+        """Whether no step follows the current one."""
+        return self._index + 1 >= len(self._steps)
+
+    @property
     def released_us(self) -> int | None:
         """When the current step was released; None before the vehicle was ready."""
         return self._released_us

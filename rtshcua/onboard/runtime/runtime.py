@@ -8,9 +8,10 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Ending, Event, Readings
 from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.flight import Limits, Stage
-from rtshcua.onboard.runtime.happenings import Happenings
+from rtshcua.onboard.runtime.happenings import Happenings, last_words_first
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.snapshot import view_of
+from rtshcua.onboard.runtime.turns import Turns
 from rtshcua.onboard.runtime.view import View
 
 _RUNNING, _ENDED = Stage.RUNNING, Stage.ENDED  # an enumeration's attributes are slow to find
@@ -29,6 +30,7 @@ class Runtime:
     ) -> None:
         self._journal = Journal(recorder)
         self._conduct = Conduct(loaded, self._journal, limits or Limits(), resumed=resumed)
+        self._turns = Turns(self._conduct)
         self._happenings = Happenings(self._conduct, self._journal)
 
     @property
@@ -43,15 +45,15 @@ class Runtime:
         one observation of the policy's temporal monitors, after what was received and before what is decided. Once the
         run ended, nothing is done any more.
         """
-        conduct, monitor = self._conduct, self._conduct.monitor
-        for event in events:
+        conduct, monitor, turns = self._conduct, self._conduct.monitor, self._turns
+        for event in last_words_first(events):
             if isinstance(event, Readings) and conduct.stage is _RUNNING and monitor.hides(event):
-                conduct.turn(now)  # no state goes by unwatched, however many came at once
+                turns.turn(now)  # no state goes by unwatched, however many came at once
                 monitor.seen()
             if conduct.stage is not _ENDED:
                 self._happenings.take(now, event)
         monitor.observe(now)
-        while conduct.turn(now):
+        while turns.turn(now):
             pass
         if conduct.stage is not _ENDED:  # then the close is the seal
             self._journal.seal_when_idle(now)
@@ -67,10 +69,15 @@ class Runtime:
         return self._conduct.aloft
 
     @property
+    def linked(self) -> bool:
+        """Whether the vehicle is heard."""
+        return not self._conduct.link.down
+
+    @property
     def homeward(self) -> bool:
         """Whether the command that flies brings the vehicle home or down, and its link is not lost."""
         active = self._conduct.dispatcher.active
-        return active is not None and active.homeward and self._conduct.craft.lost_since_us is None
+        return active is not None and active.homeward and self.linked
 
     def view(self, now: Now) -> View:
         """What a display may show."""

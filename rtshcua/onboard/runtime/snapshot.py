@@ -20,7 +20,7 @@ def view_of(conduct: Conduct, at_us: int) -> View:
         _left_us(conduct, at_us),
         conduct.craft.armed,
         conduct.craft.airborne,
-        conduct.craft.lost_since_us is None,
+        not conduct.link.down,
         _signals(conduct, at_us),
         tuple(conduct.admission.recent),
         conduct.ending,

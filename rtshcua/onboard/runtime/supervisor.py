@@ -16,6 +16,10 @@ class Grace:
     def __init__(self) -> None:
         self._since: dict[str, int] = {}
 
+    def stood(self, us: int) -> None:
+        """For so long nothing was judged: that time does not count."""
+        self._since = {text: since_us + us for text, since_us in self._since.items()}
+
     def over(self, broken: Iterable[tuple[str, Truth]], at_us: int, grace_us: int) -> str | None:
         """The first text that is FALSE, or was UNKNOWN at each call for longer than `grace_us`; else None.
 
@@ -40,6 +44,10 @@ class Supervisor:
         self._policy = policy
         self._started_us = started_us
         self._grace = Grace()
+
+    def stood(self, us: int) -> None:
+        """For so long nothing was judged: no grace ran meanwhile. The skill's own time did."""
+        self._grace.stood(us)
 
     def violated(self, state: State, now: Now) -> str | None:
         """The text of what does not hold any more, or None while all does."""

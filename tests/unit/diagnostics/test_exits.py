@@ -22,6 +22,7 @@ def test_codes_and_slugs_never_change() -> None:
         11: "decision",
         12: "anchor",
         13: "tests",
+        14: "crashed",
         70: "fault",
         74: "io",
         130: "interrupted",

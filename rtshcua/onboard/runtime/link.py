@@ -1,0 +1,131 @@
+"""The link to the vehicle: while it is down nothing is judged, and when it is back fresh state is awaited first.
+
+What is known of a vehicle that was silent is old. What was current when the link was lost, and is stale when it is
+back, has to be reported again, measured after the loss, before anything is decided on it; for a bounded time, for it
+may never be. Signals that were stale or missing before are not waited for: their absence is no news.
+"""
+
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import POSITION
+from rtshcua.onboard.ports import Frozen
+from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.monitor import StateMonitor
+
+#: what stands for the vehicle's word on whether it flies, among the names of signals
+AIR_STATE = "whether it is in the air"
+
+
+class Silence(Frozen):
+    """A silence that is over: how long the vehicle was not heard, how long fresh state was then waited for, both in us,
+    and what was not reported again in time.
+    """
+
+    lasted_us: int
+    awaited_us: int
+    missing: tuple[str, ...]
+
+
+class Link:
+    """Whether the vehicle is heard, and whether what is known of it may be judged. Times are monotonic, in us.
+
+    One silence goes on until state was judged again: a link that comes and goes within it begins no new one.
+    """
+
+    def __init__(self, policy: Policy, monitor: StateMonitor, limits: Limits) -> None:
+        self._policy = policy
+        self._monitor = monitor
+        self._limits = limits
+        self.down = False
+        self._since_us: int | None = None  # the silence began; None: none is under way
+        self._lost_us = 0  # the link was lost last
+        self._first_back_us: int | None = None  # the link was back first in this silence,
+        self._back_us = 0  # and last
+        self._until_us: int | None = None  # fresh state is waited for; None: nothing is
+        self._standing_us: int | None = None  # since then nothing is judged
+        self._awaited: frozenset[int] = frozenset()
+        self._awaits_air = False
+
+    def lost(self, now_us: int, *, takes_off: bool) -> bool:
+        """The link is lost. `takes_off`: it was on the ground, under a command. False if the link was down already."""
+        if self.down:
+            return False
+        self.down = True
+        self._lost_us = now_us
+        self._since_us = now_us if self._since_us is None else self._since_us
+        self._standing_us = now_us if self._standing_us is None else self._standing_us
+        self._awaited |= self._monitor.current(now_us)
+        self._awaits_air = self._awaits_air or takes_off
+        return True
+
+    def back(self, now_us: int) -> int | None:
+        """The link is back: how long it was down. None if it was not down.
+
+        Fresh state is waited for `fresh_us` from now, and `flapping_us` from when it was back first in this silence.
+        """
+        if not self.down:
+            return None
+        self.down = False
+        self._back_us = now_us
+        self._first_back_us = now_us if self._first_back_us is None else self._first_back_us
+        self._until_us = min(now_us + self._limits.fresh_us, self._first_back_us + self._limits.flapping_us)
+        return now_us - self._lost_us
+
+    def air_reported(self) -> None:
+        """The vehicle said whether it is in the air."""
+        self._awaits_air = False
+
+    def silent_us(self, now_us: int) -> int:
+        """How long the silence has lasted; 0 if none is under way."""
+        return 0 if self._since_us is None else now_us - self._since_us
+
+    def awaits(self, now_us: int) -> bool:
+        """Whether nothing may be judged now, for fresh state may still come. Not to be asked while the link is down."""
+        if self._until_us is None:
+            return False
+        if now_us < self._until_us and self._missing(now_us):
+            self._standing_us = now_us if self._standing_us is None else self._standing_us
+            return True
+        return False
+
+    def judged(self, now_us: int) -> tuple[int, Silence | None]:
+        """State is judged now: for how long it was not, and the silence if that is over with it.
+
+        Until the time for fresh state is over, what is stale only now and was not reported again is waited for too.
+        """
+        if self._until_us is None:
+            return 0, None
+        stood_us = 0 if self._standing_us is None else now_us - self._standing_us
+        self._standing_us = None
+        silence = None
+        if self._since_us is not None:
+            lasted_us = self._back_us - self._since_us
+            silence = Silence(lasted_us, now_us - self._back_us, self._missing(now_us))
+            self._since_us = self._first_back_us = None
+        if now_us >= self._until_us or not (self._awaits_air or self._pending):
+            self._forget()
+        return stood_us, silence
+
+    def _forget(self) -> None:
+        """All that was awaited has come, or is not awaited any more."""
+        self._until_us = None
+        self._lost_us = self._back_us = 0
+        self._awaited = frozenset()
+        self._awaits_air = False
+
+    @property
+    def _pending(self) -> frozenset[int]:
+        return self._monitor.unreported(self._awaited, self._lost_us)
+
+    def _missing(self, now_us: int) -> tuple[str, ...]:
+        """The names of what is not known any more, and was awaited in vain so far."""
+        slots = self._pending
+        slots = slots and slots - self._monitor.current(now_us)
+        air = (AIR_STATE,) if self._awaits_air else ()
+        return (*self._names(slots), *air) if slots else air
+
+    def _names(self, slots: frozenset[int]) -> tuple[str, ...]:
+        return tuple(
+            signal.name
+            for signal in self._policy.signals
+            if signal.slot in slots or (signal.kind == POSITION and signal.slot + 1 in slots)
+        )

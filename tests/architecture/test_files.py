@@ -1,4 +1,4 @@
-"""Files stay small, and the pins say what to install, never where from."""
+"""The pins say what to install, never where from."""
 
 import re
 import tomllib
@@ -7,17 +7,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-LONGEST = 300
 REQUIREMENTS = sorted((CHECKOUT / "requirements").glob("*.txt"))
-
-
-def test_no_source_file_is_longer_than_a_reader_can_hold() -> None:
-    lengths = {
-        str(file.relative_to(CHECKOUT)): len(file.read_text(encoding="utf-8").splitlines())
-        for file in (CHECKOUT / "rtshcua").rglob("*.py")
-    }
-    assert lengths
-    assert not {name: lines for name, lines in lengths.items() if lines > LONGEST}
 
 
 def pins(text: str) -> list[str]:

@@ -341,9 +341,9 @@ class Driver:
         seen = self._seen
         if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us) or self._mute:
             return False
-        return (
-            seen.airborne or (self.source.unready or (self._preflight is not None and self._preflight.unready)) is None
-        )
+        if seen.airborne:
+            return True
+        return self.source.unready is None and (self._preflight is None or self._preflight.unready is None)
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""

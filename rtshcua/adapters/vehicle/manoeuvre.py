@@ -145,7 +145,9 @@ class Manoeuvre:
         """The message of the stage; none where it would ask for what is so already."""
         self._waits, self._entered_us = False, seen.up_us
         self._aids.mode.sent()
-        self._aids.targets.expect(self._left[0].target, seen)
+        target = self._left[0].target
+        if target is not None or self._command.kind in _HOMEWARD:  # else it is what it was: a mode, a speed, an arming
+            self._aids.targets.expect(target, seen)
         if self._left[0].spare and self._is_done(seen):
             return []
         return self._commander.start(self._left[0], seen.up_us)

@@ -1,0 +1,203 @@
+"""Whoever else flies the vehicle is seen, whether or not the mode changes, and is never fought.
+
+The required property, over the moments at which a pilot may act, the phases of the reports and the delays of the link:
+no frame that moves the vehicle leaves later than W after the takeover took effect, where W is how old a mode report may
+be on which a frame leaves, and the link's delay; and a takeover that shows after a frame of ours was on its way ends
+what we do.
+"""
+
+import copyreg
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from itertools import product
+from struct import Struct
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.mavlink.frames import Codec
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Failed, Succeeded, TakenOver
+from rtshcua.simulation.faults import Fault, LinkDelay, PilotGoto, PilotMode, PilotPause, PilotSticks
+from rtshcua.simulation.modes import Mode
+
+Make = Callable[..., Any]
+ASKS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
+MS, S = 1_000, 1_000_000
+copyreg.pickle(Struct, lambda made: (Struct, (made.format,)))  # a flight is copied with its codec
+WITHIN_US = {"px4": PX4.mode_within_us, "ardupilot": ARDUPILOT.mode_within_us}
+#: how long it may take until the driver looks again
+TICK_US = 40 * MS
+#: how often landed state and target are reported
+REPORTED_US = 100 * MS
+DELAYS_US = (0, 20 * MS, 150 * MS)
+
+
+def moves(frame: bytes) -> bool:
+    """Whether an autopilot that obeys the frame does something."""
+    for received in Codec(1, 1).parse(frame):
+        if received.name.startswith("COMMAND_"):
+            return received.message.command not in (
+                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                mavlink.MAV_CMD_REQUEST_MESSAGE,
+            )
+        if received.name == "SET_POSITION_TARGET_GLOBAL_INT":
+            return True
+    return False
+
+
+class Sent:
+    """When frames left that move the vehicle."""
+
+    def __init__(self, one: Any) -> None:
+        self.at_us: list[int] = []
+        self._one = one
+        one.vehicle.lose = self
+
+    def __call__(self, frame: bytes) -> bool:
+        if moves(frame):
+            self.at_us.append(self._one.now_us)
+        return False
+
+
+TAKEOVERS: dict[str, Callable[[int], Fault]] = {
+    "pause": PilotPause,
+    "go-to": lambda at_us: PilotGoto(at_us, -60_000, 40_000, 25_000),
+    "go-to lower": lambda at_us: PilotGoto(at_us, 0, 300_000, 12_000),
+    "land": lambda at_us: PilotMode(at_us, Mode.LAND),
+    "return": lambda at_us: PilotMode(at_us, Mode.RETURN),
+    "position": lambda at_us: PilotMode(at_us, Mode.POSITION),
+}
+
+
+@pytest.mark.parametrize("name", TAKEOVERS)
+def test_a_takeover_in_a_leg_is_seen_and_not_fought(flyer: Make, flavour: str, name: str) -> None:
+    """PX4's pause and go-to, and ArduCopter's guided target, change no mode (recorded)."""
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(5)
+    sent = Sent(one)
+    one.vehicle.simulation.inject(TAKEOVERS[name](0))
+    if (name, flavour) == ("pause", "ardupilot"):
+        # It goes on reporting our target, so that only its motion tells.
+        assert one.until((TakenOver, Failed), 30).reason == "stopped-short"
+        return
+    taken = one.until((TakenOver, Failed), 3)
+    assert isinstance(taken, TakenOver), taken
+    one.wait(30)
+    assert sent.at_us == []
+
+
+@pytest.mark.parametrize("name", ["go-to", "land", "position"])
+def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(flyer: Make, name: str) -> None:
+    one = flyer().up()
+    assert isinstance(one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000, speed=5_000), Succeeded)
+    one.wait(3)
+    one.vehicle.simulation.inject(TAKEOVERS[name](0))
+    one.until(TakenOver, 3)
+
+
+@pytest.mark.parametrize("name", ["pause", "go-to", "land", "position"])
+def test_a_takeover_is_seen_while_it_holds(flyer: Make, flavour: str, name: str) -> None:
+    """ArduCopter obeys no pause in BRAKE: there is nothing to see."""
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(5)
+    one.begin(MotionKind.HOLD)
+    one.wait(8)
+    sent = Sent(one)
+    one.vehicle.simulation.inject(TAKEOVERS[name](0))
+    if (name, flavour) == ("pause", "ardupilot"):
+        assert not any(isinstance(event, (TakenOver, Failed)) for event in one.wait(10))
+    elif (name, flavour) == ("pause", "px4"):
+        one.wait(10)  # it stands where it stood: nothing is taken from us, and nothing of ours follows
+    else:
+        one.until(TakenOver, 3)
+    assert sent.at_us == []
+
+
+def test_sticks_end_what_px4_does_by_itself(flyer: Make, flavour: str) -> None:
+    """ArduCopter does not mind them in GUIDED."""
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(5)
+    one.vehicle.simulation.inject(PilotSticks(0))
+    if flavour == "px4":
+        assert one.until(TakenOver, 3).how == "Position"
+    else:
+        assert not any(isinstance(event, (TakenOver, Failed)) for event in one.wait(10))
+
+
+def test_our_own_targets_are_nobody_elses(flyer: Make) -> None:
+    """Leg after leg, a hold, and another leg."""
+    one = flyer().up()
+    path = [(20_000, 0), (20_000, 20_000), (0, 20_000), (0, 0), (20_000, 0)]
+    assert isinstance(one.fly(MotionKind.COVER, *path, altitude=20_000, speed=5_000), Succeeded)
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=8_000)
+    one.wait(6)
+    assert isinstance(one.fly(MotionKind.HOLD, hold_us=5 * S), Succeeded)
+    assert isinstance(one.fly(MotionKind.FLY, (0, 0), altitude=30_000, speed=8_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.HOME), Succeeded)
+    assert not any(isinstance(event, TakenOver) for event in one.events)
+
+
+# ---------------------------------------------------------------- interleavings
+
+
+def moments(whole: bool) -> Iterator[tuple[int, int, int]]:
+    """(when the pilot acts after our command is begun, the phase of PX4's heartbeat then, the link's delay), in us."""
+    acts = range(-400, 600, 20) if whole else (-100, 20, 200)
+    phases = range(0, 1_000, 100) if whole else (100, 600)
+    delays = DELAYS_US if whole else DELAYS_US[::2]
+    return product((ms * MS for ms in acts), (ms * MS for ms in phases), delays)
+
+
+def under_way(flyer: Make, delay_us: int) -> Any:
+    """A flight in the middle of a leg."""
+    one = flyer().up()
+    if delay_us:
+        one.vehicle.simulation.inject(LinkDelay(0, delay_us))
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(4)
+    return one
+
+
+def holds(one: Any, flavour: str, name: str, acts_us: int, phase_us: int, delay_us: int) -> None:
+    """One pilot, one next command of ours, close together."""
+    one.wait((phase_us - one.now_us % S) % S / S)
+    sent = Sent(one)
+    begins_us = one.now_us + 500 * MS
+    takes_us = begins_us + acts_us
+    simulation = one.vehicle.simulation
+    simulation.inject(TAKEOVERS[name](simulation.now_us + takes_us - one.now_us))
+    one.wait((begins_us - one.now_us) / S)
+    if not any(isinstance(event, TakenOver) for event in one.events):
+        one.begin(MotionKind.FLY, (200_000, 90_000), altitude=25_000, speed=5_000)
+        one.wait(6)
+    latest_us, late_us = max(sent.at_us, default=0), takes_us + WITHIN_US[flavour] + 2 * delay_us + TICK_US
+    if any(isinstance(event, TakenOver) for event in one.events):
+        one.wait(3)
+        assert max(sent.at_us, default=0) == latest_us, "nothing is sent once it shows"
+    else:  # ours was on its way, and came before any report showed the pilot's
+        assert takes_us - TICK_US <= latest_us + delay_us <= takes_us + REPORTED_US
+    assert latest_us <= late_us, f"{(latest_us - takes_us) / MS} ms after it took effect"
+
+
+def try_all(flyer: Make, flavour: str, name: str, *, whole: bool) -> None:
+    flights = {delay_us: under_way(flyer, delay_us) for delay_us in DELAYS_US}
+    for acts_us, phase_us, delay_us in moments(whole):
+        holds(deepcopy(flights[delay_us]), flavour, name, acts_us, phase_us, delay_us)
+
+
+@pytest.mark.parametrize("name", ["land", "go-to"])
+def test_no_frame_leaves_later_than_w(flyer: Make, flavour: str, name: str) -> None:
+    try_all(flyer, flavour, name, whole=False)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", ["land", "return", "position", "go-to"])
+def test_no_frame_leaves_later_than_w_at_any_moment(flyer: Make, flavour: str, name: str) -> None:
+    try_all(flyer, flavour, name, whole=True)

@@ -65,7 +65,7 @@ class Handling:
     forgets_speed: bool = False
     """Whether another mode flies at the cruise speed again."""
     forgets_at_first_target: bool = False
-    """Whether so does the first target in a mode: a speed that was set before it is lost, as recorded."""
+    """Whether so does the first target in GUIDED: a speed that was set before it is lost, as recorded."""
     lifts_to_targets: bool = False
     """Whether a target makes it lift off when it stands armed."""
     crash_disarm_s: float | None = None

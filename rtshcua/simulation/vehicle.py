@@ -150,7 +150,7 @@ class Vehicle(Flight):
     def go_to(self, target: Point) -> None:
         """Flies straight to `target`; on the ground it does nothing, or lifts off if armed, as the flavour does."""
         if self.flies:
-            if self.handling.forgets_at_first_target and not self.sent:
+            if self.handling.forgets_at_first_target and self.mode is Mode.GUIDED and not self.sent:
                 self._speed = None
             self.destination, self.sent = target, True
             if self.paused:

@@ -87,6 +87,8 @@ class Flavour:
     """How long the estimator goes on without a fix."""
     texts_need_ground_station: bool
     """Whether STATUSTEXT is sent only once a ground station's heartbeat was seen."""
+    check_text: str
+    """How a text begins that says what stands against arming, when only asked."""
     beats_on_mode: bool
     """Whether another mode is told by a heartbeat at once."""
     reminds: bool
@@ -189,9 +191,7 @@ class Autopilot:
                 facts = {"speed": vehicle.touched_m_s, "up": up, "amsl": up + self.home.amsl_mm // 1000}
                 self.say(mavlink.MAV_SEVERITY_INFO, flavour.texts[event].format(**facts))
         vehicle.events.clear()
-        if flavour.beats_on_mode and vehicle.mode is not self._told_mode:
-            self.send(self.reports.message(mavlink.MAVLINK_MSG_ID_HEARTBEAT))
-        self._told_mode = vehicle.mode
+        self.tell_mode()
         if vehicle.armed or not flavour.reminds:
             self._remind_us = self.now_us + _REMIND_FIRST_US
         elif self.now_us >= self._remind_us:
@@ -199,6 +199,12 @@ class Autopilot:
             if self.sensors.consistent:
                 for reason in flavour.arming(self):
                     self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {reason}")
+
+    def tell_mode(self) -> None:
+        """A heartbeat, if the mode is another one than was told, and the flavour tells at once."""
+        if self.flavour.beats_on_mode and self.vehicle.mode is not self._told_mode:
+            self.send(self.reports.message(mavlink.MAVLINK_MSG_ID_HEARTBEAT))
+        self._told_mode = self.vehicle.mode
 
     def _follow_plans(self) -> None:
         """The mission, the fence and the transfers go on."""

@@ -61,6 +61,15 @@ def request_version(a: Autopilot, _: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
+def run_checks(a: Autopilot, _: Command) -> tuple[int, ...]:
+    """MAV_CMD_RUN_PREARM_CHECKS: refused while armed; what stands against arming comes as texts."""
+    if a.vehicle.armed:
+        return (TEMPORARILY_REJECTED,)
+    for reason in a.flavour.arming(a):
+        a.say(mavlink.MAV_SEVERITY_CRITICAL, f"{a.flavour.check_text}: {reason}")
+    return (ACCEPTED,)
+
+
 def get_home(a: Autopilot, _: Command) -> tuple[int, ...]:
     """MAV_CMD_GET_HOME_POSITION."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_HOME_POSITION](a))

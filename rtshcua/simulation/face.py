@@ -39,6 +39,7 @@ class Face:
             handler = _HANDLERS.get(received.name)
             if handler is not None and self._is_for_me(received.message) and self._is_trusted(received):
                 handler(self._autopilot, received)
+                self._autopilot.tell_mode()
         return self._collect()
 
     def due(self) -> list[bytes]:

@@ -112,6 +112,8 @@ class Flight(ABC):
         """Stops where it can, at the height `up`, or where it can stop climbing as well."""
         body, agility = self.body, self.handling.agility
         stop = agility.brake if self.mode is Mode.BRAKE else agility.stop
+        if self.mode is Mode.LAND:
+            stop = agility.land
         self._approach, self._hardest = stop.approach, stop.hardest
         if up is None:
             # PX4 comes back to the height where it was told to hold (recorded); ArduCopter stops ahead of it.

@@ -18,6 +18,8 @@ class Agility:
     """How it stops when told to stay."""
     brake: Stop
     """The same in BRAKE."""
+    land: Stop
+    """The same when told to land."""
     climb_acceleration: float
     climb_approach: Approach
     """How it slows down in front of a height."""
@@ -62,6 +64,8 @@ class Handling:
     after_landing: Mode | None = None
     forgets_speed: bool = False
     """Whether another mode flies at the cruise speed again."""
+    forgets_at_first_target: bool = False
+    """Whether so does the first target in GUIDED: a speed that was set before it is lost, as recorded."""
     lifts_to_targets: bool = False
     """Whether a target makes it lift off when it stands armed."""
     crash_disarm_s: float | None = None

@@ -13,13 +13,16 @@ class Streams:
         self._next_us = 0  # nothing is due before
 
     def set(self, message_id: int, interval_us: int) -> None:
-        """Sets an interval as SET_MESSAGE_INTERVAL means it: 0 is the default one, negative is never."""
+        """Sets an interval as SET_MESSAGE_INTERVAL means it: 0 is the default one, negative is never.
+
+        One that it has already changes nothing, not even when the next message is due.
+        """
         if interval_us == 0:
             interval_us = self._default.get(message_id, -1)
         if interval_us < 0:
             self._interval.pop(message_id, None)
             self._due.pop(message_id, None)
-        else:
+        elif interval_us != self._interval.get(message_id):
             self._interval[message_id] = interval_us
             self._due[message_id] = self._next_us = 0
 

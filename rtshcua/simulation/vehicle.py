@@ -141,6 +141,7 @@ class Vehicle(Flight):
             self._hold(Activity.RETURN_CLIMB, max(body.up, self.handling.return_up))
             if self.handling.comes_back:
                 self.target = self.destination = Point(body.north, body.east, self.target.up)
+                self._steer_to_target()
 
     def wait(self, seconds: float) -> None:
         """Keeps its height for so long before it goes on landing."""
@@ -149,6 +150,8 @@ class Vehicle(Flight):
     def go_to(self, target: Point) -> None:
         """Flies straight to `target`; on the ground it does nothing, or lifts off if armed, as the flavour does."""
         if self.flies:
+            if self.handling.forgets_at_first_target and self.mode is Mode.GUIDED and not self.sent:
+                self._speed = None
             self.destination, self.sent = target, True
             if self.paused:
                 return

@@ -6,11 +6,11 @@ second. A difference has a key, by which one that is kept on purpose can be name
 
 import re
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from recorded.trace import SECOND, Heard, Question
+from recorded.trace import CLIENT, SECOND, Heard, Question
 from rtshcua.simulation.place import Home
 
 ANSWERED = ("AUTOPILOT_VERSION", "HOME_POSITION")
@@ -144,27 +144,82 @@ def motion(
 ) -> Iterator[Difference]:
     """Stretches of time in which height or place differ by more than the limits, looked at where positions came."""
     own = [h for h in simulated if h.name == "GLOBAL_POSITION_INT" and h.message.lat]
+    real = [h for h in recorded if h.name == "GLOBAL_POSITION_INT" and h.message.lat]
     if not own:
         yield Difference("position", "some", "none")
         return
-    for axis, limit, read in (
-        ("height", up_m, lambda m: (m.relative_alt / 1000,)),
-        ("place", away_m, lambda m: home.local(m.lat, m.lon)),
-    ):
-        worst: tuple[float, Heard, Any] | None = None
-        start_us = 0
-        for h in (h for h in recorded if h.name == "GLOBAL_POSITION_INT" and h.message.lat):
-            at = min(max(bisect_left(own, h.at_us, key=_at), 0), len(own) - 1)
-            real, mine = read(h.message), read(own[at].message)
-            off = sum((a - b) ** 2 for a, b in zip(real, mine, strict=True)) ** 0.5
-            if off > limit:
-                start_us = start_us if worst else h.at_us
-                worst = max(worst or (0.0, h, mine), (off, h, mine), key=lambda w: w[0])
-            elif worst is not None:
-                yield _stretch(axis, start_us, h.at_us, worst, read)
-                worst = None
-        if worst is not None:
-            yield _stretch(axis, start_us, recorded[-1].at_us, worst, read)
+    yield from _stretches("height", up_m, real, own, lambda m: (m.relative_alt / 1000,))
+    yield from _stretches("place", away_m, real, own, lambda m: home.local(m.lat, m.lon))
+
+
+def targets(
+    home: Home, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float, late_us: int
+) -> Iterator[Difference]:
+    """The same for the targets that are reported, and stretches in which one side reports none for `late_us`."""
+    during = _between(simulated, recorded[0].at_us, recorded[-1].at_us)
+    real, own = ([h for h in side if h.name == "POSITION_TARGET_GLOBAL_INT"] for side in (recorded, during))
+    for side, others, whose in ((real, own, "recorded"), (own, real, "simulated")):
+        alone = [h.at_us for h in side if not _between(others, h.at_us - late_us, h.at_us + late_us)]
+        if alone:
+            yield Difference(f"targets only {whose}", _moment(alone[0]), f"{len(alone)} of them, until {alone[-1]}")
+    near = [h for h in real if _between(own, h.at_us - late_us, h.at_us + late_us)]
+    yield from _stretches("target height", up_m, near, own, lambda m: (m.alt,), late_us)
+    yield from _stretches("target place", away_m, near, own, lambda m: home.local(m.lat_int, m.lon_int), late_us)
+
+
+def acknowledgements(recorded: list[Heard], simulated: list[Heard]) -> Iterator[Difference]:
+    """The results of each command of the client's, in order, over the whole session."""
+    real, own = _results(recorded), _results(simulated)
+    for command in sorted({*real, *own}):
+        if real.get(command) != own.get(command):
+            yield Difference(f"command {command}", real.get(command), own.get(command))
+
+
+def _results(heard: list[Heard]) -> dict[int, list[int]]:
+    results: dict[int, list[int]] = {}
+    for h in heard:
+        if h.name == "COMMAND_ACK" and h.message.target_component in (0, CLIENT):
+            results.setdefault(h.message.command, []).append(h.message.result)
+    return results
+
+
+def rates(names: Iterable[str], recorded: list[Heard], simulated: list[Heard], part: float) -> Iterator[Difference]:
+    """How many messages of these names came, if that differs by more than a part of them, and by more than two."""
+    during = _between(simulated, recorded[0].at_us, recorded[-1].at_us)
+    for name in names:
+        real, own = (sum(h.name == name for h in side) for side in (recorded, during))
+        if abs(real - own) > max(2, part * real):
+            yield Difference(f"rate of {name}", real, own)
+
+
+def _stretches(
+    axis: str,
+    limit: float,
+    recorded: list[Heard],
+    own: list[Heard],
+    read: Callable[[Any], tuple[float, ...]],
+    late_us: int = 0,
+) -> Iterator[Difference]:
+    """Where the sides differ by more than `limit`, and by what comes within `late_us` too."""
+    worst: tuple[float, Heard, Any] | None = None
+    start_us = 0
+    for h in recorded:
+        at = min(max(bisect_left(own, h.at_us, key=_at), 0), len(own) - 1)
+        near = _between(own, h.at_us - late_us, h.at_us + late_us) if late_us else [own[at]]
+        real = read(h.message)
+        off, mine = min((_off(real, read(other.message)), read(other.message)) for other in near)
+        if off > limit:
+            start_us = start_us if worst else h.at_us
+            worst = max(worst or (0.0, h, mine), (off, h, mine), key=lambda w: w[0])
+        elif worst is not None:
+            yield _stretch(axis, start_us, h.at_us, worst, read)
+            worst = None
+    if worst is not None:
+        yield _stretch(axis, start_us, recorded[-1].at_us, worst, read)
+
+
+def _off(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    return sum((x - y) ** 2 for x, y in zip(a, b, strict=True)) ** 0.5
 
 
 def _stretch(axis: str, start_us: int, end_us: int, worst: Any, read: Callable[[Any], Any]) -> Difference:

@@ -61,9 +61,13 @@ class Question:
 
 
 class Trace:
-    """The session of one file in `tests/traces`."""
+    """The session of one file in `tests/traces`.
 
-    def __init__(self, name: str) -> None:
+    `wall`: by the clock of who recorded it, from the first frame; for an autopilot whose own clock stood still.
+    """
+
+    def __init__(self, name: str, wall: bool = False) -> None:
+        self._wall = wall
         data = lzma.decompress((TRACES / f"{name}.tlog.xz").read_bytes())
         self._frames = [
             (entry.at_us, received) for entry in tlog.read(data) for received in Codec(0, 0).parse(entry.frame)
@@ -75,6 +79,8 @@ class Trace:
         return [at for at, _ in pairs], [boot for _, boot in pairs]
 
     def _boot_us(self, at_us: int) -> int:
+        if self._wall:
+            return at_us - self._frames[0][0]
         wall, boot = self._clock
         after = min(max(bisect_right(wall, at_us), 1), len(wall) - 1)
         left = after - 1

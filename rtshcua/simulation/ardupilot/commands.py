@@ -21,6 +21,7 @@ from rtshcua.simulation.command_rules import (
     get_home,
     request_message,
     request_version,
+    run_checks,
     set_message_interval,
 )
 from rtshcua.simulation.modes import Mode
@@ -86,9 +87,9 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
         vehicle.set_mode(Mode.GUIDED)
     if not a.fence.allows(target):
         return (FAILED,)
+    vehicle.go_to(target)
     if command.p1 > 0:
         vehicle.speed = command.p1
-    vehicle.go_to(target)
     return (ACCEPTED,)
 
 
@@ -202,4 +203,5 @@ COMMANDS: Mapping[int, Handler] = {
     mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(FAILED, needs_one=False),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,
     mavlink.MAV_CMD_GET_HOME_POSITION: get_home,
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS: run_checks,
 }

@@ -52,11 +52,20 @@ _LOITER = Stop(Approach(braking=5.5, gain=2.6), hardest=6.5, ahead=_loiter, told
 """Measured from 10.1 m/s: 18 m, below 0.4 m/s after 3.0 s."""
 _BRAKE = Stop(Approach(braking=3.0, gain=0.75), hardest=3.6, ahead=_brake, told=_brake)
 """Measured from 10.1 m/s: 20.7 m, below 0.4 m/s after 4.6 s; recorded from 4.0 m/s: 7 m, 3.5 s."""
+
+
+def _land(speed: float) -> float:
+    return speed * (0.1 * speed + 2.3)
+
+
+_LAND = Stop(Approach(braking=2.2, gain=0.8), hardest=3.0, ahead=_land, told=_land)
+"""Recorded from 6.9 m/s: 21 m, 4.3 s."""
 _AGILITY = Agility(
     acceleration=2.5,
     approach=Approach(braking=1.25, gain=1.0),
     stop=_LOITER,
     brake=_BRAKE,
+    land=_LAND,
     climb_acceleration=1.1,
     climb_approach=Approach(braking=0.55, gain=1.0),
     takeoff_acceleration=1.2,
@@ -85,5 +94,6 @@ def handling(config: SimulationConfig) -> Handling:
         takeoff_up=2.5,
         landed_disarm_s=0.3,
         forgets_speed=True,
+        forgets_at_first_target=True,  # `pos_control_start` of mode_guided.cpp takes WPNAV_SPEED again
         crash_disarm_s=2.0,  # CRASH_CHECK_TRIGGER_SEC of crash_check.cpp
     )

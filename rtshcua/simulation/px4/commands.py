@@ -20,6 +20,7 @@ from rtshcua.simulation.command_rules import (
     get_home,
     request_message,
     request_version,
+    run_checks,
     set_message_interval,
 )
 from rtshcua.simulation.modes import Mode
@@ -208,4 +209,5 @@ COMMANDS: Mapping[int, Handler] = {
     mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(DENIED, needs_one=True),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,
     mavlink.MAV_CMD_GET_HOME_POSITION: get_home,
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS: run_checks,
 }

@@ -61,6 +61,7 @@ _AGILITY = Agility(
     approach=Approach(braking=0.75, gain=0.95),
     stop=_STOP,
     brake=_STOP,
+    land=_STOP,
     climb_acceleration=1.5,
     climb_approach=Approach(braking=0.7, gain=0.6),
     takeoff_acceleration=0.8,

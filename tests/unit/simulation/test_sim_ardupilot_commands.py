@@ -230,3 +230,14 @@ def test_data_stream_request_overrides_an_interval(copter: Any) -> None:
     assert count("GLOBAL_POSITION_INT") in (10, 11)
     copter.send(mavlink.MAVLink_request_data_stream_message(1, 1, mavlink.MAV_DATA_STREAM_ALL, 5, 0))
     assert count("GLOBAL_POSITION_INT") == 0
+
+
+def test_a_speed_that_is_set_before_the_first_target_is_forgotten(flying: Any) -> None:
+    assert flying.long(178, 1, 2, -1) == [0]
+    flying.go_to(100, 0, 10)
+    flying.wait(6)
+    assert flying.truth.speed_mm_s > 4_500, "`pos_control_start` takes WPNAV_SPEED again, as recorded"
+    assert flying.long(178, 1, 2, -1) == [0]
+    flying.go_to(200, 0, 10)
+    flying.wait(6)
+    assert flying.truth.speed_mm_s < 2_200

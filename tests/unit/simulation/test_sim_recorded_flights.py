@@ -90,7 +90,7 @@ KEPT: Mapping[str, Mapping[str, str]] = {
         "place from 88 s": "its simulator's wind has a profile; here it changes in three steps",
     },
     "px4": {
-        "place from 46 s": "it flew the second leg slower than the first; here both alike",
+        "place from 45 s": "it flew the second leg slower than the first; here both alike",
         "mode (50593792, True), time 1": "between arming and the takeoff came a heartbeat, by chance",
     },
 }

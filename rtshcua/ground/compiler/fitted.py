@@ -47,11 +47,12 @@ def check_policy(context: Context, policy: PolicyDecl, vehicle: VehicleDecl, ski
                 _check(context, vehicle, clause.condition, "write the clause on a line of its own, with `where fitted`")
 
 
-def check_step(context: Context, vehicle: VehicleDecl, step: Step) -> None:
-    """Report the same of a step's own clauses."""
-    own = step.overrides
+def check_step(context: Context, vehicle: VehicleDecl, step: Step) -> bool:
+    """Whether a step's own clauses read only what the vehicle has; reports what they read else."""
+    before, own = len(context.report.found), step.overrides
     for clause in () if own is None else (*own.require, *own.assume, *own.maintain):
         _check(context, vehicle, clause.condition, "leave the clause out")
+    return len(context.report.found) == before
 
 
 def _check(context: Context, vehicle: VehicleDecl, condition: Condition, help: str) -> None:

@@ -53,8 +53,7 @@ def lower_mission(
     invocations: list[Invocation] = []
     for number, phase, step in steps:
         local_time.check_step(context, under.vehicle, step)
-        fitted.check_step(context, under.vehicle, step)
-        if not _known(context, step, under):
+        if not fitted.check_step(context, under.vehicle, step) or not _known(context, step, under):
             continue
         skill = under.skills[step.skill.text]
         contract = tightened.contract(step)

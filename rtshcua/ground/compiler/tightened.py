@@ -110,7 +110,7 @@ class Tightened:
     def _known(self, clause: ClauseDecl) -> bool:
         """Whether the policy has the signals and zones that a clause names."""
         context, under = self._context, self._under
-        signals = {*(signal.name for signal in under.policy.signals), *under.policy.vehicle.without}  # of these: E0413
+        signals = {signal.name for signal in under.policy.signals}
         good = True
         for reference in references(clause.condition):
             zone = reference.name.removesuffix(ENTRY)

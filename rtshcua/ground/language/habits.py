@@ -24,6 +24,7 @@ TEXTS = {
     "test": 'a test is called by a text, as in `test "low battery" { ... }`',
     "at": 'a moment is written as in `at "2026-06-01T08:00:00Z"`',
 }
+_IS = re.compile(r"\bis\s+\Z")
 _TOLD = re.compile(r"\b(test|at)\s+\Z")
 
 _EXPONENT = re.compile(r"(?<![A-Za-z0-9_.])[0-9][0-9_.]*[eE][0-9]*\s*\Z")
@@ -52,6 +53,9 @@ def habit(automaton: Automaton, failure: Failure, symbols: set[str]) -> Habit | 
         return _import(automaton, failure)
     if symbols == {"<STRING>"} and (told := _TOLD.search(before)):
         return Habit(TEXTS[told[1]])
+    if symbols == {"known"} and (told := _IS.search(before)):
+        word = Span(source.file, failure.start - len(told[0]), failure.start - len(told[0]) + len("is"))
+        return Habit("did you mean `==`? `is` stands before `known` alone", Fix(word, "==", "write `==`"))
     if found == "=" and before[-1:] == "=" and "<NUMBER>" in symbols:
         return Habit("a value is given with one `=`", Fix(span, "", "write one `=`"))
     meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)

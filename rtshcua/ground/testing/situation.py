@@ -120,7 +120,9 @@ class Situations:
             codes.WITHOUT_EFFECT,
             span,
             f"nothing in `{self._policy.name}` reads `{subject.name.text}`, so its value changes nothing",
-            help=f"it reads {listed(self._signals)}",
+            help="the vehicle is without it"
+            if subject.name.text in self._policy.lowered.policy.vehicle.without
+            else f"it reads {listed(self._signals)}",
             labels=[(self._policy.lowered.declaration.name.span, "the policy is declared here")],
         )
 

@@ -20,7 +20,7 @@ from rtshcua.cli.shown import plain, shorten, utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
-from rtshcua.model.flat.policy import Monitor, MonitorKind
+from rtshcua.model.flat.policy import LeftOut, Monitor, MonitorKind, Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone
 from rtshcua.wire.bundle import envelopes
 from rtshcua.wire.keys import Duty
@@ -213,6 +213,24 @@ def test_what_flies_after_a_silence(silence_us: int, then: int, said: str) -> No
     page = Page()
     show_policy(page, replace(case.policy(), silence_us=silence_us, after_silence=then))
     assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
+
+
+def test_the_sensors_that_a_vehicle_lacks_and_the_clauses_left_out() -> None:
+    policy = case.policy()
+    vehicle = replace(policy.vehicle, without=("rain", "snow"))
+    clause = LeftOut(0, "assume", "rain < 3 m/s", 0, 0, 1)
+    page = Page()
+    show_policy(page, replace(policy, vehicle=vehicle, left_out=(clause,)))
+    rows = [" ".join(row.split()) for row in str(page).splitlines()]
+    assert "without rain, snow: not fitted; clauses `where fitted` that read it are left out" in rows
+    assert rows.count("left out assume rain < 3 m/s: the vehicle is without a sensor for it") == 1
+    assert not any(row.startswith("left out") for row in _shown(policy))
+
+
+def _shown(policy: Policy) -> list[str]:
+    page = Page()
+    show_policy(page, policy)
+    return [row.strip() for row in str(page).splitlines()]
 
 
 def test_a_bundle_that_makes_no_sense(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,6 +73,9 @@ REFUSED = [
     (argument(9), "instruction 0: argument cell 9 is no number"),
     ((Op.SIGNAL_IN, BATTERY, 0), f"instruction 0: slot {BATTERY} is no enumeration"),
     ((Op.SIGNAL_IN, -1, 0), "instruction 0: slot -1 is no enumeration"),
+    ((Op.KNOWN, -1, 0), "instruction 0: there is no slot -1"),
+    ((Op.KNOWN, 99, 0), "instruction 0: there is no slot 99"),
+    ((Op.KNOWN, FIX, 1), "instruction 0: an unused operand is not 0"),
     ((Op.SIGNAL_IN, FIX, 2), "instruction 0: there is no set 2"),
     ((Op.SIGNAL_IN, FIX, -1), "instruction 0: there is no set -1"),
     ((Op.ARGUMENT_IN, 1, 0), "instruction 0: argument cell 1 is no choice and no zone"),
@@ -189,6 +192,9 @@ B = {BATTERY: interval(2, 5)}
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: interval(0, 2)}, F),
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: maybe(members({3}))}, T | U),
         ((Op.SIGNAL_IN, FIX, flat.GOOD_FIX), {FIX: MISSING}, U),
+        ((Op.KNOWN, FIX, 0), {FIX: members({0, 7})}, T),
+        ((Op.KNOWN, FIX, 0), {FIX: maybe(members({3}))}, T | U),
+        ((Op.KNOWN, FIX, 0), {FIX: MISSING}, U),
     ],
 )
 def test_over_sets(code: tuple[int, ...], slots: dict[int, Value], truth: int) -> None:

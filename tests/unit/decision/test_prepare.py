@@ -20,7 +20,7 @@ from rtshcua.decision.watch import watch
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
 from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STALE, MAX_ZONES
 from rtshcua.model.flat.mission import Invocation, Mission
-from rtshcua.model.flat.policy import Airspace, Policy, RuleKind
+from rtshcua.model.flat.policy import Airspace, LeftOut, Policy, RuleKind
 from rtshcua.model.flat.zone import CIRCLE, MAX_COORDINATE, MAX_VERTICES, POLYGON, Zone
 
 P = flat.POLICY
@@ -56,6 +56,10 @@ def parameter(number: int, **fields: Any) -> Policy:
 
 def rule(**fields: Any) -> Policy:
     return replace(P, rules=(replace(P.rules[0], **fields), *P.rules[1:]))
+
+
+def lacking(*without: str, **fields: Any) -> Policy:
+    return replace(P, vehicle=replace(P.vehicle, without=without), **fields)
 
 
 BAD = flat.clause("bad", (0, 0, 0))
@@ -188,6 +192,15 @@ POLICIES: list[tuple[Policy, str]] = [
     (contract(HOVER, record=("buffered",)), "skill `hover`: recorded as `buffered`, which is for reflexes alone"),
     (replace(P, without_evidence=2), "without evidence 2 is not in 0..1"),
     (replace(P, without_evidence=-1), "without evidence -1 is not in 0..1"),
+    (lacking("b", "a"), "vehicle: the signals that it is without are not ascending"),
+    (lacking("a", "a"), "vehicle: the signals that it is without are not ascending"),
+    (lacking(P.signals[0].name), f"vehicle: it is without the signal `{P.signals[0].name}`, which the policy reads"),
+    (
+        replace(P, left_out=(LeftOut(0, "assume", "x", 0, 0, 1),)),
+        "vehicle: `x` is left out, and it is without no signal",
+    ),
+    (lacking("a", left_out=(LeftOut(99, "assume", "x", 0, 0, 1),)), "vehicle: there is no skill 99"),
+    (lacking("a", left_out=(LeftOut(0, "permit", "x", 0, 0, 1),)), "vehicle: `x` is left out of `permit`, which no"),
     (replace(P, silence_us=0), f"silence 0 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=-1), f"silence -1 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=MAX_SILENCE + 1), f"silence {MAX_SILENCE + 1} is not in 1..{MAX_SILENCE}"),

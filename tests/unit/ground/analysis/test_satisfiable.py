@@ -66,6 +66,7 @@ CHOICES = st.one_of(
     st.builds(tree.Member, st.just(False), st.just(4), st.integers(0, 2)),
     st.builds(tree.Member, st.just(True), st.just(2), st.integers(0, 2)),
     st.builds(tree.InWindow, st.integers(0, 23).map(HOUR.__mul__), st.integers(0, 24).map(HOUR.__mul__)),
+    st.builds(tree.Known, st.sampled_from((0, 1, 4))),
     st.builds(tree.InPhase, st.just(2)),
     st.builds(tree.Monitored, st.integers(0, 1)),
 )
@@ -73,6 +74,7 @@ PLACES = st.one_of(
     st.builds(tree.Inside, st.integers(0, 3)),
     st.builds(tree.InsideArgument, st.just(2), st.integers(0, 1)),
     st.builds(tree.PointInside, st.just(3), st.integers(0, 3)),
+    st.just(tree.Both(tree.Known(2), tree.Known(3))),  # what `position is known` is lowered to
 )
 
 

@@ -141,7 +141,7 @@ def test_a_rule_about_skills_that_keep_an_argument_in_other_cells_becomes_severa
 def test_defaults_are_filled_in_where_they_can_be_seen() -> None:
     text = (
         SHIPPED["lib:skills/hover.rts"]
-        .replace("grace    1 s", "")
+        .replace("grace    5 s", "")
         .replace("record   intent, decision, state, authorization, effect", "")
     )
     found = compiled("missions/short.rts", {"lib:skills/hover.rts": text})

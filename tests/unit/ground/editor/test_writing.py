@@ -20,6 +20,7 @@ from rtshcua.mavlink import dialect
 FILE = "/w/new.rts"
 HEAD = 'import "lake.rts"\n'
 POLICY = HEAD + "policy p version 1 {\n  "
+VEHICLE = HEAD + "vehicle v {\n  "
 MISSION = HEAD + "mission m under lake@1 on quad {\n  "
 SKILL = HEAD + "skill s(far: length in 1 m .. 5 m, area: zone) {\n  "
 
@@ -36,6 +37,7 @@ def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
         (HEAD, ["zone", "policy", "mission", "import", "test", "nominal"], ["pond", "permit", "and"]),
         (HEAD + "zo", ["zone"], ["permit"]),
         (POLICY, ["permit", "forbid", "airspace", "contingency", "without"], ["zone", "pond", "deadline"]),
+        (VEHICLE + "without ", ["gps.fix", "position"], ["pond", "quad", "evidence"]),
         (POLICY + "permit ", ["look", "goto", "any"], ["pond", "quad", "operator"]),
         (POLICY + "permit look, ho", ["hover", "goto"], ["pond"]),
         (POLICY + "permit look by ", ["role", "any"], ["look"]),

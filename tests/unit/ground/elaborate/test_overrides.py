@@ -113,7 +113,7 @@ def test_a_clause_says_where_it_stands_among_the_policys_files_and_then_the_miss
         ("{ deadline 5001 ms }", ["E0617"]),
         ("{ valid for 41 min }", ["E0617"]),
         ("{ lasts at most 36 s }", ["E0617"]),
-        ("{ grace 1001 ms }", ["E0617"]),
+        ("{ grace 5001 ms }", ["E0617"]),
         ("{ energy at most 3.99 % }", ["E0617"]),
         ("{ energy at most 4 % }", []),
         ("{ energy at most 101 % }", ["E0614"]),

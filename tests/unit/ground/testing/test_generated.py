@@ -75,7 +75,7 @@ def test_it_says_that_it_records_what_is_so_now(small: Generated) -> None:
 
 def test_there_are_limits_of_every_kind_of_clause(small: Generated) -> None:
     roles = {each.part.role for each in small.limits}
-    assert roles == {"permit", "forbid", "confirm", "degrade", "require", "airspace", "energy"}
+    assert roles == {"permit", "forbid", "confirm", "degrade", "require", "assume", "airspace", "energy"}
     assert any("delegate rise" in each.part.text for each in small.limits)
 
 

@@ -73,6 +73,7 @@ def test_what_is_not_reached_is_named_and_nothing_else(arms: Generated) -> None:
         ("energy", "the charge that is needed"),  # `require` asks for more
         ("airspace", "the ceiling of `city`"),  # forbidden before that is looked at, as is the next
         ("maintain", "`height`"),
+        ("assume", "`speed`"),  # the room for it is there in every scene: its limit is that of `obstacle.distance`
     }
     assert {each.role for each in arms.unreached if each.turned} >= {"energy"}
 

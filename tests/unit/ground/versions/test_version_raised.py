@@ -172,6 +172,21 @@ def test_what_differs(before: LoweredPolicy, old: str, new: str, words: str) -> 
     assert found.startswith(words)
 
 
+def test_a_sensor_that_is_missing_now_is_told_first_and_as_looser(before: LoweredPolicy) -> None:
+    """And one that is there again as what it is."""
+    fitted = changed({"require battery > 30 %": "require battery > 30 % assume wind.speed < 9 m/s where fitted"})
+    old = lowered(fitted).policy
+    new = lowered(
+        fitted.replace("clock utc", "without wind.speed clock utc").replace("top <= 20 m", "top <= 21 m")
+    ).policy
+    assert new.vehicle.without == ("wind.speed",)
+    assert [clause.text for clause in new.left_out] == ["wind.speed < 9 m/s"]
+    first, *rest = differences(old, new)
+    assert first.startswith("looser: the vehicle is now without the signal `wind.speed`")
+    assert [told.partition(" `")[0] for told in rest] == ["the rule", "the skill", "the signal"]
+    assert differences(new, old)[0] == "the vehicle is no longer without the signal `wind.speed`"
+
+
 def test_a_zone_that_lies_elsewhere_in_the_list_is_not_another(before: LoweredPolicy) -> None:
     """Sets and tables have more members then; what they say of the zones that were there is the same."""
     inside = "zone shed = circle(47.39780 N, 8.54500 E, 5 m)\nzone field"

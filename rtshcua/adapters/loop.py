@@ -42,6 +42,10 @@ class Stepped(Protocol):
         """What to do at `now` after these events."""
         ...
 
+    def prepare(self, now: Now) -> None:
+        """Nothing else is to be done: what the next step may need may be looked at ahead."""
+        ...
+
 
 Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
 
@@ -91,6 +95,7 @@ class Loop:
         actions = self._runtime.step(now, events)
         ending = self._act(actions)
         self._watch(now, events, actions)
+        self._runtime.prepare(now)
         return ending
 
     def _tend(self) -> None:

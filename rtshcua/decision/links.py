@@ -83,6 +83,18 @@ def _chosen(
 
 def admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: bool, phase: int) -> Truth:
     """Whether a link may fly, over a set of situations."""
+    seen = policy.latest.seen
+    if not exact or seen is None or seen.sets is not sets:
+        return _admissible(link, sets, policy, exact, phase)
+    for known, its_phase, truth in seen.links:
+        if known is link and its_phase == phase:
+            return truth
+    truth = _admissible(link, sets, policy, exact, phase)
+    seen.links.append((link, phase, truth))
+    return truth
+
+
+def _admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: bool, phase: int) -> Truth:
     at = environment(sets, policy, link.arguments, phase)
     truth = TRUE
     for _, condition in link.require:

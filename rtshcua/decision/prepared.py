@@ -8,12 +8,14 @@ from rtshcua.decision.energy import Energy
 from rtshcua.decision.evaluate import Condition, Tables
 from rtshcua.decision.link import Guards, PreparedLink
 from rtshcua.decision.rules import Candidates, RuleIndex
-from rtshcua.decision.values import Value
+from rtshcua.decision.truth import Truth
+from rtshcua.decision.values import Sets, Value
 from rtshcua.decision.volume import Planner
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.contract import Parameter
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Airspace, Policy
+from rtshcua.model.flat.situation import Now, State
 
 
 class PreparedAirspace(NamedTuple):
@@ -39,9 +41,30 @@ class PreparedMonitor(NamedTuple):
     condition: Condition
 
 
+class Seen(NamedTuple):
+    """A single situation, as sets of values, and which links were found to be admissible in it, by their phase."""
+
+    state: State
+    now: Now
+    sets: Sets
+    links: list[tuple[PreparedLink, int, Truth]]
+
+
+class Latest:
+    """The last single situation that was asked about: in the same one, the answers are the same."""
+
+    __slots__ = ("seen",)
+
+    def __init__(self) -> None:
+        self.seen: Seen | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedPolicy:
-    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `monitors` are in order."""
+    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `monitors` are in order.
+
+    `latest` is remembered to be quick: no answer depends on it.
+    """
 
     policy: Policy
     compiler: Compiler
@@ -52,6 +75,7 @@ class PreparedPolicy:
     contingency: tuple[PreparedLink, ...]
     still: Planner  # plans to stay: the present place with its error
     monitors: tuple[PreparedMonitor, ...]
+    latest: Latest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

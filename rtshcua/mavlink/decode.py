@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.mavlink.framing import HEADER, checksum
+from rtshcua.mavlink.framing import HEADER, checks
 
 Message = Any
 """An instance of a generated `MAVLink_..._message` class; pymavlink ships no types."""
@@ -50,7 +50,7 @@ def kind_of(number: int) -> Kind | None:
 def decode(frame: bytes, kind: Kind) -> Message | None:
     """The message in a whole frame, signed or not; None if its checksum is wrong."""
     end = HEADER + frame[1]
-    if checksum(frame[1:end] + kind.extra) != frame[end] | frame[end + 1] << 8:
+    if not checks(frame[1:end] + kind.extra, frame[end], frame[end + 1]):
         return None
     fields = kind.fields
     if frame[1] >= fields.size:  # what is longer than we know comes of a newer dialect

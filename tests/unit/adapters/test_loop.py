@@ -82,6 +82,9 @@ class World:
         self.events = list(events)
         return self.script.pop(0) if self.script else []
 
+    def prepare(self, now: Now) -> None:
+        pass
+
 
 def test_actions_are_carried_out_in_their_order() -> None:
     actions = [Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True), Append(b"2", WRITTEN), Show("k", "t"), Release()]

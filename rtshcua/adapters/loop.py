@@ -26,6 +26,7 @@ from rtshcua.onboard.ports import (
     Failed,
     Noted,
     Release,
+    Show,
     Vehicle,
 )
 
@@ -35,11 +36,19 @@ WAIT_US = 50_000
 HELD_WAIT_US = 300
 
 
+#: what is recorded and shown, and does nothing to the vehicle
+_TOLD = (Append, Show, Announce)
+
+
 class Stepped(Protocol):
     """The runtime, as far as the loop knows it."""
 
     def step(self, now: Now, events: Sequence[Event]) -> Sequence[Action]:
         """What to do at `now` after these events."""
+        ...
+
+    def prepare(self, now: Now) -> None:
+        """Nothing else is to be done: what the next step may need may be looked at ahead."""
         ...
 
 
@@ -58,6 +67,18 @@ class _Held(NamedTuple):
 
     dispatch: Dispatch
     record: _Record
+
+
+def _reflex(actions: Sequence[Action]) -> Dispatch | None:
+    """A command that waits for no record and comes first of all that is done to the vehicle: it is sent before the
+    records are handed to the sink. They are chained already, and nothing that the sink says could keep it back.
+    """
+    for action in actions:
+        if isinstance(action, Dispatch):
+            return None if action.needs_record else action
+        if not isinstance(action, _TOLD):
+            return None
+    return None
 
 
 class Loop:
@@ -89,8 +110,14 @@ class Loop:
         now = self._clock.now()
         events = [*also, *answers, *seen]
         actions = self._runtime.step(now, events)
-        ending = self._act(actions)
+        reflex = _reflex(actions)
+        try:
+            if reflex is not None:
+                self._send(reflex)
+        finally:
+            ending = self._act(actions, reflex)
         self._watch(now, events, actions)
+        self._runtime.prepare(now)
         return ending
 
     def _tend(self) -> None:
@@ -113,7 +140,7 @@ class Loop:
         elif self._clock.now().monotonic_us > held.dispatch.not_after_us:
             self._refuse(held.dispatch, "late")
 
-    def _act(self, actions: Sequence[Action]) -> Ending | None:
+    def _act(self, actions: Sequence[Action], sent: Dispatch | None) -> Ending | None:
         ending: Ending | None = None
         record: _Record | None = _Record(self._lines, BUFFERED)
         for action in actions:
@@ -121,7 +148,8 @@ class Loop:
                 case Append():
                     record = self._append(action, record)
                 case Dispatch():
-                    self._dispatch(action, record)
+                    if action is not sent:
+                        self._dispatch(action, record)
                 case Release():
                     self._held = None
                     self._vehicle.release()

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy, Seen
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.decision.values import MAYBE, MISSING, PRESENT, Sets, Span, Value
 from rtshcua.model.flat.situation import Context, Now, State
@@ -29,6 +29,18 @@ class Case:
 
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     """A set of situations, as conditions read it; `phase` is that of the invocation, -1 where there is none."""
+    seen = policy.latest.seen
+    if seen is None or seen.sets is not sets:
+        return _environment(sets, policy, arguments, phase)
+    for at in seen.environments:
+        if at.arguments is arguments and at.phase == phase:
+            return at
+    at = _environment(sets, policy, arguments, phase)
+    seen.environments.append(at)
+    return at
+
+
+def _environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     values, _, utc, error, monitors = sets
     if len(monitors) != len(policy.monitors):
         monitors = ()
@@ -41,6 +53,15 @@ def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     A state of the wrong size is a fault of whoever made it; nothing of it is believed. The same goes for the truths of
     temporal monitors, where there are too few or too many, or one is no truth.
     """
+    seen = policy.latest.seen
+    if seen is not None and seen.now == now and seen.state == state:
+        return seen.sets
+    sets = _situation(state, policy, now)
+    policy.latest.seen = Seen(state, now, sets, [], [], [])
+    return sets
+
+
+def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     limits = policy.limits
     values: list[Value]
     if len(state.values) == len(state.ages) == len(limits):

@@ -13,7 +13,14 @@ from rtshcua.decision.energy import Energy
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.lasting import longest
 from rtshcua.decision.parameters import misfit
-from rtshcua.decision.prepared import Limit, PreparedAirspace, PreparedInvocation, PreparedMonitor, PreparedPolicy
+from rtshcua.decision.prepared import (
+    Latest,
+    Limit,
+    PreparedAirspace,
+    PreparedInvocation,
+    PreparedMonitor,
+    PreparedPolicy,
+)
 from rtshcua.decision.reads import monitored, slots_read, where
 from rtshcua.decision.rules import RuleIndex
 from rtshcua.decision.values import point
@@ -52,6 +59,7 @@ def prepare(policy: Policy) -> PreparedPolicy | Malformed:
             PreparedMonitor(monitor.kind, monitor.window_us, compiler.monitored(monitor, number))
             for number, monitor in enumerate(policy.monitors)
         ),
+        latest=Latest(),
     )
 
 

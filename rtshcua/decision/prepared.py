@@ -5,15 +5,17 @@ from typing import NamedTuple
 
 from rtshcua.decision.compiler import Compiler
 from rtshcua.decision.energy import Energy
-from rtshcua.decision.evaluate import Condition, Tables
-from rtshcua.decision.link import Guards, PreparedLink
+from rtshcua.decision.evaluate import Condition, Environment, Tables
+from rtshcua.decision.link import Choice, Guards, PreparedLink
 from rtshcua.decision.rules import Candidates, RuleIndex
-from rtshcua.decision.values import Value
+from rtshcua.decision.truth import Truth
+from rtshcua.decision.values import Sets, Value
 from rtshcua.decision.volume import Planner
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.contract import Parameter
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Airspace, Policy
+from rtshcua.model.flat.situation import Now, State
 
 
 class PreparedAirspace(NamedTuple):
@@ -39,9 +41,34 @@ class PreparedMonitor(NamedTuple):
     condition: Condition
 
 
+class Seen(NamedTuple):
+    """A single situation, as sets of values, and as conditions read it, by arguments and phase; and what was found in
+    it: which links may fly, by their phase, and which would be chosen for an invocation, after the link of which index.
+    """
+
+    state: State
+    now: Now
+    sets: Sets
+    environments: list[Environment]
+    links: list[tuple[PreparedLink, int, Truth]]
+    choices: list[tuple["PreparedInvocation", int, Choice | None]]
+
+
+class Latest:
+    """The last single situation that was asked about: in the same one, the answers are the same."""
+
+    __slots__ = ("seen",)
+
+    def __init__(self) -> None:
+        self.seen: Seen | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedPolicy:
-    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `monitors` are in order."""
+    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `monitors` are in order.
+
+    `latest` is remembered to be quick: no answer depends on it.
+    """
 
     policy: Policy
     compiler: Compiler
@@ -52,6 +79,7 @@ class PreparedPolicy:
     contingency: tuple[PreparedLink, ...]
     still: Planner  # plans to stay: the present place with its error
     monitors: tuple[PreparedMonitor, ...]
+    latest: Latest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

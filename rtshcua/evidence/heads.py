@@ -5,7 +5,7 @@ from hashlib import sha256
 
 from msgspec.structs import replace
 
-from rtshcua.evidence.merkle import Tree, leaf_hash
+from rtshcua.evidence.merkle import LEAF, Tree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, sign
 from rtshcua.evidence.records import Close, Record, Signed, encode, unsigned
 
@@ -17,15 +17,15 @@ _TOGETHER = 256  # lines
 class Head:
     """The number of the next record, the hash of the last line, the tree over all lines.
 
-    Of the segment under way: its number `epoch`, its `records` and `octets`, and their digest. Its lines are hashed
-    together, some at a time: that is quicker, and who records something does not wait for it. `after` is the digest of
-    the last checkpoint, which the next one names.
+    Of the segment under way: its number `epoch`, its `first` record, its `records` and `octets`, and their digest. Its
+    lines are hashed together, some at a time: that is quicker, and who records something does not wait for it. `after`
+    is the digest of the last checkpoint, which the next one names.
     """
 
-    __slots__ = ("_first", "_hash", "_lines", "_octets", "_push", "after", "epoch", "prev", "seq", "tree")
+    __slots__ = ("_hash", "_lines", "_octets", "_push", "after", "epoch", "first", "prev", "seq", "tree")
 
     def __init__(self) -> None:
-        self.seq = 0
+        self.seq = self.first = 0
         self.prev = START
         self.tree = Tree()
         self._push = self.tree.push
@@ -34,7 +34,7 @@ class Head:
         self._begin()
 
     def _begin(self) -> None:
-        self._first = self.seq
+        self.first = self.seq
         self._octets = 0  # that are in the hash,
         self._hash = sha256()
         self._lines: list[bytes] = []  # and lines that come after them
@@ -42,7 +42,7 @@ class Head:
     @property
     def records(self) -> int:
         """How many lines the segment has."""
-        return self.seq - self._first
+        return self.seq - self.first
 
     @property
     def octets(self) -> int:
@@ -70,7 +70,9 @@ class Head:
 
     def take(self, line: bytes) -> None:
         """Stand after this line, an ordinary record."""
-        leaf = leaf_hash(line)
+        hasher = LEAF.copy()  # what `leaf_hash` does
+        hasher.update(line)
+        leaf = hasher.digest()
         self._push(leaf)
         self.prev = leaf.hex()
         self.seq += 1

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.mavlink.framing import HEADER, checksum
+from rtshcua.mavlink.framing import HEADER, checks
 
 Message = Any
 """An instance of a generated `MAVLink_..._message` class; pymavlink ships no types."""
@@ -50,7 +50,7 @@ def kind_of(number: int) -> Kind | None:
 def decode(frame: bytes, kind: Kind) -> Message | None:
     """The message in a whole frame, signed or not; None if its checksum is wrong."""
     end = HEADER + frame[1]
-    if checksum(frame[1:end] + kind.extra) != frame[end] | frame[end + 1] << 8:
+    if not checks(frame[1:end] + kind.extra, frame[end], frame[end + 1]):
         return None
     fields = kind.fields
     if frame[1] >= fields.size:  # what is longer than we know comes of a newer dialect
@@ -70,8 +70,7 @@ def _plain(of: Any) -> Callable[[tuple[Any, ...]], Message]:
 
     def build(values: tuple[Any, ...]) -> Message:
         message = new(of)
-        held = message.__dict__
-        held.update(rest)
+        held = message.__dict__ = rest.copy()
         held.update(zip(names, values, strict=True))
         return message
 
@@ -87,13 +86,17 @@ def _layout(of: Any) -> tuple[tuple[str, int, int], ...]:
 def _arrays(of: Any) -> Callable[[tuple[Any, ...]], Message]:
     """A message with arrays of numbers, without the generated constructor."""
     rest, layout, new = _bare(of), _layout(of), of.__new__
+    single = [(name, start) for name, start, length in layout if length == 1]
+    arrays = tuple((name, start, start + length) for name, start, length in layout if length > 1)
+    names = tuple(name for name, _ in single)
+    pick = tuple(start for _, start in single)
 
     def build(values: tuple[Any, ...]) -> Message:
         message = new(of)
-        held = message.__dict__
-        held.update(rest)
-        for name, start, length in layout:
-            held[name] = list(values[start : start + length]) if length > 1 else values[start]
+        held = message.__dict__ = rest.copy()
+        held.update(zip(names, map(values.__getitem__, pick), strict=True))
+        for name, start, end in arrays:
+            held[name] = list(values[start:end])
         return message
 
     return build

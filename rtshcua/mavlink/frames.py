@@ -1,5 +1,6 @@
 """MAVLink 2 messages to frames and back, over pymavlink's generated messages (never `mavutil`)."""
 
+from binascii import crc_hqx
 from collections.abc import Container
 from typing import NamedTuple, Protocol
 
@@ -7,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from rtshcua.mavlink.decode import Message as Message
 from rtshcua.mavlink.decode import decode, kind_of
-from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, HEADER, MARKER, checksum, frame_length, message_id
+from rtshcua.mavlink.framing import CHECKSUM, FLAG_SIGNED, FLAGS, HEADER, MARKER, MIRROR, SIGNATURE, message_id
 
 # pymavlink lets an environment variable switch the checksum off in its own decoder. Nobody here may use it so.
 ardupilotmega.MAVLINK_IGNORE_CRC = 0
@@ -25,6 +26,9 @@ class Received(NamedTuple):
     """Whether the frame carries a signature. Whether the signature is right is not checked here."""
     frame: bytes
     """The frame as it came, for the raw log."""
+
+
+_received = tuple.__new__  # the constructor that a named tuple is given is a function more
 
 
 class Verifier(Protocol):
@@ -68,7 +72,8 @@ class Codec:
                 payload = payload[:1] + payload[1:].rstrip(b"\0")
             head = bytes((len(payload), 0, 0, sender.seq, sender.srcSystem, sender.srcComponent)) + kind.number
             covered = head + payload
-            frame = b"\xfd" + covered + checksum(covered + kind.extra).to_bytes(2, "little")
+            crc = crc_hqx((covered + kind.extra).translate(MIRROR), 0xFFFF)  # as `framing.checksum`
+            frame = b"\xfd" + covered + bytes((MIRROR[crc >> 8], MIRROR[crc & 0xFF]))
         sender.seq = (sender.seq + 1) % 256
         return frame
 
@@ -104,21 +109,24 @@ class Codec:
 
 
 def _decode(frame: bytes) -> Received | None:
-    kind = kind_of(message_id(frame, 0))
-    if kind is None:
+    kind = kind_of(frame[7] | frame[8] << 8 | frame[9] << 16)
+    message = None if kind is None else decode(frame, kind)
+    if kind is None or message is None:
         return None
-    message = decode(frame, kind)
-    if message is None:
-        return None
-    return Received(message, kind.name, frame[5], frame[6], frame[4], bool(frame[FLAGS] & FLAG_SIGNED), frame)
+    signed = frame[FLAGS] == FLAG_SIGNED
+    return _received(Received, (message, kind.name, frame[5], frame[6], frame[4], signed, frame))
 
 
 def _frame_end(datagram: bytes, start: int) -> int:
     """Where the frame that begins at `start` ends; 0 if no whole frame that can be understood begins there."""
-    if datagram[start] != MARKER or len(datagram) < start + HEADER or datagram[start + 2] & ~FLAG_SIGNED:
+    octets = len(datagram)
+    if datagram[start] != MARKER or octets < start + HEADER:
         return 0
-    end = start + frame_length(datagram, start)
-    return end if end <= len(datagram) else 0
+    flags = datagram[start + FLAGS]
+    if flags & ~FLAG_SIGNED:
+        return 0
+    end = start + HEADER + datagram[start + 1] + CHECKSUM + (SIGNATURE if flags else 0)
+    return end if end <= octets else 0
 
 
 def _at_boundary(datagram: bytes, end: int) -> bool:

@@ -27,6 +27,10 @@ class Lateness:
         if durability >= SYNCED:
             self._promised = number
 
+    def kept(self, synced: int) -> bool:
+        """Whether all that was promised came true: then neither `late` nor `stuck` has anything to say."""
+        return self._promised <= synced
+
     def late(self, synced: int, now_s: float) -> str | None:
         """That a line is late, once for each time that the disk falls behind; `synced` lines are on it."""
         if self._told_s or self._waited_s(synced, now_s) <= self._late_s:

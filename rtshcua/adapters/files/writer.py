@@ -80,14 +80,19 @@ class EvidenceWriter:
 
     def trouble(self) -> str | None:
         """Why lines are not kept, once for each failure of the disk."""
-        try:
-            return self._keeper.troubles.get_nowait()
-        except Empty:
-            return None if self._keeper.failing else self._lateness.stuck(self._keeper.synced, monotonic())
+        keeper = self._keeper
+        if not keeper.troubles.empty():  # nobody else takes from it
+            return keeper.troubles.get_nowait()
+        if keeper.failing or self._lateness.kept(keeper.synced):
+            return None
+        return self._lateness.stuck(keeper.synced, monotonic())
 
     def late(self) -> str | None:
         """That a line was not on the disk in time, once for each time that it falls behind."""
-        return None if self._keeper.failing else self._lateness.late(self._keeper.synced, monotonic())
+        keeper = self._keeper
+        if keeper.failing or self._lateness.kept(keeper.synced):
+            return None
+        return self._lateness.late(keeper.synced, monotonic())
 
     def settle(self) -> None:
         """Waits until all that was given is on the disk. Raises OSError when it is not, or not in time."""

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.mavlink.frames import Received
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.onboard.ports import Command, Event
 
@@ -22,7 +21,8 @@ class UdpVehicle:
     """Listens where the vehicle sends to (`udpin`), and answers the first sender that proves to be a vehicle.
 
     Datagrams of other senders are read from then on only to learn whether there is a second vehicle. `keep` gets every
-    good frame that came from the vehicle, and every one that was sent, with its UTC time in us.
+    good frame that came from the vehicle, and every one that was sent, with its UTC time in us: when the next poll
+    begins, or at the end, for nothing that is sent is to wait for it.
     Raises OSError where the address cannot be bound.
     """
 
@@ -34,6 +34,8 @@ class UdpVehicle:
         self._keep = keep
         self._peer: tuple[str, int] | None = None
         self._pending: list[Event] = []
+        self._buffer = memoryview(bytearray(_LARGEST))
+        self._unkept: list[tuple[int, bytes]] = []
         self._slice_us = max(_SLICE_US, clock.us_in(_SLICE_S))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -55,13 +57,20 @@ class UdpVehicle:
         return self._driver
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
-        """Wait at most `timeout_us` of the clock for frames; gives what happened."""
+        """Wait at most `timeout_us` of the clock for frames; gives what happened.
+
+        What waits is taken in together. What has to be waited for is acted on as it comes, one datagram at a time.
+        """
+        self._keep_all()
         events, frames = self._driver.tick(now_us)
         self._send(frames)
         events, self._pending = [*self._pending, *events], []
         wait = 0.0 if events else max(0.0, self._clock.real_seconds(timeout_us))
-        if select.select([self._socket], [], [], wait)[0]:
+        links = [self._socket]
+        if select.select(links, [], [], 0)[0]:
             self._drain(now_us + self._slice_us, events)
+        elif wait and select.select(links, [], [], wait)[0]:
+            self._take(events)
         return events
 
     def begin(self, command: Command, now_us: int) -> None:
@@ -80,46 +89,56 @@ class UdpVehicle:
 
     def close(self) -> None:
         """Give the port back."""
+        self._keep_all()
         self._socket.close()
 
     def _drain(self, until_us: int, events: list[Event]) -> None:
         for _ in range(_BATCH):
-            try:
-                datagram, sender = self._socket.recvfrom(_LARGEST)
-            except BlockingIOError:
-                return
-            except ConnectionError:  # an ICMP answer to something we sent: the peer is not there (yet)
-                continue
-            now = self._clock.now()
-            if self._peer is not None and sender != self._peer:
-                self._driver.overhear(datagram, now.monotonic_us)
-                if now.monotonic_us > until_us:
-                    return
-                continue
-            heard = self._driver.receive(datagram, now.monotonic_us)
-            if self._peer is None:
-                if self._driver.flavour is None:
-                    continue
-                self._peer = sender
-            for frame in heard.frames:
-                self._keep(now.utc_us, unsigned(frame.frame))
-                self._follow(frame)
-            self._send(heard.answers)
-            events += heard.events
-            if now.monotonic_us > until_us:
+            taken_us = self._take(events)
+            if taken_us is None or taken_us > until_us:
                 return
 
-    def _follow(self, frame: Received) -> None:
-        if frame.name == "GLOBAL_POSITION_INT":
-            self._clock.heard(frame.message.time_boot_ms * 1_000)
+    def _take(self, events: list[Event]) -> int | None:
+        """Take in a datagram that waits, and give the time; None if there is none."""
+        try:
+            octets, sender = self._socket.recvfrom_into(self._buffer)
+        except BlockingIOError:
+            return None
+        except ConnectionError:  # an ICMP answer to something we sent: the peer is not there (yet)
+            return 0
+        datagram = bytes(self._buffer[:octets])
+        now = self._clock.now()
+        now_us = now.monotonic_us
+        if self._peer is not None and sender != self._peer:
+            self._driver.overhear(datagram, now_us)
+            return now_us
+        heard = self._driver.receive(datagram, now_us)
+        if self._peer is None:
+            if self._driver.flavour is None:
+                return now_us
+            self._peer = sender
+        for frame in heard.frames:
+            self._unkept.append((now.utc_us, frame.frame))
+            if frame.name == "GLOBAL_POSITION_INT":
+                self._clock.heard(frame.message.time_boot_ms * 1_000)
+        if heard.answers:
+            self._send(heard.answers)
+        events += heard.events
+        return now_us
 
     def _send(self, frames: Sequence[bytes]) -> None:
         if self._peer is None or not frames:
             return
-        utc_us = self._clock.now().utc_us
         for frame in frames:
-            self._keep(utc_us, unsigned(frame))
             try:
                 self._socket.sendto(frame, self._peer)
             except OSError:
                 continue  # lost, as any datagram may be: what matters is sent again, and only effects count
+        utc_us = self._clock.now().utc_us
+        self._unkept += [(utc_us, frame) for frame in frames]
+
+    def _keep_all(self) -> None:
+        """Hand over what came and left since the last call, in its order."""
+        unkept, self._unkept = self._unkept, []
+        for utc_us, frame in unkept:
+            self._keep(utc_us, unsigned(frame))

@@ -3,6 +3,7 @@ policy's temporal monitors say of it.
 """
 
 from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.reads import where
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.truth import UNKNOWN
 from rtshcua.model.flat.limits import MAX_VALUE
@@ -20,6 +21,8 @@ class StateMonitor:
 
     def __init__(self, policy: PreparedPolicy) -> None:
         self._policy = policy
+        self._where = frozenset(where(policy.policy.vehicle))
+        self.moved = False  # position or height changed; who has looked at it may say so
         self._values: list[int | None] = [None] * policy.policy.slots
         self._stamps: list[int | None] = [None] * policy.policy.slots
         self._held: tuple[int | None, ...] | None = None  # the values, while none of them changes
@@ -38,6 +41,8 @@ class StateMonitor:
             if stamp is not None and readings.at_us < stamp:
                 continue
             self._stamps[slot] = readings.at_us
+            if slot in self._where and value != self._values[slot]:
+                self.moved = True
             self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
             self._unseen.add(slot)
 

@@ -59,6 +59,13 @@ class Runtime:
             self._journal.seal_when_idle(now)
         return self._journal.take()
 
+    def prepare(self, now: Now) -> None:
+        """To be called after `step` when nothing else is to be done: what the next one may need is looked at ahead.
+
+        Nothing that is decided, recorded or sent depends on it.
+        """
+        self._conduct.prepare(now)
+
     def leave(self) -> None:
         """Nobody will watch any more: the next step sends the last link, unless a return or a landing flies."""
         self._conduct.leave()

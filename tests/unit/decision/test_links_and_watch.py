@@ -147,9 +147,9 @@ DEGRADE_TEXT, AIRSPACE_TEXT = flat.RULES[6].text, "airspace inside city outside 
         ({POSITION_X: 88 * M + 1}, []),  # where it is, not where it may go
         ({POSITION_X: 600 * M}, [("position inside grow(area, 15 m)", FALSE), (AIRSPACE_TEXT, FALSE)]),
         ({BATTERY: 2_000}, [(DEGRADE_TEXT, FALSE)]),
-        ({BATTERY: 1_086}, [(WAY_HOME, FALSE), (DEGRADE_TEXT, FALSE)]),  # 111.8 m are 86.3 of 10000, beside 1000
+        ({BATTERY: 1_086}, [(DEGRADE_TEXT, FALSE), (WAY_HOME, FALSE)]),  # 111.8 m are 86.3 of 10000, beside 1000
         ({BATTERY: 1_087}, [(DEGRADE_TEXT, FALSE)]),
-        ({BATTERY: None}, [(WAY_HOME, UNKNOWN), (DEGRADE_TEXT, UNKNOWN)]),
+        ({BATTERY: None}, [(DEGRADE_TEXT, UNKNOWN), (WAY_HOME, UNKNOWN)]),
         (
             {POSITION_X: None, HEIGHT: 26 * M},  # too high, wherever it is
             [(NEAR, UNKNOWN), (LOW, FALSE), (AIRSPACE_TEXT, UNKNOWN), (WAY_HOME, UNKNOWN)],

@@ -137,7 +137,7 @@ def test_the_same_volume_at_two_times() -> None:
     step = ready(STEP, policy)
     state, later = flat.state(), replace(flat.NOW, utc_us=UTC + 2 * H)
     for _ in range(2):
-        assert watch(step, state, policy, flat.NOW) == ()
+        assert tuple(watch(step, state, policy, flat.NOW)) == ()
         assert [one.truth for one in watch(step, state, policy, later)] == [F]
         assert [one.truth for one in holding(step, state, policy, later)] == [F]
     outcomes = [ask(policy=policy, now=now).reason for now in (flat.NOW, later, flat.NOW)]

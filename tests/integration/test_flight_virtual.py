@@ -149,8 +149,17 @@ def test_a_vehicle_that_stays_silent_is_lost(flavour: str) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_poor_and_slow_link_is_survived(flavour: str) -> None:
-    for fault in ("link-loss,at=20s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-loss,at=50s,for=3s"):
+    for fault in ("link-loss,at=20s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-loss,at=50s,for=700ms"):
         assert fly("standard", flavour, fault).ending is Ending.COMPLETED
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_lost_fix_stops_it_and_one_that_is_back_brings_it_home(flavour: str) -> None:
+    """While the autopilot still vouches for the position nothing lands it on the spot."""
+    flown = fly("standard", flavour, "gps-loss,at=50s,for=3s")
+    assert flown.ending is Ending.ABORTED
+    assert [record["detail"].partition(":")[0] for record in flown.effects("violated")] == ["gps.fix >= fix_3d"]
+    assert flown.dispatched()[-2:] == ["hover", "return_home"]
 
 
 @pytest.mark.parametrize("level", ["20%", "6%"])

@@ -53,8 +53,8 @@ _FASTEST_WAIT_S = 0.002
 
 _LANDING = "interrupted: it falls back and lands first, and the log is closed then"
 _SILENT = (
-    "interrupted: the vehicle is silent; it falls back as soon as it is heard again, and is given up if it stays silent. "
-    "Ctrl-C twice more within 3 s leaves it"
+    "interrupted: the vehicle is silent; it falls back as soon as it is heard again, and is given up if it stays "
+    "silent. Ctrl-C twice more within 3 s leaves it"
 )
 _CRASHED = (
     "CRASHED: the vehicle came down as no landing does; nothing more is sent. Keep away from its rotors and battery"

@@ -3,6 +3,8 @@
 It obeys position targets in GUIDED only, and ignores them silently elsewhere; takeoff takes a height above home.
 """
 
+from collections.abc import Callable
+
 from rtshcua.adapters.ardupilot import modes
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.datum import relative_m
@@ -51,12 +53,23 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                 Stage(None, None, climbed(command.altitude), _GUIDED, powered=True, progress=rises),
             ]
         case MotionKind.FLY | MotionKind.COVER:
-            way = [_guided(system)]
-            if command.speed:
-                speed = messages.command(system, messages.CHANGE_SPEED, 1, command.speed / 1_000, -1)
-                way.append(Stage(speed, messages.CHANGE_SPEED, None, _GUIDED, _SPEED_US, powered=True))
-            points = zip(command.geo[::2], command.geo[1::2], strict=True)
-            return way + [_leg(system, *point, command.altitude, seen.home_amsl) for point in points]
+            points = list(zip(command.geo[::2], command.geo[1::2], strict=True))
+            legs = [_leg(system, *point, command.altitude, seen.home_amsl) for point in points]
+            if not command.speed or not legs:
+                return [_guided(system), *legs]
+            # A speed that is set before the first target in GUIDED is forgotten (recorded): it goes out behind it.
+            speed = messages.command(system, messages.CHANGE_SPEED, 1, command.speed / 1_000, -1)
+            first, *others = legs
+            return [
+                _guided(system),
+                Stage(
+                    first.message, None, _sets_off(first), _GUIDED, repeat_us=_REPEAT_US, powered=True,
+                    target=first.target, progress=first.progress,
+                ),
+                Stage(speed, messages.CHANGE_SPEED, None, _GUIDED, _SPEED_US, powered=True),
+                Stage(None, None, first.done, _GUIDED, powered=True, progress=first.progress),
+                *others,
+            ]  # fmt: skip
         case MotionKind.HOME:
             return _down(system, modes.RETURN, Expected(homeward, _RETURNS_US))
         case MotionKind.LAND:
@@ -81,6 +94,17 @@ def _leg(system: int, latitude: int, longitude: int, altitude: int, home_amsl: i
         target=Target(latitude, longitude, None if home_amsl is None else home_amsl + altitude),
         progress=Expected(to_place(latitude, longitude, altitude), _FLIES_US),
     )
+
+
+def _sets_off(leg: Stage) -> Callable[[Observed], bool]:
+    """The autopilot says that it flies to the leg's target; one that says nothing of it is seen to move."""
+
+    def done(seen: Observed) -> bool:
+        if seen.target is None or leg.target is None:
+            return seen.speed is not None and not still(seen)
+        return leg.target.matches(seen.target)
+
+    return lambda seen: done(seen) or (leg.done is not None and leg.done(seen))
 
 
 def _guided(system: int) -> Stage:

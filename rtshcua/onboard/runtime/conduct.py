@@ -67,7 +67,7 @@ class Conduct:
         current = self.queue.current
         if self.stage is Stage.RUNNING and current is not None and self.monitor.moved:
             self.monitor.moved = False
-            self._fallback.prepare(now, self.monitor.state(now.monotonic_us), current.step)
+            self.fallback.prepare(now, self.monitor.state(now.monotonic_us), current.step)
 
     # -------------------------------------------------------- what ends a run, or turns it homeward
 

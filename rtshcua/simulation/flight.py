@@ -38,6 +38,7 @@ class Flight(ABC):
         self.crashed = False
         self.touched_m_s = 0.0  # how fast it last came down on the ground
         self._activity = Activity.REST
+        self._error = (0.0, 0.0)  # how far its estimate is off
         self._speed: float | None = None
         self._waiting_s = 0.0
         self._nose: float | None = None
@@ -84,6 +85,7 @@ class Flight(ABC):
         Returns the load on the battery, hovering being 1.
         """
         activity, body = self._activity, self.body
+        self._error = error
         if activity in _DOWN:
             self._stand(dt)
             return battery.IDLE if self.armed else battery.REST
@@ -108,6 +110,10 @@ class Flight(ABC):
     def _touch_down(self) -> None:
         """The ground has come."""
 
+    def _believed(self, north: float, east: float, up: float) -> Point:
+        """A place as it takes it to be: it steers by its estimate, which may be off."""
+        return Point(north + self._error[0], east + self._error[1], up)
+
     def _hold(self, activity: Activity = Activity.TRACK, up: float | None = None) -> None:
         """Stops where it can, at the height `up`, or where it can stop climbing as well."""
         body, agility = self.body, self.handling.agility
@@ -119,8 +125,8 @@ class Flight(ABC):
             # PX4 comes back to the height where it was told to hold (recorded); ArduCopter stops ahead of it.
             ahead = 0.0 if self.handling.comes_back else body.v_up**2 / (2 * agility.climb_acceleration)
             up = body.up + copysign(ahead, body.v_up)
-        self.target = Point(*stop.place(body), up)
-        self.destination = Point(*stop.told_place(body), up)
+        self.target = self._believed(*stop.place(body), up)
+        self.destination = self._believed(*stop.told_place(body), up)
         self.sent = False
         self._activity = activity
         self.landed = Landed.IN_AIR

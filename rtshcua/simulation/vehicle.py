@@ -95,7 +95,7 @@ class Vehicle(Flight):
             self._hold(Activity.CLIMB, up)
             self.landed = Landed.TAKEOFF
         else:
-            self._lift(Point(self.body.north, self.body.east, up))
+            self._lift(self._believed(self.body.north, self.body.east, up))
         self.sent = False
 
     def _lift(self, target: Point) -> None:
@@ -140,7 +140,7 @@ class Vehicle(Flight):
             body = self.body
             self._hold(Activity.RETURN_CLIMB, max(body.up, self.handling.return_up))
             if self.handling.comes_back:
-                self.target = self.destination = Point(body.north, body.east, self.target.up)
+                self.target = self.destination = self._believed(body.north, body.east, self.target.up)
                 self._steer_to_target()
 
     def wait(self, seconds: float) -> None:

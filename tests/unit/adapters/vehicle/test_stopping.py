@@ -1,0 +1,206 @@
+"""A stop stops from every state in which it may be commanded, and one that does not is told.
+
+What stops each autopilot, from which speed and over which distance, is measured (vehicles.md 5); `did-not-stop` is told
+by the ground speed alone, never by an acknowledgement or a mode.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.vehicle.effects import STILL
+from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.progress import LAG_US, Brakes, Expected, Progress, Stop
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Crashed, Failed, Ready, Succeeded, TakenOver
+from rtshcua.simulation.faults import Kill, Pillar
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.vehicle import Vehicle
+from virtual.policy import POLICY
+
+Make = Callable[..., Any]
+S = 1_000_000
+FAR = (300_000, 0)
+
+
+def stops(one: Any, seconds: float = 9) -> None:
+    """It comes to stand, by what is really so."""
+    begun = one.now_us
+    one.begin(MotionKind.HOLD, hold_us=2 * S)
+    end = one.until((Succeeded, Failed, TakenOver), seconds)
+    assert isinstance(end, Succeeded), end
+    assert end.at_us - begun < seconds * S
+    assert one.truth.speed_mm_s < STILL
+    assert abs(one.truth.climb_mm_s) < STILL
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.3, 1.0, 4.0, 8.0])
+def test_a_leg_is_stopped_whenever_that_is_asked(flyer: Make, after_s: float) -> None:
+    """PX4 is in Hold already, where DO_SET_MODE to Hold changes nothing (recorded: it flew on for 46 m)."""
+    one = flyer().up()
+    one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
+    one.wait(after_s)
+    stops(one)
+
+
+def test_a_climb_is_stopped(flyer: Make) -> None:
+    one = flyer()
+    one.until(Ready)
+    one.begin(MotionKind.CLIMB, altitude=40_000)
+    one.wait(9)
+    assert one.truth.climb_mm_s > 1_000
+    stops(one)
+
+
+@pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
+def test_a_return_and_a_landing_are_stopped(flyer: Make, kind: MotionKind) -> None:
+    one = flyer().up(40_000)
+    one.fly(MotionKind.FLY, (60_000, 0), altitude=40_000, speed=8_000)
+    one.begin(kind)
+    one.wait(4)
+    stops(one)
+    assert one.truth.mode in (Mode.LOITER, Mode.BRAKE)
+
+
+def test_a_hold_that_does_not_stop_has_failed(flyer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is acknowledged, the mode is right, and the vehicle flies on."""
+    one = flyer().up()
+    one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
+    one.wait(8)
+    monkeypatch.setattr(Vehicle, "hold", lambda self, up=None: None)
+    begun = one.now_us
+    one.begin(MotionKind.HOLD)
+    failed = one.until((Succeeded, Failed, TakenOver), 10)
+    assert (type(failed), failed.reason) == (Failed, "did-not-stop")
+    assert failed.at_us - begun < 8 * S, "it declares no brakes: by the cautious guess"
+
+
+def test_a_hold_that_drifts_away_has_failed(flyer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = flyer().up()
+    one.begin(MotionKind.HOLD)
+    one.wait(4)
+    vehicle = one.vehicle.simulation._autopilot.vehicle
+    monkeypatch.setattr(type(vehicle), "_fly", lambda self, dt, *_: self.body._move(dt, 0.0, 0.0))
+    vehicle.body.v_north = 3.0
+    assert one.until((Succeeded, Failed), 15).reason == "did-not-hold"
+
+
+# ---------------------------------------------------------------- the rule, by hand
+
+BRAKES = Brakes(2_000, 500_000)
+
+
+@pytest.mark.parametrize(
+    ("passed_s", "fastest"),
+    [(0, 10_000), (0.5, 10_000), (2.5, 10_000), (3.5, 8_000), (5.0, 5_000), (7.0, 1_000), (7.5, STILL), (60, STILL)],
+)
+def test_the_fastest_that_it_may_be(passed_s: float, fastest: int) -> None:
+    """10 m/s, 2 m/s^2 after 0.5 s, and 2 s for reports, filters and gusts."""
+    assert BRAKES.fastest(10_000, round(passed_s * S)) == fastest
+
+
+def speeds(stop: Stop, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0) -> float | None:
+    """When a stop from 10 m/s fails, where the speed is `of` the seconds since; None: it does not."""
+    for tick in range(round(until_s * 10)):
+        seen = Observed(up_us=tick * S // 10, speed=of(tick / 10))
+        if stop.has_failed(seen, obeyed=tick / 10 >= obeyed_s):
+            return tick / 10
+    return None
+
+
+def stop_from(speed: int | None) -> Stop:
+    return Stop(BRAKES, Observed(speed=speed))
+
+
+def test_a_vehicle_that_brakes_as_declared_does_not_fail() -> None:
+    assert speeds(stop_from(10_000), lambda s: max(0, round(10_000 - 2_000 * max(0.0, s - 0.5)))) is None
+
+
+def test_measured_stops_do_not_fail() -> None:
+    """PX4 from 4.5 m/s and ArduCopter from 10.1 m/s, evenly to the time at which they were below 0.4 m/s."""
+    assert speeds(stop_from(4_500), lambda s: max(300, round(4_500 - 4_100 * s / 4.6))) is None
+    assert speeds(stop_from(10_100), lambda s: max(300, round(10_100 - 9_700 * s / 4.6))) is None
+
+
+def test_one_that_flies_on_fails_soon() -> None:
+    failed = speeds(stop_from(10_000), lambda s: 10_000)
+    assert failed is not None
+    assert 2.5 < failed < 3.5
+
+
+def test_one_that_slows_down_too_little_fails_later() -> None:
+    failed = speeds(stop_from(10_000), lambda s: max(2_000, round(10_000 - 2_000 * s)))
+    assert failed is not None
+    assert 5 < failed < 8
+
+
+def test_one_that_creeps_on_fails_at_the_end() -> None:
+    failed = speeds(stop_from(10_000), lambda s: 800)
+    assert failed == pytest.approx((BRAKES.stands_us(10_000)) / S, abs=0.2)
+
+
+def test_time_counts_from_when_it_obeyed() -> None:
+    failed = speeds(stop_from(10_000), lambda s: 10_000, obeyed_s=5)
+    assert failed is not None
+    assert 7.5 < failed < 8.5
+
+
+def test_a_speed_that_nobody_knows_has_not_fallen() -> None:
+    assert speeds(stop_from(None), lambda s: None) == pytest.approx((BRAKES.reaction_us + 2 * LAG_US) / S, abs=0.2)
+    assert speeds(stop_from(10_000), lambda s: None) is not None
+
+
+def test_a_vehicle_without_declared_brakes_is_given_a_cautious_guess() -> None:
+    assert POLICY.vehicle.braking == 0
+    assert Brakes.of(POLICY.vehicle) == Brakes(1_000, S)
+
+
+def test_progress_is_a_metre_in_its_time_by_any_part() -> None:
+    left: list[tuple[int, ...] | None] = [None]
+    progress = Progress(Expected(lambda seen: left[0], 8 * S))
+
+    def at(second: float, *parts: int) -> bool:
+        left[0] = parts or None
+        return progress.has_stalled(Observed(up_us=round(second * S)))
+
+    assert not at(0, 50_000, 20_000)
+    assert not at(8, 49_500, 20_000)
+    assert at(8.1, 49_500, 20_000), "half a metre in eight seconds"
+    assert not at(8.2, 49_500, 19_000), "another part fell"
+    assert not at(16.2, 60_000, 19_000)
+    assert at(16.3, 60_000, 19_000)
+    assert not at(16.4), "nothing is known: nothing is held against it"
+    assert not at(60, 60_000, 19_000), "and it counts anew from there"
+    assert at(68.1, 60_000, 19_000)
+
+
+# ---------------------------------------------------------------- crashes
+
+PILLAR = Pillar(0, 0, 100_000, 3_000, 60_000)
+
+
+def test_a_vehicle_that_flies_into_a_pillar_has_crashed(flyer: Make) -> None:
+    """And has not landed: PX4 stays armed and in its mode, ArduCopter disarms; both lie tilted."""
+    one = flyer(faults=(PILLAR,)).up()
+    one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
+    crashed = one.until((Crashed, Succeeded), 60)
+    assert isinstance(crashed, Crashed)
+    assert one.truth.crashed
+    one.wait(20)
+    assert sum(isinstance(event, Crashed) for event in one.events) == 1
+
+
+def test_motors_that_stop_in_the_air_are_a_crash(flyer: Make) -> None:
+    one = flyer().up()
+    one.vehicle.simulation.inject(Kill(0))
+    assert "motors stopped" in one.until(Crashed, 10).how
+
+
+@pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
+def test_a_landing_is_no_crash(flyer: Make, kind: MotionKind) -> None:
+    one = flyer().up()
+    one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000, speed=8_000)
+    assert isinstance(one.fly(kind), Succeeded)
+    one.wait(10)
+    assert not any(isinstance(event, Crashed) for event in one.events)

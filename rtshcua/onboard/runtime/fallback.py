@@ -41,6 +41,7 @@ class Fallback:
     def land(self) -> None:
         """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
         self._chain = Chain(CONTINGENCY_LINK, -1, len(self._loaded.bundle.policy.contingency) - 2)
+        self._holds = True
 
     def hold(self, now: Now, state: State) -> None:
         """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one."""

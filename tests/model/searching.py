@@ -13,18 +13,20 @@ from functools import partial
 from msgspec.structs import replace
 
 from model.small import LIMITS, PROFILES, UNIT, Small
-from model.snapshot import BEGIN_US, Snapshots
+from model.snapshot import BEGIN_US, SERIALS, Snapshots
 from model.watching import Ear, Gate, Watch
 from reference import documents, world
 from reference.flat_case import ISSUED
 from reference.seeds import epoch_seeds
 from reference.world import SESSION_KEY
 from rtshcua.evidence.chain import Recorder
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
+    Crashed,
     Event,
     EvidenceFailed,
     Failed,
@@ -34,10 +36,10 @@ from rtshcua.onboard.ports import (
     Presented,
     Readings,
     Ready,
-    Sent,
     Succeeded,
     TakenOver,
 )
+from rtshcua.onboard.runtime.flight import Stage
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire.keys import Duty
 
@@ -53,9 +55,10 @@ EVENTS: dict[str, Callable[["World"], Event]] = {
     "armed": lambda at: AirState(at.now_us, True, False),
     "in the air": lambda at: AirState(at.now_us, True, True),
     "succeeded": lambda at: Succeeded(at.now_us, at.token),
-    "failed": lambda at: Failed(at.now_us, at.token, "no-effect"),
+    "failed": lambda at: Failed(at.now_us, at.token, "did-not-stop" if at.holds else "no-progress"),
     "late success": lambda at: Succeeded(at.now_us, at.before),
     "taken over": lambda at: TakenOver(at.now_us, "POSCTL"),
+    "crashed": lambda at: Crashed(at.now_us, "on its side"),
     "link lost": lambda at: LinkLost(at.now_us),
     "link back": lambda at: LinkBack(at.now_us),
     "interrupted": lambda at: Interrupted(at.now_us),
@@ -91,21 +94,29 @@ class World:
     now_us: int = BEGIN_US
     token: int = 0  # of the command that was sent last,
     before: int = 0  # and of the one before
-    left: bool = False  # it was left alone: that happens once
+    left: bool = False  # it was left alone, and the program has ended
+    restarted: bool = False  # the program was begun anew: that happens once
+    heard_us: int = BEGIN_US  # when the vehicle reported last
     handed: int = 0  # documents that were handed over: refused ones are counted without end
+
+    @property
+    def holds(self) -> bool:
+        """Whether what flies is to stand still."""
+        return self.watch.command == MotionKind.HOLD
 
     def step(self, event: Event | None) -> None:
         """One call of the runtime, and all that must hold of it."""
         self.ear.heard.clear()
         self.ear.passed.clear()
-        self.watch.before(event)
+        if isinstance(event, Readings):
+            self.heard_us = self.now_us
+        self.watch.before(event, self.now_us, self.heard_us, known=None not in PROFILES[self.profile].values())
         now = Now(self.now_us, START.utc_us + self.now_us - BEGIN_US, START.utc_error_us)
         actions = self.runtime.step(now, () if event is None else (event,))
         flew = self.watch.flying
         self.watch.after(self.of, self.ear, event, actions, self.now_us)
         if self.watch.flying not in (None, flew):
             self.before, self.token = self.token, self.watch.flying or 0
-            self.step(Sent(self.now_us, self.token))
 
 
 class Broken(AssertionError):
@@ -114,11 +125,13 @@ class Broken(AssertionError):
 
 @dataclass
 class Found:
-    """What a search found: the graph, by number of state; `ticks` are the edges along which time passes."""
+    """What a search found: the graph, by number of state. An edge says how many units pass, and in how many of them the
+    vehicle is heard.
+    """
 
     states: int = 0
     transitions: int = 0
-    edges: list[list[tuple[int, int]]] = field(default_factory=list)
+    edges: list[list[tuple[int, int, int]]] = field(default_factory=list)
     falling: list[bool] = field(default_factory=list)
     whole: bool = True
     endings: set[str] = field(default_factory=set)
@@ -153,22 +166,26 @@ class Search:
         waiting: deque[tuple[int, bytes]] = deque()
 
         def number(at: World, parent: int, event: str) -> int:
-            parts: object = at.runtime.ending  # when it is over, how it was is over too
-            if at.runtime.ending is None:
-                parts = (at.runtime, at.of, at.watch, at.profile, at.token, at.before, at.left, at.handed)
-            digest = self._snapshots.canonical(parts, at.now_us)
+            ending = "left" if at.left else at.runtime.ending
+            parts: object = ending  # when it is over, how it was is over too
+            if ending is None:
+                parts = (at.runtime, at.of, at.watch, at.profile, at.heard_us, at.restarted, at.handed)
+            conduct = at.runtime._conduct
+            standing = conduct.dispatcher._standing
+            permit = None if standing is None else standing[1]
+            digest = self._snapshots.canonical(parts, at.now_us, conduct.stage, permit)
             known = numbers.get(digest)
             if known is not None:
                 return known
             new = numbers[digest] = len(parents)
             parents.append((parent, event))
             found.edges.append([])
+            found.falling.append(conduct.stage is Stage.FALLING)
             if at.runtime.ending is not None:
-                found.endings.add(at.runtime.ending.value)
                 _guarded(found, new, "(over)", _over, at)
-            view = at.runtime.view(Now(at.now_us, START.utc_us, START.utc_error_us))
-            found.falling.append(view.stage.value == "falling-back")
-            if at.runtime.ending is None:
+            if ending is not None:
+                found.endings.add(str(ending))
+            else:
                 waiting.append((new, self._snapshots.take(at)))
             return new
 
@@ -182,24 +199,44 @@ class Search:
             state, data = waiting.popleft()
             for name, units, happen in events:
                 at = self._snapshots.restore(data)
+                heard = 0 if at.watch.down else units
                 _guarded(found, state, name, happen, at)
                 found.transitions += 1
-                found.edges[state].append((number(at, state, name), units))
+                target = number(at, state, name)
+                if name != "restarted":  # that is another run
+                    found.edges[state].append((target, units, heard))
         found.states = len(parents)
         return found
 
     def _begin(self, *, resumed: bool) -> World:
-        of = self._snapshots.restore(self._template)
-        of = replace(of, executor=Gate(of.executor, SESSION_KEY, self._ear))
+        of = self._loaded()
         at = World(of, Runtime(of, self._ear, limits=LIMITS, resumed=resumed), self._ear, self._of.profiles[0])
+        at.restarted = at.watch.resumed = resumed
         at.step(_readings(at))
         return at
+
+    def _loaded(self) -> Loaded:
+        of = self._snapshots.restore(self._template)
+        of.boundary._mint._serial = SERIALS
+        return replace(of, executor=Gate(of.executor, SESSION_KEY, self._ear))
+
+    def _restart(self, at: World) -> None:
+        """The program dies, and is begun again: of what was, it knows that a run of this bundle broke off."""
+        if not at.restarted:
+            at.restarted = True
+            at.of = self._loaded()
+            at.runtime = Runtime(at.of, self._ear, limits=LIMITS, resumed=True)
+            at.watch = Watch(resumed=True, airborne=at.watch.airborne, armed=at.watch.armed)
+            at.token = at.before = at.handed = 0
+            at.step(_readings(at))
 
     def _events(self) -> list[tuple[str, int, Callable[[World], None]]]:
         """All that can happen: its name, how many units pass, and how."""
         happen: list[tuple[str, int, Callable[[World], None]]] = []
         for name in self._of.events:
-            if name in PASSING:
+            if name == "restarted":
+                happen.append((name, 0, self._restart))
+            elif name in PASSING:
                 happen.append((name, *PASSING[name]))
             else:
                 happen.append((name, 0, partial(_happens, make=EVENTS[name])))
@@ -252,10 +289,10 @@ def _silence(at: World) -> None:
 
 
 def _leave(at: World) -> None:
-    if not at.left:
-        at.left = True
-        at.runtime.leave()
-        at.step(None)
+    """As the program does it: one step more, then it has ended."""
+    at.left = True
+    at.runtime.leave()
+    at.step(None)
 
 
 #: what is no event of the ports: its name, how many units pass, and how

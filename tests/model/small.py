@@ -10,13 +10,17 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, GOTO, HOME, HOVER, LAND, NOMINAL, TAKEOFF, WIND, M, S
+from rtshcua.decision.checks.vehicle import MAX_SPEED
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind
 from rtshcua.onboard.runtime.flight import Limits
 
 UNIT = S
-LIMITS = Limits(ready_us=UNIT, silent_us=UNIT, retry_us=UNIT, tries=1, again_us=UNIT // 2)
+GRACE = UNIT // 2  # shorter than a skill may last, or it would never be over first
+LIMITS = Limits(
+    ready_us=UNIT, silent_us=UNIT // 2, fresh_us=UNIT, flapping_us=UNIT, retry_us=UNIT, tries=1, again_us=UNIT // 2
+)
 
 GOOD = dict(NOMINAL)
 #: what the vehicle may report: all is well; too windy for a step, not for links; no position; nothing known; no charge
@@ -47,11 +51,17 @@ class Small:
 VEHICLE = ("ready", "on the ground", "in the air", "succeeded", "failed", "time")
 LINK = ("link lost", "link back")
 PEOPLE = ("taken over", "interrupted", "left alone")
+WORST = ("crashed", "restarted")
 REST = ("armed", "late success", "evidence failed", "silence")
 
 
 def policy(
-    contingency: tuple[Link, ...], chain: tuple[Link, ...], *, confirm: bool = False, degrade: bool = False
+    contingency: tuple[Link, ...],
+    chain: tuple[Link, ...],
+    *,
+    confirm: bool = False,
+    degrade: bool = False,
+    after: AfterSilence = AfterSilence.CONTINGENCY,
 ) -> Policy:
     """Permits everything; `chain` stands behind each step that flies, but for a take-off, which lands."""
 
@@ -61,7 +71,7 @@ def policy(
         require = tuple(each for each in of.require if each is flat.FIX_IS_GOOD)
         assume = tuple(each for each in of.assume if each is flat.CALM)
         return replace(
-            of, deadline_us=UNIT, duration_us=duration_us, grace_us=UNIT, fallback=fallback, phases=(),
+            of, deadline_us=UNIT, duration_us=duration_us, grace_us=GRACE, fallback=fallback, phases=(),
             require=require, assume=assume, maintain=(), reads=(WIND,) * len(assume) + (FIX,) * len(require),
         )  # fmt: skip
 
@@ -74,7 +84,8 @@ def policy(
         contracts=tuple(map(contract, flat.CONTRACTS)),
         signals=tuple(replace(each, stale_us=stale_us) for each in flat.POLICY.signals),
         contingency=contingency, rules=tuple(rules), airspace=None,
-        vehicle=replace(flat.POLICY.vehicle, reserve=0),
+        vehicle=replace(flat.POLICY.vehicle, reserve=0, speed=MAX_SPEED, endurance_us=UNIT), silence_us=UNIT // 2,
+        after_silence=after,
     )  # fmt: skip
 
 
@@ -101,34 +112,36 @@ def small(
     name: str, skills: tuple[int, ...], profiles: tuple[str, ...], events: tuple[str, ...], *,
     contingency: tuple[Link, ...] = (HOLD, BACK, DOWN), chain: tuple[Link, ...] = (HOLD, BACK),
     otherwise: OnInadmissible = OnInadmissible.ABORT, confirm: bool = False, degrade: bool = False,
-    documents: tuple[str, ...] = (),
+    documents: tuple[str, ...] = (), after: AfterSilence = AfterSilence.CONTINGENCY,
 ) -> Small:  # fmt: skip
-    made = policy(contingency, chain, confirm=confirm, degrade=degrade)
+    made = policy(contingency, chain, confirm=confirm, degrade=degrade, after=after)
     return Small(name, made, mission(made, skills, otherwise), profiles, events, documents)
 
 
 #: in `make test`
-TINY = small(
-    "tiny", (TAKEOFF, HOME), ("good", "windy"), (*VEHICLE, *PEOPLE), contingency=(BACK, DOWN), chain=(HOLD,)
-)  # fmt: skip
+TINY = small("tiny", (TAKEOFF, GOTO, HOME), ("good", "windy", "no-fix"), (*VEHICLE, *PEOPLE, *WORST))
 
 _STEPS = (TAKEOFF, GOTO, HOME)
 
 
 def _little(name: str, skills: tuple[int, ...], profiles: tuple[str, ...], *events: str, **more: Any) -> Small:
-    return small(name, skills, profiles, (*VEHICLE, *events), contingency=(BACK, DOWN), chain=(HOLD,), **more)
+    return small(name, skills, profiles, (*VEHICLE, *events), **{"contingency": (BACK, DOWN), "chain": (HOLD,)} | more)
 
 
+_HOLDS: Any = {"contingency": (HOLD, BACK, DOWN), "otherwise": OnInadmissible.HOLD}
 #: in `make soak`
 ALL = (
-    small("chain", _STEPS, ("good", "windy", "no-fix"), (*VEHICLE, *PEOPLE)),
-    _little("everything", (TAKEOFF, HOME), ("good",), *PEOPLE, *LINK, *REST),
-    _little("link", (TAKEOFF, HOME), ("good", "windy"), *LINK, "interrupted", "silence"),
-    _little("unknown", _STEPS, ("good", "blind"), "silence"),
-    _little("hold", _STEPS, ("good", "no-fix"), "interrupted", otherwise=OnInadmissible.HOLD),
-    _little("skip", _STEPS, ("good", "no-fix"), "interrupted", otherwise=OnInadmissible.SKIP),
-    _little("degrade", _STEPS, ("good", "low"), "interrupted", degrade=True),
+    small("chain", _STEPS, ("good", "windy", "no-fix"), (*VEHICLE, *PEOPLE, *WORST, *REST)),
+    _little("everything", (TAKEOFF, HOME), ("good",), *PEOPLE, *WORST, *LINK, *REST),
+    _little("link", (TAKEOFF, HOME), ("good", "windy"), *LINK, *WORST, "taken over", "interrupted", "silence"),
+    _little("stop", (TAKEOFF, GOTO), ("good", "no-fix"), *LINK, *WORST, "taken over", "silence", **_HOLDS),
+    _little("goes on", (TAKEOFF, HOME), ("good", "blind"), *LINK, "silence", after=AfterSilence.CONTINUE),
+    _little("unknown", _STEPS, ("good", "blind"), *WORST, "silence"),
+    _little("hold", _STEPS, ("good", "no-fix"), *WORST, "taken over", "interrupted", **_HOLDS),
+    _little("skip", _STEPS, ("good", "no-fix"), *WORST, "interrupted", otherwise=OnInadmissible.SKIP),
+    _little("degrade", _STEPS, ("good", "low"), *WORST, "interrupted", degrade=True),
     _little("recall", (TAKEOFF, HOME), ("good", "windy"), *LINK, documents=("recall",)),
-    _little("approval", (TAKEOFF, GOTO), ("good",), confirm=True, documents=("granted", "refused")),
-    _little("replacement", _STEPS, ("good",), documents=("replaced", "recall")),
+    _little("approval", (TAKEOFF, GOTO), ("good",), *WORST, confirm=True, documents=("granted", "refused")),
+    _little("waiting", (TAKEOFF, GOTO), ("good",), *LINK, "silence", confirm=True, documents=("granted",), **_HOLDS),
+    _little("replacement", _STEPS, ("good",), *WORST, documents=("replaced", "recall")),
 )

@@ -1,16 +1,19 @@
-"""A world as bytes: to go back to it, and to tell whether two are the same but for the time at which they are.
+"""A world as bytes: to go back to it, and to tell whether two are the same but for what nothing reads.
 
-Both follow whatever attributes the real objects have; nothing here knows the names of any. What never changes (policy,
-mission, compiled conditions) is kept by reference. What is only written (evidence, what a display shows) is left out of
-the comparison, times become ages, and ages beyond `OLD` are all alike, because nothing compares them with more.
+Both follow whatever attributes the real objects have. What never changes (policy, mission, compiled conditions) is kept
+by reference. What is only written (evidence, what a display shows), and what is not read before it is set anew, is left
+out of the comparison; times become ages, and ages beyond `OLD` are all alike, because nothing compares them with more;
+serial numbers of permits become what can still be done with them. `docs/model-checking.md` has the reasons.
 """
 
 import io
+import marshal
 import pickle
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
 from enum import Enum
 from hashlib import blake2b
-from types import BuiltinFunctionType, FunctionType
+from types import BuiltinFunctionType, FunctionType, MethodType
 from typing import Any
 
 from msgspec import Struct
@@ -18,19 +21,72 @@ from msgspec import Struct
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.mission import Invocation
-from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.mint import AGAIN, Mint
+from rtshcua.onboard.runtime.admission import Admission
+from rtshcua.onboard.runtime.conduct import Conduct
+from rtshcua.onboard.runtime.craft import Craft
+from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.onboard.runtime.inbox import Inbox
+from rtshcua.onboard.runtime.monitor import StateMonitor
+from rtshcua.onboard.runtime.queue import InvocationQueue
+from rtshcua.onboard.runtime.turns import Turns
 from rtshcua.onboard.runtime.view import Decided
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.permit import SIZE, open_permit
+from rtshcua.wire.trust import TrustRoot
 
 #: where monotonic and UTC time begin, in us: far from every other number, and from each other
 BEGIN_US = 1 << 52
 _REACH = 1 << 40
 _TIMES = 1 << 50
+#: where the serial numbers of permits begin: far from every other number too
+SERIALS = 1 << 46
 
 #: where the classes of what a bundle says are; what is asked and answered (`situation`) is not among them
 _FIXED = ("rtshcua.model.flat.", "rtshcua.wire.bundle", "rtshcua.wire.trust")
 _ONCE = (PreparedInvocation, PreparedPolicy, Recorder, Limits, Enum, type, FunctionType, BuiltinFunctionType)
+#: attributes that decide what is recorded, and how often, and nothing else; the moment of the last request, which is
+#: compared with time that goes back, and with nothing else; and what is kept so that it is not computed twice
+_ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
+    Admission: ("_last", "_repeated", "recent"),
+    Inbox: ("_refused_us", "_unrecorded"),
+    SoftwareBoundary: ("_now_us",),
+    StateMonitor: ("_state", "_held"),
+}
+#: attributes that are read in these stages only, and are set anew whenever a run comes into them
+_READ_IN: dict[tuple[type, str], tuple[Stage, ...]] = {
+    (Conduct, "supervisor"): (Stage.RUNNING,),
+    (Conduct, "patience"): (Stage.DECIDING,),
+    (Conduct, "held"): (Stage.DECIDING,),
+    (Conduct, "fresh"): (Stage.DECIDING,),
+    (Conduct, "asked_us"): (Stage.DECIDING,),
+    (InvocationQueue, "_released_us"): (Stage.DECIDING,),
+    (Craft, "ready"): (Stage.WAITING,),
+    (Turns, "_began_us"): (Stage.WAITING,),
+    (Fallback, "_chain"): (Stage.FALLING,),
+    (Fallback, "_holds"): (Stage.FALLING,),
+}
+
+
+_PLAIN = frozenset((str, bool, type(None)))
+#: what is one and the same all through a search
+_ALWAYS = frozenset((PreparedPolicy, Policy, TrustRoot, Limits))
+
+
+def _unread(stage: Stage) -> dict[type, tuple[str, ...]]:
+    """What is not read in a stage, by class."""
+    unread = dict(_ONLY_WRITTEN)
+    for (kind, name), stages in _READ_IN.items():
+        if stage not in stages:
+            unread[kind] = (*unread.get(kind, ()), name)
+    return unread
+
+
+_UNREAD = {stage: _unread(stage) for stage in Stage}
 
 
 def fixed(kind: type) -> bool:
@@ -45,19 +101,18 @@ class Snapshots:
     """Takes and restores worlds. `unwatched`: types of objects that are shared and not compared."""
 
     def __init__(self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...] = ()) -> None:
-        self._key = key
-        self._utc_us = utc_us
-        self._old_us = old_us
         self._shared: dict[int, Any] = {}
         self._keeps: dict[type, bool] = {}
         self._unwatched = unwatched
-        self._rules: dict[type, Callable[[Any], object] | None] = {}
-        self._values: dict[object, int] = {}
-        self._now_us = 0
+        self._compare = _Comparison(key, utc_us, old_us, unwatched, self._reference)
 
     def take(self, world: object) -> bytes:
         """The world, to be restored as often as wanted."""
-        return _dumps(world, self._reference)
+        buffer = io.BytesIO()
+        pickler = pickle.Pickler(buffer, protocol=5)
+        pickler.persistent_id = self._reference  # type: ignore[method-assign]
+        pickler.dump(world)
+        return buffer.getvalue()
 
     def restore(self, data: bytes) -> Any:
         """A world of its own."""
@@ -65,12 +120,16 @@ class Snapshots:
         unpickler.persistent_load = self._shared.__getitem__  # type: ignore[method-assign]
         return unpickler.load()
 
-    def canonical(self, world: object, now_us: int) -> bytes:
-        """A digest that worlds share which differ only in what nothing reads, and in what time it is."""
-        self._now_us = now_us
-        return blake2b(_dumps(world, self._ageless), digest_size=16).digest()
+    def canonical(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> bytes:
+        """A digest that worlds share which differ only in what nothing reads, and in what time it is.
 
-    # ------------------------------------------------------------------------------------------ by reference
+        `stage` is where the run stands, `standing` the one permit that is kept for later.
+        """
+        return blake2b(marshal.dumps(self.plain(world, now_us, stage, standing), 2), digest_size=16).digest()
+
+    def plain(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> Any:
+        """What is compared, as tuples."""
+        return self._compare.plain(world, now_us, stage, standing)
 
     def _reference(self, thing: Any) -> int | None:
         kind = type(thing)
@@ -82,25 +141,48 @@ class Snapshots:
         self._shared.setdefault(id(thing), thing)
         return id(thing)
 
-    # ------------------------------------------------------------------------------------------ for comparing
 
-    def _ageless(self, thing: Any) -> object:
+Rule = Callable[[Any], Any]
+
+
+class _Comparison:
+    """Makes plain tuples of a world. A rule a class, found once."""
+
+    def __init__(
+        self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...], refer: Callable[[Any], int | None]
+    ) -> None:
+        self._key = key
+        self._utc_us = utc_us
+        self._old_us = old_us
+        self._unwatched = unwatched
+        self._refer = refer
+        self._rules: dict[type, Rule] = {int: self._number, bytes: self._octets}
+        for kind in _PLAIN:
+            self._rules[kind] = _itself
+        self._now_us = 0
+        self._unread: dict[type, tuple[str, ...]] = {}
+        self._stands = range(0)
+        self._seen: dict[int, int] = {}
+
+    def plain(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> Any:
+        self._now_us = now_us
+        self._unread = _UNREAD[stage]
+        permit = None if standing is None else open_permit(standing, self._key)
+        self._stands = range(0)
+        if permit is not None:
+            self._stands = range(permit.serial, permit.serial + 1 + permit.fallbacks + permit.contingencies + AGAIN)
+        self._seen = {}
+        return self._of(world)
+
+    def _of(self, thing: Any) -> Any:
         kind = type(thing)
-        try:
-            if kind is str:  # nearly half of all
-                return self._values[thing]
-            rule = self._rules[kind]
-        except KeyError:
+        rule = self._rules.get(kind)
+        if rule is None:
             rule = self._rules[kind] = self._rule(kind)
-        return None if rule is None else rule(thing)
+        return rule(thing)
 
-    def _rule(self, kind: type) -> Callable[[Any], object] | None:
-        if kind is int:
-            return self._number
-        if kind is bytes:
-            return self._octets
-        if kind is str:
-            return self._alike
+    def _rule(self, kind: type) -> Rule:
+        name = kind.__qualname__
         if issubclass(kind, (Recorder, Decided, *self._unwatched)):
             return lambda thing: "unwatched"
         if issubclass(kind, Bundle):
@@ -109,37 +191,99 @@ class Snapshots:
             return lambda thing: ("invocation", thing.invocation.binding)
         if issubclass(kind, Invocation):
             return lambda thing: ("invocation", thing.binding)
+        if issubclass(kind, (Mint, FrameSession)):
+            return lambda thing: name  # the next serial is one that nobody has seen; no frame is sent in a search
         if issubclass(kind, type):
             return lambda thing: ("type", thing.__qualname__)
         if issubclass(kind, Enum):
-            return lambda thing: ("member", kind.__name__, thing.name)
+            return lambda thing: (name, thing.name)
         if fixed(kind):
-            return lambda thing: ("shared", self._reference(thing))
+            return lambda thing: ("shared", self._refer(thing))
+        if issubclass(kind, (set, frozenset)):
+            return self._members
+        if issubclass(kind, dict):
+            return lambda thing: tuple([(self._of(key), self._of(value)) for key, value in thing.items()])
+        if issubclass(kind, (tuple, list, deque)):
+            return self._row
+        if issubclass(kind, int):
+            return self._number
+        if issubclass(kind, MethodType):
+            return lambda thing: (thing.__name__, self._of(thing.__self__))
+        return self._attributes(kind, name)
+
+    def _attributes(self, kind: type, name: str) -> Rule:
+        if issubclass(kind, Struct):
+            names: tuple[str, ...] = kind.__struct_fields__
+            if kind.__struct_config__.frozen:
+                return lambda thing: (name, *[self._of(getattr(thing, each)) for each in names])
+        elif hasattr(kind, "__slots__"):
+            names = tuple(kind.__slots__)
+        else:
+            return lambda thing: self._once(thing) or (name, *self._named(kind, thing.__dict__.items()))
+        return lambda thing: self._once(thing) or (
+            name, *self._named(kind, [(each, getattr(thing, each)) for each in names])
+        )  # fmt: skip
+
+    def _named(self, kind: type, attributes: Iterable[tuple[str, Any]]) -> list[Any]:
+        unread, rules = self._unread.get(kind, ()), self._rules
+        found: list[Any] = []
+        for name, value in attributes:
+            if name in unread:
+                continue
+            of = type(value)
+            if of in _PLAIN:
+                found.append((name, value))
+            elif of not in _ALWAYS:
+                rule = rules.get(of)
+                found.append((name, rule(value) if rule is not None else self._of(value)))
+        return found
+
+    def _once(self, thing: Any) -> tuple[str, int] | None:
+        """An object that may change is described where it is met first."""
+        seen = self._seen
+        number = seen.get(id(thing))
+        if number is not None:
+            return "seen", number
+        seen[id(thing)] = len(seen)
         return None
 
-    def _alike(self, value: object) -> int:
-        """Equal texts are one, whether or not they are one object."""
-        return self._values.setdefault(value, len(self._values))
+    def _row(self, thing: Any) -> Any:
+        rules = self._rules
+        return tuple([rules[type(each)](each) if type(each) in rules else self._of(each) for each in thing])
 
-    def _number(self, number: int) -> object:
+    def _members(self, thing: Any) -> Any:
+        """A set; of serials, those that can still be asked for."""
+        stands = self._stands
+        return tuple(sorted([self._of(each) for each in thing if not _is_serial(each) or each in stands]))
+
+    def _number(self, number: int) -> Any:
+        if number < SERIALS:
+            return number
         if number < _TIMES:
-            return None
+            return self._serial(number) if _is_serial(number) else number
         for zero_us, now_us in ((BEGIN_US, self._now_us), (self._utc_us, self._utc_us + self._now_us - BEGIN_US)):
             if abs(number - zero_us) < _REACH:
                 return "t", min(max(now_us - number, -self._old_us), self._old_us)
-        return None
+        return number
 
-    def _octets(self, octets: bytes) -> object:
+    def _serial(self, number: int) -> Any:
+        """A serial by its place behind the standing permit; older ones are told apart by what holds them."""
+        if number in self._stands:
+            return "s", number - self._stands.start
+        return ("s", "newer") if number > self._stands.start else ("s", "older")
+
+    def _octets(self, octets: bytes) -> Any:
         permit = open_permit(octets, self._key) if len(octets) == SIZE else None
         if permit is None:
-            return self._alike(octets)
-        late = self._number(permit.not_after_us)
-        return "p", permit.kind, permit.step, permit.link, permit.serial, permit.fallbacks, permit.contingencies, late
+            return octets
+        # It is kept for what it stands for, and until when it was good for its own step does not count any more.
+        serial = self._number(permit.serial)
+        return "p", permit.kind, permit.step, permit.link, serial, permit.fallbacks, permit.contingencies
 
 
-def _dumps(world: object, persistent: Callable[[Any], object]) -> bytes:
-    buffer = io.BytesIO()
-    pickler = pickle.Pickler(buffer, protocol=5)
-    pickler.persistent_id = persistent  # type: ignore[method-assign]
-    pickler.dump(world)
-    return buffer.getvalue()
+def _itself(thing: Any) -> Any:
+    return thing
+
+
+def _is_serial(number: Any) -> bool:
+    return type(number) is int and SERIALS <= number < SERIALS + _REACH

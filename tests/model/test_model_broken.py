@@ -8,20 +8,32 @@ import pytest
 from msgspec.structs import replace
 
 from model.graph import longest
-from model.searching import Broken, Search
-from model.small import LINK, TINY, VEHICLE, Small
+from model.searching import Broken, Found, Search
+from model.small import BACK, DOWN, HOLD, LINK, VEHICLE, WORST, Small, small
+from reference.flat_case import GOTO, HOME, TAKEOFF
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
 from rtshcua.onboard.runtime.fallback import Fallback, Progress
-from rtshcua.onboard.runtime.supervisor import Supervisor
+from rtshcua.onboard.runtime.happenings import Happenings
+from rtshcua.onboard.runtime.link import Link
+from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
+
+LITTLE = small("little", (TAKEOFF, HOME), ("good",), VEHICLE, contingency=(BACK, DOWN), chain=(HOLD,))
+#: it holds in the air for an approval that does not come
+HOLDING = small("holding", (TAKEOFF, GOTO), ("good",), VEHICLE, confirm=True)
 
 
 def with_events(*events: str) -> Small:
-    """The tiny run in good weather, where the vehicle does what it likes and besides these happen."""
-    return with_fields(TINY, profiles=("good",), events=(*VEHICLE, *events))
+    """A small run in good weather, where the vehicle does what it likes and besides these happen."""
+    return with_fields(LITTLE, events=(*VEHICLE, *events))
+
+
+def endless(found: Found) -> bool:
+    """Whether time may pass for ever."""
+    return bool(longest([[(target, units) for target, units, _ in edges] for edges in found.edges])[1])
 
 
 # ------------------------------------------------------------------------------------------- what must never be
@@ -83,7 +95,7 @@ NEVER: dict[str, tuple[type, str, Callable[[Any], Any], str, str]] = {
     "past the executor": (Dispatcher, "_send", past_the_executor, "sent past the executor", "interrupted"),
     "ended in the air": (Conduct, "break_off", ended_in_the_air, "it ended", "interrupted"),
     "a landing ends nothing": (Conduct, "down", nothing_ends, "it ended in the air", "interrupted"),
-    "without release": (Dispatcher, "release", without_release, "it ended", "taken over"),
+    "without release": (Dispatcher, "release", without_release, "it went on after", "taken over"),
 }
 
 
@@ -93,6 +105,53 @@ def test_what_must_never_be_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
     with pytest.raises(Broken, match=words):
         Search(with_events(event)).run()
+
+
+def goes_on(of: Any) -> Any:
+    """A takeover and a crash are recorded, and nothing follows."""
+    return lambda self, now, event: None
+
+
+def judges_at_once(of: Any) -> Any:
+    """When the link is back, what is known is judged as it is."""
+    return lambda self, now_us: False
+
+
+def grace_runs(of: Any) -> Any:
+    """The time in which nothing was judged counts as if something had been."""
+    return lambda self, us: None
+
+
+def flies_on(of: Any) -> Any:
+    """A hold that failed is recorded, and nothing follows."""
+
+    def fall_back(self: Any, kind: int, cause: Any = None, *, holds: bool = True) -> None:
+        if holds:
+            of(self, kind, *([] if cause is None else [cause]))
+
+    return fall_back
+
+
+AFTER: dict[str, tuple[type, str, Callable[[Any], Any], str, Small]] = {
+    "it goes on after a takeover": (Happenings, "_ended", goes_on, "it went on", with_events("taken over")),
+    "it goes on after a crash": (Happenings, "_ended", goes_on, "it went on", with_events(*WORST)),
+    "stale state is judged": (
+        Link, "awaits", judges_at_once, "judged what was known before a silence", with_events(*LINK, "silence")),
+    "grace runs through silence": (
+        Grace, "stood", grace_runs, "its grace ran while the link was down",
+        with_fields(with_events(*LINK), profiles=("good", "blind"))),
+    "a failed stop flies on": (Conduct, "fall_back", flies_on, "left flying after a stop that failed", HOLDING),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", AFTER)
+def test_what_must_follow_a_silence_a_takeover_and_a_failed_stop_is_seen(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner, method, broken, words, of = AFTER[name]
+    monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
+    with pytest.raises(Broken, match=words):
+        Search(of).run()
 
 
 # --------------------------------------------------------------------------------------- what must always come
@@ -121,4 +180,4 @@ def test_a_path_without_an_end_is_seen(name: str, monkeypatch: pytest.MonkeyPatc
     owner, method, broken, event = ENDLESS[name]
     monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
     parts = (Search(with_events(event)).run(most) for most in (400, 3_000))  # a circle in a part is one in the whole
-    assert any(longest(found.edges)[1] for found in parts)
+    assert any(endless(found) for found in parts)

@@ -8,11 +8,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from model.small import GRACE, LIMITS, UNIT
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.executor import PermitRefusal
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, AirState, Dispatch, End, Ending, Event, Release, Reply, Succeeded
+from rtshcua.onboard.ports import (
+    Action,
+    AirState,
+    Crashed,
+    Dispatch,
+    End,
+    Ending,
+    Event,
+    Failed,
+    LinkBack,
+    LinkLost,
+    Release,
+    Reply,
+    Succeeded,
+    TakenOver,
+)
 from rtshcua.wire.permit import LINK_VALID_US, open_permit
 from rtshcua.wire.request import STEP
 
@@ -78,9 +94,26 @@ class Gate:
         return result
 
 
+#: what says that state was looked at
+_JUDGED = ("fresh", "decision", "dispatched", "violated", "time-over", "long-silence")
+_STALE_US = UNIT + UNIT // 2
+_UNKNOWN = "unknown for longer"
+
+
 @dataclass
 class Watch:
     """What was seen so far."""
+
+    resumed: bool = False  # an earlier run of this bundle broke off
+    down: bool = False  # the link
+    silent: bool = False  # a silence is under way: until state is judged again
+    lost_us: int = 0  # when the link was lost last,
+    back_us: int | None = None  # and when it was back first in this silence
+    awaited: bool = False  # what was known was current when the link was lost
+    heard_us: int = 0  # when the vehicle reported last
+    unknown_us: int | None = None  # so long something has been unknown while the link was up; None: all is known
+    unstopped: bool = False  # a hold failed, and nothing was sent since
+    now_us: int = 0
 
     flying: int | None = None  # the token of the command that flies
     command: object | None = None
@@ -95,16 +128,35 @@ class Watch:
     armed: bool | None = None
     ending: Ending | None = None
 
-    def before(self, event: Event | None) -> None:
-        """What the vehicle says, as it says it."""
+    def before(self, event: Event | None, now_us: int, heard_us: int, *, known: bool) -> None:
+        """What the vehicle says, as it says it. `known`: all that it reported last has a value."""
+        passed_us = now_us - self.now_us if self.now_us else 0
+        self.now_us, self.heard_us = now_us, heard_us
+        stale = now_us - heard_us > _STALE_US
+        if known and not stale:
+            self.unknown_us = None
+        else:
+            before_us = self.unknown_us
+            self.unknown_us = 0 if before_us is None else min(before_us + (0 if self.down else passed_us), 2 * UNIT)
         if isinstance(event, AirState):
             self.airborne, self.armed = event.airborne, event.armed
+        elif isinstance(event, LinkLost) and not self.down:
+            self.down, self.lost_us = True, now_us
+            self.back_us = self.back_us if self.silent else None
+            self.awaited, self.silent = self.awaited or not stale, True
+        elif isinstance(event, LinkBack) and self.down:
+            self.down = False
+            self.back_us = now_us if self.back_us is None else self.back_us
+        elif isinstance(event, Failed) and event.token == self.flying and self.ending is None:
+            self.unstopped = self.command == MotionKind.HOLD
 
     def after(self, of: Loaded, ear: Ear, event: Event | None, actions: Sequence[Action], now_us: int) -> None:
         """Check one step of the runtime."""
         sent = [action for action in actions if isinstance(action, Dispatch)]
         assert [id(each) for each in sent] == [id(each) for each in ear.passed], "sent past the executor"
         assert not (self.ending and actions), f"after the end: {list(map(type, actions))}"
+        was_over = self.ending is not None
+        self._judged(ear, ended=any(isinstance(action, End) for action in actions))
         order = iter(sent)
         if isinstance(event, Succeeded) and event.token == self.flying and self.command in _HOMEWARD:
             self.ours = False  # that is what its success means; who flies it next is somebody else
@@ -126,6 +178,38 @@ class Watch:
                 self.recalled = True
         assert next(order, None) is None, "sent, and not recorded"
         self._ended(actions)
+        if isinstance(event, (TakenOver, Crashed)) and not was_over:
+            grave = Ending.CRASHED if isinstance(event, Crashed) else Ending.STOOD_DOWN
+            assert self.released, "it went on after a takeover or a crash"
+            assert self.ending is grave, "it went on after a takeover or a crash"
+        self._stopped()
+        if self.flying is None:
+            self.command = None
+
+    def _judged(self, ear: Ear, *, ended: bool) -> None:
+        """Nothing is judged while the link is down, nor on what was known before it was, while it may still come."""
+        stale = self.now_us - self.heard_us > _STALE_US and self.heard_us <= self.lost_us
+        waits = self.back_us is not None and self.now_us < self.back_us + LIMITS.flapping_us
+        for what, said in ear.heard:
+            if what in ("fresh", "not-fresh"):
+                self.silent = False
+            if what in _JUDGED:
+                assert not self.down, "judged while the link was down"
+                assert not (self.awaited and stale and waits), "judged what was known before a silence"
+            if what == "violated" and _UNKNOWN in said.get("detail", ""):
+                assert (self.unknown_us or 0) > GRACE, "its grace ran while the link was down"
+        if not self.down:
+            assert waits or not self.silent or self.ending or ended, "judging was put off for too long"
+            self.awaited = self.awaited and stale and waits
+            self.back_us = self.back_us if waits else None
+            self.lost_us = self.lost_us if waits else 0
+
+    def _stopped(self) -> None:
+        """A hold that failed is followed by something else, as soon as state may be judged."""
+        if self.flying is not None or self.ending is not None:
+            self.unstopped = False
+        waits = self.down or self.silent or self.back_us is not None
+        assert not self.unstopped or waits, "left flying after a stop that failed"
 
     def _dispatched(
         self, of: Loaded, dispatch: Dispatch, key: tuple[int, int, int], said: dict[str, Any],
@@ -138,6 +222,8 @@ class Watch:
         assert command.token not in self.tokens, "one permit, sent twice"
         policy = of.bundle.policy
         if kind == STEP:
+            assert not self.resumed, "a step of a run that broke off before"
+            assert not self.unstopped, "a step after a hold that failed"
             assert key in fresh, "a step without its decision"
             assert not self.homeward, "a step after a return or a landing began"
             assert not self.recalled, "a step after a recall"

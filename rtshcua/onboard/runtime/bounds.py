@@ -2,8 +2,9 @@
 runs by a search (docs/model-checking.md).
 
 Each wait of the runtime has a limit of its own. It is noticed at the next step of the loop, at most `period_us` later,
-and while the link is lost nothing is sent: a limit that runs out then is noticed when the link is back, at most
-`silent_us` later, or the run stands down.
+and when the link was lost only on fresh state, at most `flapping_us` after it was back. Time in which the vehicle is
+not heard is not counted here: a silence lasts no longer than the vehicle can fly and `silent_us`, then the run stands
+down.
 """
 
 from collections.abc import Iterable
@@ -15,13 +16,14 @@ from rtshcua.onboard.runtime.flight import Limits, link_us
 
 
 def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period_us: int) -> int:
-    """From the moment a skill's chain begins (None: the contingency) until the run has ended, in us.
+    """From the moment a skill's chain begins (None: the contingency) until the run has ended, in us of time with a
+    link.
 
     That it ended means: landed, stood down from, or given up after the last tries. A degrade rule's target, each link
     of the chain and each of the contingency fly once; the last link is sent again, `tries` times. A run that is left
     alone meanwhile (`Runtime.leave`, once) begins with the last link once more.
     """
-    slack_us = limits.silent_us + period_us
+    slack_us = limits.flapping_us + period_us
     chain = contract.fallback if contract is not None else ()
     targets = [rule.target for rule in policy.rules if contract is not None and rule.target is not None]
     degraded = max((_link_us(policy, target) + slack_us for target in targets), default=0)
@@ -32,11 +34,11 @@ def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period
 
 
 def run_us(policy: Policy, mission: Mission, limits: Limits, period_us: int) -> int | None:
-    """From the start of a run to its end, in us; None if a step has no time limit of its own.
+    """From the start of a run to its end, in us of time with a link; None if a step has no time limit of its own.
 
     A step waits for its deadline, or for an approval and then for its deadline again, and flies for its duration.
     """
-    slack_us = limits.silent_us + period_us
+    slack_us = limits.flapping_us + period_us
     approval_us = max((rule.within_us for rule in policy.rules if rule.kind == RuleKind.CONFIRM), default=0)
     total = limits.ready_us + slack_us
     contracts = [invocation.contract for invocation in mission.invocations]

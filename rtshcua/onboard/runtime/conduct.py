@@ -47,7 +47,7 @@ class Conduct:
         self.asked_us = 0  # when that was
         self.held = False  # a hold for the current step was tried
         self.recording = True  # records are kept, or the policy does not ask
-        self.stopping_us: int | None = None  # when somebody asked this program to stop
+        self.stopping = False  # somebody asked this program to stop
 
     @property
     def aloft(self) -> bool:
@@ -86,7 +86,9 @@ class Conduct:
 
     def stop(self, now: Now) -> None:
         """Somebody asked this program to stop, and waits for it."""
-        self.stopping_us = now.monotonic_us if self.stopping_us is None else self.stopping_us
+        if not self.stopping:
+            self.stopping = True
+            self.link.hurry(now.monotonic_us)
         self.break_off(now, Ending.INTERRUPTED)
 
     def unrecorded(self, now: Now) -> None:

@@ -41,6 +41,7 @@ class Fallback:
     def land(self) -> None:
         """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
         self._chain = Chain(CONTINGENCY_LINK, -1, len(self._loaded.bundle.policy.contingency) - 2)
+        self._holds = True
 
     def prepare(self, now: Now, state: State, step: int) -> None:
         """Look at what would fly if a step had to fall back now: what depends on the place alone is then remembered,

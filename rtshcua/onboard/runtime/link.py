@@ -37,6 +37,7 @@ class Link:
         self._limits = limits
         self.down = False
         self._since_us: int | None = None  # the silence began; None: none is under way
+        self._waits_us: int | None = None  # and is waited out since then
         self._lost_us = 0  # the link was lost last
         self._first_back_us: int | None = None  # the link was back first in this silence,
         self._back_us = 0  # and last
@@ -51,7 +52,8 @@ class Link:
             return False
         self.down = True
         self._lost_us = now_us
-        self._since_us = now_us if self._since_us is None else self._since_us
+        if self._since_us is None:
+            self._since_us = self._waits_us = now_us
         self._standing_us = now_us if self._standing_us is None else self._standing_us
         self._awaited |= self._monitor.current(now_us)
         self._awaits_air = self._awaits_air or takes_off
@@ -74,9 +76,13 @@ class Link:
         """The vehicle said whether it is in the air."""
         self._awaits_air = False
 
-    def silent_us(self, now_us: int) -> int:
-        """How long the silence has lasted; 0 if none is under way."""
-        return 0 if self._since_us is None else now_us - self._since_us
+    def hurry(self, now_us: int) -> None:
+        """Somebody waits for the end from now on: a silence that is under way is waited out anew."""
+        self._waits_us = None if self._since_us is None else now_us
+
+    def waited_us(self, now_us: int) -> int:
+        """How long a silence that is under way was waited out; 0 if there is none."""
+        return 0 if self._waits_us is None else now_us - self._waits_us
 
     def awaits(self, now_us: int) -> bool:
         """Whether nothing may be judged now, for fresh state may still come. Not to be asked while the link is down."""
@@ -100,7 +106,7 @@ class Link:
         if self._since_us is not None:
             lasted_us = self._back_us - self._since_us
             silence = Silence(lasted_us, now_us - self._back_us, self._missing(now_us))
-            self._since_us = self._first_back_us = None
+            self._since_us = self._waits_us = self._first_back_us = None
         if now_us >= self._until_us or not (self._awaits_air or self._pending):
             self._forget()
         return stood_us, silence

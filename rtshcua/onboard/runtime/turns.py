@@ -71,12 +71,10 @@ class Turns:
         somebody waits for this program to stop.
         """
         conduct = self._conduct
-        waited_us, limit_us = conduct.link.silent_us(now_us), conduct.limits.silent_us
-        if conduct.stopping_us is not None:
-            waited_us = min(waited_us, now_us - conduct.stopping_us)
-        elif conduct.aloft:
+        limit_us = conduct.limits.silent_us
+        if conduct.aloft and not conduct.stopping:
             limit_us += conduct.loaded.bundle.policy.vehicle.endurance_us
-        return waited_us > limit_us
+        return conduct.link.waited_us(now_us) > limit_us
 
     def _heard_again(self, now: Now, silence: Silence) -> None:
         """State is judged again after a silence. One that was too long ends the mission, if the policy says so."""

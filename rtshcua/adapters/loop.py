@@ -26,6 +26,7 @@ from rtshcua.onboard.ports import (
     Failed,
     Noted,
     Release,
+    Show,
     Vehicle,
 )
 
@@ -33,6 +34,10 @@ from rtshcua.onboard.ports import (
 WAIT_US = 50_000
 #: while a command is held for its record, it looks this often whether that is kept.
 HELD_WAIT_US = 300
+
+
+#: what is recorded and shown, and does nothing to the vehicle
+_TOLD = (Append, Show, Announce)
 
 
 class Stepped(Protocol):
@@ -64,6 +69,18 @@ class _Held(NamedTuple):
     record: _Record
 
 
+def _reflex(actions: Sequence[Action]) -> Dispatch | None:
+    """A command that waits for no record and comes first of all that is done to the vehicle: it is sent before the
+    records are handed to the sink. They are chained already, and nothing that the sink says could keep it back.
+    """
+    for action in actions:
+        if isinstance(action, Dispatch):
+            return None if action.needs_record else action
+        if not isinstance(action, _TOLD):
+            return None
+    return None
+
+
 class Loop:
     """One run. `watch` sees each step's events and actions, after they were carried out; it must not block."""
 
@@ -93,7 +110,12 @@ class Loop:
         now = self._clock.now()
         events = [*also, *answers, *seen]
         actions = self._runtime.step(now, events)
-        ending = self._act(actions)
+        reflex = _reflex(actions)
+        try:
+            if reflex is not None:
+                self._send(reflex)
+        finally:
+            ending = self._act(actions, reflex)
         self._watch(now, events, actions)
         self._runtime.prepare(now)
         return ending
@@ -118,7 +140,7 @@ class Loop:
         elif self._clock.now().monotonic_us > held.dispatch.not_after_us:
             self._refuse(held.dispatch, "late")
 
-    def _act(self, actions: Sequence[Action]) -> Ending | None:
+    def _act(self, actions: Sequence[Action], sent: Dispatch | None) -> Ending | None:
         ending: Ending | None = None
         record: _Record | None = _Record(self._lines, BUFFERED)
         for action in actions:
@@ -126,7 +148,8 @@ class Loop:
                 case Append():
                     record = self._append(action, record)
                 case Dispatch():
-                    self._dispatch(action, record)
+                    if action is not sent:
+                        self._dispatch(action, record)
                 case Release():
                     self._held = None
                     self._vehicle.release()

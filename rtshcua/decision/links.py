@@ -47,6 +47,19 @@ def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: in
     return next(_chosen(policy.contingency, situation(state, policy, now), policy, after, True, NO_PHASE))
 
 
+def look_ahead(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> None:
+    """Ask of every link that may have to follow an invocation whether it may fly now. What depends on the place alone
+    is remembered (`Planner`, `Place`), and need not be found when one has to.
+    """
+    sets = situation(state, policy, now)
+    for rule in invocation.candidates.degrades:
+        admissible(rule.target, sets, policy, True, invocation.phase)
+    for link in invocation.chain:
+        admissible(link, sets, policy, True, invocation.phase)
+    for link in policy.contingency:
+        admissible(link, sets, policy, True, NO_PHASE)
+
+
 def link_admissible(link: PreparedLink, state: State, policy: PreparedPolicy, now: Now, phase: int = NO_PHASE) -> bool:
     """Whether a link of a prepared chain may fly now; `phase` is that of the invocation whose chain it is."""
     return admissible(link, situation(state, policy, now), policy, True, phase) == TRUE

@@ -5,7 +5,7 @@ from hashlib import sha256
 
 from msgspec.structs import replace
 
-from rtshcua.evidence.merkle import Tree, leaf_hash
+from rtshcua.evidence.merkle import LEAF, Tree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, sign
 from rtshcua.evidence.records import Close, Record, Signed, encode, unsigned
 
@@ -70,7 +70,9 @@ class Head:
 
     def take(self, line: bytes) -> None:
         """Stand after this line, an ordinary record."""
-        leaf = leaf_hash(line)
+        hasher = LEAF.copy()  # what `leaf_hash` does
+        hasher.update(line)
+        leaf = hasher.digest()
         self._push(leaf)
         self.prev = leaf.hex()
         self.seq += 1

@@ -4,14 +4,14 @@ from collections.abc import Iterable
 from hashlib import sha256
 from typing import ClassVar
 
-_LEAF = sha256(b"\x00")
+LEAF = sha256(b"\x00")  # a leaf's hash, as far as it is the same for all
 _NODE = sha256(b"\x01")
 EMPTY = sha256(b"").digest()
 
 
 def leaf_hash(entry: bytes) -> bytes:
     """SHA-256(0x00 || entry)."""
-    hasher = _LEAF.copy()  # cheaper than joining the prefix to the bytes
+    hasher = LEAF.copy()  # cheaper than joining the prefix to the bytes
     hasher.update(entry)
     return hasher.digest()
 

@@ -87,13 +87,18 @@ def _layout(of: Any) -> tuple[tuple[str, int, int], ...]:
 def _arrays(of: Any) -> Callable[[tuple[Any, ...]], Message]:
     """A message with arrays of numbers, without the generated constructor."""
     rest, layout, new = _bare(of), _layout(of), of.__new__
+    single = [(name, start) for name, start, length in layout if length == 1]
+    arrays = tuple((name, start, start + length) for name, start, length in layout if length > 1)
+    names = tuple(name for name, _ in single)
+    pick = tuple(start for _, start in single)
 
     def build(values: tuple[Any, ...]) -> Message:
         message = new(of)
         held = message.__dict__
         held.update(rest)
-        for name, start, length in layout:
-            held[name] = list(values[start : start + length]) if length > 1 else values[start]
+        held.update(zip(names, map(values.__getitem__, pick), strict=True))
+        for name, start, end in arrays:
+            held[name] = list(values[start:end])
         return message
 
     return build

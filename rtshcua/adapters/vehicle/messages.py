@@ -5,6 +5,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.adapters.vehicle.fence import FenceItem
+from rtshcua.mavlink.decode import kind_of
 
 NAN = float("nan")
 
@@ -17,6 +18,11 @@ SET_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
 RUN_PREARM_CHECKS = dialect.MAV_CMD_RUN_PREARM_CHECKS
 FENCE = dialect.MAV_MISSION_TYPE_FENCE
 TEXT_OCTETS = 50
+
+_ZEROS = (0.0,) * 7
+_COMMAND_LONG = kind_of(dialect.MAVLINK_MSG_ID_COMMAND_LONG)
+assert _COMMAND_LONG is not None
+_COMMAND = _COMMAND_LONG
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _POSITION_ONLY = 0x0DF8  # POSITION_TARGET_TYPEMASK: ignore velocity, acceleration, yaw and yaw rate
@@ -31,8 +37,8 @@ def heartbeat() -> Any:
 
 def command(system: int, number: int, *parameters: float) -> Any:
     """COMMAND_LONG with up to seven parameters, the rest 0."""
-    filled = [*parameters, *[0.0] * (7 - len(parameters))]
-    return dialect.MAVLink_command_long_message(system, _AUTOPILOT, number, 0, *filled)
+    filled = (*parameters, *_ZEROS[len(parameters) :])
+    return _COMMAND.build((*filled, number, system, _AUTOPILOT, 0))  # in the order of the wire
 
 
 def set_mode(system: int, *custom: int) -> Any:

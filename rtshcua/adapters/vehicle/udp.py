@@ -35,6 +35,7 @@ class UdpVehicle:
         self._keep = keep
         self._peer: tuple[str, int] | None = None
         self._pending: list[Event] = []
+        self._buffer = memoryview(bytearray(_LARGEST))
         self._unkept: list[tuple[int, bytes]] = []
         self._slice_us = max(_SLICE_US, clock.us_in(_SLICE_S))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -101,11 +102,12 @@ class UdpVehicle:
     def _take(self, events: list[Event]) -> int | None:
         """Take in a datagram that waits, and give the time; None if there is none."""
         try:
-            datagram, sender = self._socket.recvfrom(_LARGEST)
+            octets, sender = self._socket.recvfrom_into(self._buffer)
         except BlockingIOError:
             return None
         except ConnectionError:  # an ICMP answer to something we sent: the peer is not there (yet)
             return 0
+        datagram = bytes(self._buffer[:octets])
         now = self._clock.now()
         now_us = now.monotonic_us
         if self._peer is not None and sender != self._peer:

@@ -217,8 +217,10 @@ class SoftwareBoundary:
         """A link's number outside of `decide`: the one in its chain, or `-1 - rule` for a degrade rule's target."""
         if index != DEGRADE:
             return index
-        rule = next(degrade.rule for degrade in prepared.candidates.degrades if degrade.rule.target == link)
-        return -1 - self._clauses.shared[rule]
+        for degrade in prepared.candidates.degrades:
+            if degrade.rule.target == link:
+                return -1 - self._clauses.shared[degrade.rule]
+        raise LookupError("no degrade rule has this target")
 
     def _contingency(self, asked: Request) -> int | Status | None:
         chain = self._policy.contingency

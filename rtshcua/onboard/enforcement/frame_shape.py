@@ -69,6 +69,9 @@ class Frame(NamedTuple):
     target: tuple[int, int] | None
 
 
+_frame = tuple.__new__  # the constructor that a named tuple is given is a function more
+
+
 def read_frame(octets: bytes) -> Frame | None:
     """The frame that these octets are; None unless they are one whole unsigned frame of a message in `LAYOUTS`.
 
@@ -86,4 +89,4 @@ def read_frame(octets: bytes) -> Frame | None:
     payload = octets[HEADER.size : HEADER.size + length].ljust(layout.fields.size, b"\0")
     fields = layout.fields.unpack(payload)
     target = None if layout.target < 0 else fields[layout.target : layout.target + 2]
-    return Frame(system, component, low | high << 16, fields, target)
+    return _frame(Frame, (system, component, low | high << 16, fields, target))

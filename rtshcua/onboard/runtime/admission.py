@@ -23,6 +23,7 @@ from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, decode, 
 
 #: how many decisions a display is shown
 SHOWN = 6
+_OUTCOMES = {outcome: outcome.name.lower() for outcome in Outcome}
 #: MAV_SEVERITY of what ground stations are told of a decision: info, warning, notice, warning
 _SEVERITIES = {Outcome.ALLOW: 6, Outcome.DENY: 4, Outcome.DEFER: 5, Outcome.FALLBACK: 4}
 
@@ -129,7 +130,7 @@ class Admission:
 
     def _show(self, now: Now, key: Key, answer: Answer, clause: str) -> None:
         subject = self._subject(*key)
-        outcome, reason = answer.outcome.name.lower(), answer.reason.value
+        outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
         text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
         self._journal.add(Show("decision", text, key[1]))

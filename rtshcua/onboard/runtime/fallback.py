@@ -2,7 +2,7 @@
 
 from enum import Enum, auto
 
-from rtshcua.decision.links import START, Choice, choose_contingency, choose_fallback
+from rtshcua.decision.links import START, Choice, choose_contingency, choose_fallback, look_ahead
 from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded
@@ -44,7 +44,7 @@ class Fallback:
         """Look at what would fly if a step had to fall back now: what depends on the place alone is then remembered,
         and found quickly when it has to.
         """
-        choose_fallback(self._loaded.invocations[step], state, self._loaded.policy, now)
+        look_ahead(self._loaded.invocations[step], state, self._loaded.policy, now)
 
     def hold(self, now: Now, state: State) -> None:
         """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one."""

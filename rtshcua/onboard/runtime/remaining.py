@@ -17,16 +17,16 @@ class RemainingLatency:
     def __init__(self, conservative_us: int = CONSERVATIVE_US) -> None:
         self._conservative_us = conservative_us
         self._latest: deque[int] = deque(maxlen=WINDOW)
+        self._us = conservative_us
 
     def measured(self, took_us: int) -> None:
         """Note how long one admission took, from the moment it was decided at to the moment its command was sent."""
         self._latest.append(max(took_us, 0))
+        ordered = sorted(self._latest)
+        high = ordered[-(-len(ordered) * 99 // 100) - 1]
+        self._us = high if len(ordered) >= _ENOUGH else max(high, self._conservative_us)
 
     @property
     def us(self) -> int:
         """The latency to count with now."""
-        if not self._latest:
-            return self._conservative_us
-        ordered = sorted(self._latest)
-        high = ordered[-(-len(ordered) * 99 // 100) - 1]
-        return high if len(ordered) >= _ENOUGH else max(high, self._conservative_us)
+        return self._us

@@ -29,6 +29,18 @@ class Case:
 
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     """A set of situations, as conditions read it; `phase` is that of the invocation, -1 where there is none."""
+    seen = policy.latest.seen
+    if seen is None or seen.sets is not sets:
+        return _environment(sets, policy, arguments, phase)
+    for at in seen.environments:
+        if at.arguments is arguments and at.phase == phase:
+            return at
+    at = _environment(sets, policy, arguments, phase)
+    seen.environments.append(at)
+    return at
+
+
+def _environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     values, _, utc, error, monitors = sets
     if len(monitors) != len(policy.monitors):
         monitors = ()
@@ -45,7 +57,7 @@ def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     if seen is not None and seen.now == now and seen.state == state:
         return seen.sets
     sets = _situation(state, policy, now)
-    policy.latest.seen = Seen(state, now, sets, [])
+    policy.latest.seen = Seen(state, now, sets, [], [], [])
     return sets
 
 

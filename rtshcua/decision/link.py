@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import msgspec
+
 from rtshcua.decision.evaluate import Condition
 from rtshcua.decision.values import Value
 from rtshcua.decision.volume import Planner
@@ -10,6 +12,13 @@ from rtshcua.model.flat.contract import Link
 
 #: a clause, and the function that evaluates it
 Guards = tuple[tuple[Clause, Condition], ...]
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """A link and its index in the chain, or DEGRADE (`links`)."""
+
+    index: int
+    link: Link
 
 
 class PreparedLink(NamedTuple):

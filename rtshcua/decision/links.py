@@ -7,29 +7,21 @@ the airspace already, as far as its position error tells, may always go home.
 
 from collections.abc import Iterator, Sequence
 
-import msgspec
-
 from rtshcua.decision.airspace import keeps
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE, Environment
 from rtshcua.decision.lasting import longest
+from rtshcua.decision.link import Choice as Choice
 from rtshcua.decision.link import PreparedLink
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.decision.values import Sets
-from rtshcua.model.flat.contract import Link, MotionKind
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State
 
 #: the index of the link that a `degrade` rule flies, and of having tried nothing yet
 DEGRADE = -1
 START = -2
-
-
-class Choice(msgspec.Struct, frozen=True):
-    """A link and its index in the chain, or DEGRADE."""
-
-    index: int
-    link: Link
 
 
 def choose_fallback(
@@ -39,7 +31,16 @@ def choose_fallback(
 
     Pass the index of the link that failed or whose time is over as `after`: the choice never goes backwards.
     """
-    return next(fallbacks(invocation, situation(state, policy, now), policy, after, exact=True))
+    sets = situation(state, policy, now)
+    seen = policy.latest.seen
+    if seen is None or seen.sets is not sets:
+        return next(fallbacks(invocation, sets, policy, after, exact=True))
+    for known, known_after, choice in seen.choices:
+        if known is invocation and known_after == after:
+            return choice
+    choice = next(fallbacks(invocation, sets, policy, after, exact=True))
+    seen.choices.append((invocation, after, choice))
+    return choice
 
 
 def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: int = START) -> Choice | None:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from rtshcua.decision.compiler import Compiler
 from rtshcua.decision.energy import Energy
-from rtshcua.decision.evaluate import Condition, Tables
-from rtshcua.decision.link import Guards, PreparedLink
+from rtshcua.decision.evaluate import Condition, Environment, Tables
+from rtshcua.decision.link import Choice, Guards, PreparedLink
 from rtshcua.decision.rules import Candidates, RuleIndex
 from rtshcua.decision.truth import Truth
 from rtshcua.decision.values import Sets, Value
@@ -42,12 +42,16 @@ class PreparedMonitor(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """A single situation, as sets of values, and which links were found to be admissible in it, by their phase."""
+    """A single situation, as sets of values, and as conditions read it, by arguments and phase; and what was found in
+    it: which links may fly, by their phase, and which would be chosen for an invocation, after the link of which index.
+    """
 
     state: State
     now: Now
     sets: Sets
+    environments: list[Environment]
     links: list[tuple[PreparedLink, int, Truth]]
+    choices: list[tuple["PreparedInvocation", int, Choice | None]]
 
 
 class Latest:

@@ -28,6 +28,7 @@ from rtshcua.wire.keys import Duty, key_id
 
 #: How much later than `EPOCH_US` and `EPOCH_RECORDS` an epoch is sealed before anything else is recorded; a fifth.
 _LATE = 5
+_LATE_US, _LATE_RECORDS = EPOCH_US + EPOCH_US // _LATE, EPOCH_RECORDS + EPOCH_RECORDS // _LATE
 
 _OUTCOMES = tuple(outcome.name.lower() for outcome in Outcome)  # by number
 
@@ -82,8 +83,8 @@ class Recorder:
 
     def overdue(self, now: Now) -> bool:
         """Whether the epoch must be sealed before anything else is recorded."""
-        late = now.monotonic_us - self._signed_us >= EPOCH_US + EPOCH_US // _LATE
-        return late or self._head.records >= EPOCH_RECORDS + EPOCH_RECORDS // _LATE
+        head = self._head
+        return now.monotonic_us - self._signed_us >= _LATE_US or head.seq - head.first >= _LATE_RECORDS
 
     def genesis(
         self,
@@ -194,7 +195,7 @@ class Recorder:
             Effect(  # by position, as above
                 head.prev,
                 now.monotonic_us,
-                _storable(detail),
+                detail if detail.isascii() else _storable(detail),
                 durability,
                 event,
                 kind,
@@ -289,4 +290,4 @@ def _approvals(context: Context) -> tuple[tuple[int, int, int, int], ...]:
 
 def _storable(text: str) -> str:
     """The text, with what UTF-8 cannot carry (lone surrogates) replaced: the world's text must not stop a record."""
-    return text if text.isascii() else text.encode("utf-8", "replace").decode()
+    return text.encode("utf-8", "replace").decode()

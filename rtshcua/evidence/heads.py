@@ -17,15 +17,15 @@ _TOGETHER = 256  # lines
 class Head:
     """The number of the next record, the hash of the last line, the tree over all lines.
 
-    Of the segment under way: its number `epoch`, its `records` and `octets`, and their digest. Its lines are hashed
-    together, some at a time: that is quicker, and who records something does not wait for it. `after` is the digest of
-    the last checkpoint, which the next one names.
+    Of the segment under way: its number `epoch`, its `first` record, its `records` and `octets`, and their digest. Its
+    lines are hashed together, some at a time: that is quicker, and who records something does not wait for it. `after`
+    is the digest of the last checkpoint, which the next one names.
     """
 
-    __slots__ = ("_first", "_hash", "_lines", "_octets", "_push", "after", "epoch", "prev", "seq", "tree")
+    __slots__ = ("_hash", "_lines", "_octets", "_push", "after", "epoch", "first", "prev", "seq", "tree")
 
     def __init__(self) -> None:
-        self.seq = 0
+        self.seq = self.first = 0
         self.prev = START
         self.tree = Tree()
         self._push = self.tree.push
@@ -34,7 +34,7 @@ class Head:
         self._begin()
 
     def _begin(self) -> None:
-        self._first = self.seq
+        self.first = self.seq
         self._octets = 0  # that are in the hash,
         self._hash = sha256()
         self._lines: list[bytes] = []  # and lines that come after them
@@ -42,7 +42,7 @@ class Head:
     @property
     def records(self) -> int:
         """How many lines the segment has."""
-        return self.seq - self._first
+        return self.seq - self.first
 
     @property
     def octets(self) -> int:

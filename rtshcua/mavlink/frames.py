@@ -1,5 +1,6 @@
 """MAVLink 2 messages to frames and back, over pymavlink's generated messages (never `mavutil`)."""
 
+from binascii import crc_hqx
 from collections.abc import Container
 from typing import NamedTuple, Protocol
 
@@ -7,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from rtshcua.mavlink.decode import Message as Message
 from rtshcua.mavlink.decode import decode, kind_of
-from rtshcua.mavlink.framing import CHECKSUM, FLAG_SIGNED, FLAGS, HEADER, MARKER, SIGNATURE, checksum, message_id
+from rtshcua.mavlink.framing import CHECKSUM, FLAG_SIGNED, FLAGS, HEADER, MARKER, MIRROR, SIGNATURE, message_id
 
 # pymavlink lets an environment variable switch the checksum off in its own decoder. Nobody here may use it so.
 ardupilotmega.MAVLINK_IGNORE_CRC = 0
@@ -71,7 +72,8 @@ class Codec:
                 payload = payload[:1] + payload[1:].rstrip(b"\0")
             head = bytes((len(payload), 0, 0, sender.seq, sender.srcSystem, sender.srcComponent)) + kind.number
             covered = head + payload
-            frame = b"\xfd" + covered + checksum(covered + kind.extra).to_bytes(2, "little")
+            crc = crc_hqx((covered + kind.extra).translate(MIRROR), 0xFFFF)  # as `framing.checksum`
+            frame = b"\xfd" + covered + bytes((MIRROR[crc >> 8], MIRROR[crc & 0xFF]))
         sender.seq = (sender.seq + 1) % 256
         return frame
 

@@ -12,7 +12,7 @@ FLAGS = 2
 FLAG_SIGNED = 0x01
 """The only incompatibility flag that is defined; a frame with another one cannot be understood."""
 
-_MIRROR: Final = bytes(int(f"{octet:08b}"[::-1], 2) for octet in range(256))
+MIRROR: Final = bytes(int(f"{octet:08b}"[::-1], 2) for octet in range(256))
 
 
 def frame_length(data: bytes, start: int) -> int:
@@ -31,13 +31,13 @@ def checksum(octets: bytes, start: int = 0xFFFF) -> int:
 
     It is the CRC of `crc_hqx` (same polynomial, 0x1021) with every octet, and the result, mirrored.
     """
-    crc = crc_hqx(octets.translate(_MIRROR), start)
-    return _MIRROR[crc >> 8] | _MIRROR[crc & 0xFF] << 8
+    crc = crc_hqx(octets.translate(MIRROR), start)
+    return MIRROR[crc >> 8] | MIRROR[crc & 0xFF] << 8
 
 
 def checks(covered: bytes, low: int, high: int) -> bool:
     """Whether these two octets are the checksum of what they cover; as comparing `checksum`, with less to do."""
-    return crc_hqx(covered.translate(_MIRROR), 0xFFFF) == _MIRROR[low] << 8 | _MIRROR[high]
+    return crc_hqx(covered.translate(MIRROR), 0xFFFF) == MIRROR[low] << 8 | MIRROR[high]
 
 
 def with_flags(frame: bytes, flags: int) -> bytes:

@@ -75,7 +75,8 @@ def _mac(key: bytes, body: bytes) -> bytes:
     inner, outer = inner.copy(), outer.copy()
     inner.update(body)
     outer.update(inner.digest())
-    return outer.digest()
+    mac: bytes = outer.digest()
+    return mac
 
 
 @lru_cache(maxsize=4)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from rtshcua.adapters.vehicle.fence import FenceHabits
 from rtshcua.adapters.vehicle.observed import Observed
@@ -11,8 +11,7 @@ from rtshcua.onboard.ports import Command
 Message = Any
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
+class Stage(NamedTuple):
     """One part of a manoeuvre: send, then wait until the effect is seen.
 
     `message` is sent at once, and again while it is not acknowledged; `command` is the MAV_CMD whose acknowledgement

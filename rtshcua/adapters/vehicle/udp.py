@@ -3,7 +3,6 @@
 import select
 import socket
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.driver import Driver
@@ -131,8 +130,10 @@ class UdpVehicle:
         if self._peer is None or not frames:
             return
         for frame in frames:
-            with suppress(OSError):  # lost, as any datagram may be: what matters is sent again, and only effects count
+            try:
                 self._socket.sendto(frame, self._peer)
+            except OSError:
+                continue  # lost, as any datagram may be: what matters is sent again, and only effects count
         utc_us = self._clock.now().utc_us
         self._unkept += [(utc_us, frame) for frame in frames]
 

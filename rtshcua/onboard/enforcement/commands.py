@@ -9,7 +9,6 @@ from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 
-
 #: a command but for its token
 _Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int]
 

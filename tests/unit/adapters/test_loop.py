@@ -44,6 +44,7 @@ class World:
         self.saw: list[Any] = []
         self.script = list(script)
         self.coming: list[Any] = []
+        self.prepared: list[Any] = []
         self.loop = Loop(self, self, self, self, lambda *seen: self.saw.append(seen))
 
     def now(self) -> Now:
@@ -83,7 +84,7 @@ class World:
         return self.script.pop(0) if self.script else []
 
     def prepare(self, now: Now) -> None:
-        pass
+        self.prepared.append((now, len(self.did)))
 
 
 def test_actions_are_carried_out_in_their_order() -> None:
@@ -191,10 +192,35 @@ def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
 def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
     world = held([Append(b"violated", WRITTEN), Dispatch(OTHER, 9_000, False)])
     world.loop.turn()
-    assert world.did == [b"violated", ("begin", 8)]
+    assert world.did == [("begin", 8), b"violated"]  # chained already, and handed over when the frame is on its way
     world.kept = 9
     world.loop.turn()
-    assert world.did == [b"violated", ("begin", 8)]
+    assert world.did == [("begin", 8), b"violated"]
+
+
+def test_what_a_fallback_is_recorded_by_is_handed_over_whatever_becomes_of_its_frame() -> None:
+    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False), Append(b"2", WRITTEN)])
+
+    def refuses(command: Command, now_us: int) -> None:
+        raise RuntimeError("no vehicle")
+
+    world.begin = refuses  # type: ignore[method-assign]
+    with pytest.raises(RuntimeError, match="no vehicle"):
+        world.loop.turn()
+    assert world.did == [b"1", b"2"]
+
+
+def test_a_fallback_does_not_pass_what_is_done_to_the_vehicle_before_it() -> None:
+    world = World([Release(), Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False)])
+    world.loop.turn()
+    assert world.did == ["release", b"1", ("begin", 7)]
+
+
+def test_the_runtime_looks_ahead_when_all_is_done() -> None:
+    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False)])
+    world.loop.turn()
+    assert world.did == [("begin", 7), b"1"]
+    assert world.prepared == [(Now(1_000, 1_000, 0), 2)]
 
 
 @pytest.mark.parametrize("action", [Release(), End(Ending.STOOD_DOWN)])

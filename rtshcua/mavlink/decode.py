@@ -58,22 +58,20 @@ def decode(frame: bytes, kind: Kind) -> Message | None:
     return kind.build(fields.unpack(frame[HEADER:end].ljust(fields.size, b"\0")))  # zeros at the end are not sent
 
 
-def _bare(of: Any) -> Any:
-    """The class of messages that hold their fields alone: what else the generated constructor gives each of them is the
-    same for all, and stands in the class.
-    """
+def _bare(of: Any) -> dict[str, Any]:
+    """What a message holds beside its fields."""
     made = of(*[0] * len(of.fieldnames))
-    rest = {name: value for name, value in vars(made).items() if name not in of.fieldnames}
-    return type(of.__name__, (of,), {**rest, "__doc__": of.__doc__})
+    return {name: value for name, value in vars(made).items() if name not in of.fieldnames}
 
 
 def _plain(of: Any) -> Callable[[tuple[Any, ...]], Message]:
     """A message of single numbers, without the generated constructor, which takes longer than all the rest."""
-    bare, names, new = _bare(of), tuple(of.ordered_fieldnames), of.__new__
+    rest, names, new = _bare(of), tuple(of.ordered_fieldnames), of.__new__
 
     def build(values: tuple[Any, ...]) -> Message:
-        message = new(bare)
-        message.__dict__ = dict(zip(names, values, strict=True))
+        message = new(of)
+        held = message.__dict__ = rest.copy()
+        held.update(zip(names, values, strict=True))
         return message
 
     return build
@@ -87,15 +85,16 @@ def _layout(of: Any) -> tuple[tuple[str, int, int], ...]:
 
 def _arrays(of: Any) -> Callable[[tuple[Any, ...]], Message]:
     """A message with arrays of numbers, without the generated constructor."""
-    bare, layout, new = _bare(of), _layout(of), of.__new__
+    rest, layout, new = _bare(of), _layout(of), of.__new__
     single = [(name, start) for name, start, length in layout if length == 1]
     arrays = tuple((name, start, start + length) for name, start, length in layout if length > 1)
     names = tuple(name for name, _ in single)
     pick = tuple(start for _, start in single)
 
     def build(values: tuple[Any, ...]) -> Message:
-        message = new(bare)
-        held = message.__dict__ = dict(zip(names, map(values.__getitem__, pick), strict=True))
+        message = new(of)
+        held = message.__dict__ = rest.copy()
+        held.update(zip(names, map(values.__getitem__, pick), strict=True))
         for name, start, end in arrays:
             held[name] = list(values[start:end])
         return message

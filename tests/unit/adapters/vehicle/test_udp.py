@@ -1,7 +1,9 @@
 """The UDP link: one peer, the first that proves to be a vehicle; nothing that comes raises."""
 
+import select
 import socket
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -165,3 +167,40 @@ def test_the_system_that_was_named_is_flown_and_others_may_speak() -> None:
     for peer in peers:
         peer.socket.close()
     link.close()
+
+
+def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: UdpVehicle, vehicle: Peer) -> None:
+    kept: list[tuple[int, bytes]] = link.kept  # type: ignore[attr-defined]
+    vehicle.beat()
+    poll(link)
+    assert kept == []
+    poll(link)  # says who it is, in answer
+    (came,) = Codec(1, 191).parse(kept[0][1])
+    assert (came.name, came.component) == ("HEARTBEAT", 1)
+    before = len(kept)
+    link.close()
+    assert len(kept) > before
+    assert [at for at, _ in kept] == sorted(at for at, _ in kept)
+    assert {Codec(1, 191).parse(frame)[0].component for _, frame in kept} == {1, 191}
+
+
+def test_what_is_waited_for_is_acted_on_as_it_comes(
+    link: UdpVehicle, vehicle: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    vehicle.beat()
+    poll(link)
+    poll(link)
+    both = [mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, left) for left in (57, 56)]
+
+    def taken() -> list[int | None]:
+        return [value for event in poll(link) if isinstance(event, Readings) for _, value in event.values]
+
+    for message in both:  # what waits already is taken in together
+        vehicle.send(message)
+    assert taken() == [5_700, 5_600]
+    look = select.select
+    nothing: tuple[list[Any], ...] = ([], [], [])
+    monkeypatch.setattr(select, "select", lambda *asked: look(*asked) if asked[-1] else nothing)  # all comes later
+    for message in both:
+        vehicle.send(message)
+    assert [taken(), taken()] == [[5_700], [5_600]]

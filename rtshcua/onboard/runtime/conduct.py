@@ -89,13 +89,6 @@ class Conduct:
             case Stage.ENDED:
                 return False
 
-    def prepare(self, now: Now) -> None:
-        """Make ready what a fallback would need, wherever the vehicle is now; nothing comes of it."""
-        current = self.queue.current
-        if self.stage is Stage.RUNNING and current is not None and self.monitor.moved:
-            self.monitor.moved = False
-            self._fallback.prepare(now, self.monitor.state(now.monotonic_us), current.step)
-
     # -------------------------------------------------------- what ends a run, or turns it homeward
 
     def break_off(self, now: Now, cause: Ending) -> None:

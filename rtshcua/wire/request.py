@@ -101,7 +101,7 @@ def decode(data: bytes, slots: int, monitors: int) -> Request | Malformed:
     known = fields[_HEAD_FIELDS : _HEAD_FIELDS + slots]
     if UNKNOWN in known:
         values = tuple([None if value == UNKNOWN else value for value in known])
-        known = [value for value in known if value != UNKNOWN]
+        known = tuple([value for value in known if value != UNKNOWN])
     if known and not -MAX_VALUE <= min(known) <= max(known) <= MAX_VALUE:
         return Malformed("a state value out of range")
     ages, said = fields[_HEAD_FIELDS + slots : _HEAD_FIELDS + 2 * slots], fields[_HEAD_FIELDS + 2 * slots :]

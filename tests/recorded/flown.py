@@ -27,6 +27,8 @@ from rtshcua.onboard.runtime.monitor import StateMonitor
 TRACES = Path(__file__).resolve().parents[1] / "traces"
 SECOND = 1_000_000
 TICK_US = 50_000
+#: an autopilot that was not heard for so long answers nothing either
+SILENT_US = 300_000
 #: monotonic time of the autopilot's start
 START_US = 5_000_000
 
@@ -53,7 +55,7 @@ class Recorded:
     The recording holds only what the vehicle sent, and to another client. So nothing of it answers what the driver
     asks: `parameters` and the last mode are told to it instead, and its fence is left alone. TIMESYNC is answered after
     `round_trip_us`, by the time since boot that the recorded stamps show. `commands` are begun at their second, as if
-    the recorded client's had been ours.
+    the recorded client's had been ours; with `acknowledges`, whatever is commanded is acknowledged.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Recorded:
     policy: Policy
     parameters: dict[str, float]
     commands: Sequence[tuple[float, Command]] = ()
+    acknowledges: bool = False
     events: list[tuple[float, Event]] = field(default_factory=list)
     states: list[dict[str, int | None]] = field(default_factory=list)
     sent: list[tuple[float, Received]] = field(default_factory=list)
@@ -74,6 +77,7 @@ class Recorded:
         self.driver = Driver(self.policy, self._frames, fence=False)
         self._reader, self._teller = Codec(0, 0), Codec(1, 1)
         self._beat = b""
+        self._alive_us = START_US  # when the autopilot itself was last heard
         self._now_us = START_US
         self._boots: deque[int] = deque(maxlen=20)  # boot time minus ours, as the last stamps have it
         self._clock_answers: deque[tuple[int, int]] = deque()  # when, and `ts1`
@@ -83,6 +87,7 @@ class Recorded:
             while self._now_us < entry.at_us:
                 next_us = min(entry.at_us, self._now_us + TICK_US)
                 self._pass(next_us, waiting)
+            self._alive_us = self._now_us if entry.frame[6] == 1 else self._alive_us
             self._receive(entry.frame)
 
     @property
@@ -160,16 +165,22 @@ class Recorded:
             self.sent.append((round(self.second, 2), received))
             if received.name == "COMMAND_LONG" and received.message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
                 self._tell_mode()
+            elif received.name.startswith("COMMAND_") and self.acknowledges:
+                self._acknowledge(received.message.command)
             elif received.name == "TIMESYNC" and self._boots:
                 self._clock_answers.append((self._now_us + self.round_trip_us, received.message.ts1))
             elif received.name == "PARAM_REQUEST_READ" and received.message.param_id in self.parameters:
                 self._answer(received.message.param_id)
 
+    def _acknowledge(self, number: int) -> None:
+        if self._now_us - self._alive_us > SILENT_US:
+            return
+        self._receive(self._teller.pack(mavlink.MAVLink_command_ack_message(number, 0, 0, 0, 1, OURS)))
+
     def _tell_mode(self) -> None:
         """As both real ones answer: acknowledged, and the mode as it was told last."""
-        ack = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 0, 0, 1, OURS)
-        self._receive(self._teller.pack(ack))
-        if self._beat:
+        self._acknowledge(mavlink.MAV_CMD_REQUEST_MESSAGE)
+        if self._beat and self._now_us - self._alive_us <= SILENT_US:
             self._receive(self._beat)
 
     def _answer_clock(self, at_us: int, ts1_ns: int) -> None:

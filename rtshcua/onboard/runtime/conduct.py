@@ -62,13 +62,6 @@ class Conduct:
             return not self.craft.at_rest
         return self.resumed and self.craft.airborne is not False
 
-    def prepare(self, now: Now) -> None:
-        """Make ready what a fallback would need, wherever the vehicle is now; nothing comes of it."""
-        current = self.queue.current
-        if self.stage is Stage.RUNNING and current is not None and self.monitor.moved:
-            self.monitor.moved = False
-            self.fallback.prepare(now, self.monitor.state(now.monotonic_us), current.step)
-
     # -------------------------------------------------------- what ends a run, or turns it homeward
 
     def break_off(self, now: Now, cause: Ending) -> None:

@@ -2,7 +2,7 @@
 
 from enum import Enum, auto
 
-from rtshcua.decision.links import START, Choice, choose_contingency, choose_fallback, look_ahead
+from rtshcua.decision.links import START, Choice, choose_contingency, choose_fallback
 from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded
@@ -42,12 +42,6 @@ class Fallback:
         """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
         self._chain = Chain(CONTINGENCY_LINK, -1, len(self._loaded.bundle.policy.contingency) - 2)
         self._holds = True
-
-    def prepare(self, now: Now, state: State, step: int) -> None:
-        """Look at what would fly if a step had to fall back now: what depends on the place alone is then remembered,
-        and found quickly when it has to.
-        """
-        look_ahead(self._loaded.invocations[step], state, self._loaded.policy, now)
 
     def hold(self, now: Now, state: State) -> None:
         """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from rtshcua.decision.links import look_ahead
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
@@ -60,11 +61,15 @@ class Runtime:
         return self._journal.take()
 
     def prepare(self, now: Now) -> None:
-        """To be called after `step` when nothing else is to be done: what the next one may need is looked at ahead.
-
-        Nothing that is decided, recorded or sent depends on it.
+        """To be called after `step` when nothing else is to be done: what the running step's fallback would need where
+        the vehicle is now is looked at ahead. Nothing that is decided, recorded or sent depends on it.
         """
-        self._conduct.prepare(now)
+        conduct, monitor = self._conduct, self._conduct.monitor
+        current = conduct.queue.current
+        if monitor.moved and conduct.stage is _RUNNING and current is not None:
+            monitor.moved = False
+            prepared = conduct.loaded.invocations[current.step]
+            look_ahead(prepared, monitor.state(now.monotonic_us), conduct.loaded.policy, now)
 
     def leave(self) -> None:
         """Nobody will watch any more: the next step sends the last link, unless a return or a landing flies."""

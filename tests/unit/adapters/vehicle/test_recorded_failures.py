@@ -1,0 +1,96 @@
+"""Six recorded flights of ours in which something went wrong, through the driver: what it makes of them now.
+
+Times are seconds from the first frame of the recording (`tests/traces/README.md`).
+"""
+
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from recorded.flown import Recorded, command, shipped_policy
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Failed, LinkBack, LinkLost, TakenOver
+
+BRIDGE = (473_987_600, 85_469_800)
+NOWHERE = (1 << 31) - 1
+
+
+def leg(token: int = 1) -> Any:
+    return command(token, MotionKind.FLY, *BRIDGE, altitude=20_000, speed=6_000)
+
+
+def hover(token: int = 2) -> Any:
+    return command(token, MotionKind.HOLD)
+
+
+def flown(name: str, *commands: tuple[float, Any]) -> Recorded:
+    return Recorded(name, 0, shipped_policy(), {"RTL_RETURN_ALT": 30.0}, commands, acknowledges=True)
+
+
+def legs_sent(of: Recorded) -> list[float]:
+    """When the vehicle was sent somewhere."""
+    return [
+        at
+        for at, frame in of.sent
+        if (frame.name == "COMMAND_INT" and frame.message.x != NOWHERE)
+        or frame.name == "SET_POSITION_TARGET_GLOBAL_INT"
+    ]
+
+
+def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
+    """It flew on at 4.5 to 5.6 m/s for the 10 s of the hover, about 46 m, and the hover counted as flown."""
+    seen = flown("px4-hover-does-not-stop", (21.27, leg()), (25.71, hover()))
+    (at, failed), *_ = seen.of(Failed)
+    assert (failed.token, failed.reason) == (2, "did-not-stop")
+    assert 28 < at < 30
+
+
+def test_a_landing_between_two_heartbeats_is_seen_and_the_next_leg_never_leaves() -> None:
+    """No HEARTBEAT shows the pilot's Land: the landed state does from 17.38 s on, the target before it."""
+    seen = flown("px4-takeover-race", (12.0, hover()), (18.15, leg(3)))
+    (at, taken), *_ = seen.of(TakenOver)
+    assert 17.25 < at < 17.5
+    assert taken.how in ("landing", "another target")
+    assert legs_sent(seen) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "begun", "taken_at"), [("px4-pilot-pause", 19.86, 25.07), ("px4-pilot-goto", 19.69, 24.73)]
+)
+def test_a_pause_and_a_go_to_without_a_change_of_mode_are_seen(name: str, begun: float, taken_at: float) -> None:
+    """The pause was told as `stopped-short` after 12 s; the other way was flown for 41 s, unnoticed."""
+    seen = flown(name, (begun, leg()))
+    (at, taken), *_ = seen.of(TakenOver)
+    assert taken_at - 0.1 < at < taken_at + 0.3
+    assert taken.how == "another target"
+    assert len(legs_sent(seen)) == 1
+
+
+def test_a_guided_target_is_not_overwritten() -> None:
+    """Ours was repeated every 2 s, and took the vehicle back. Now it goes out once it is obeyed no more.
+
+    That autopilot was not asked for its target, so the recording cannot show whose it flew to.
+    """
+    seen = flown("arducopter-pilot-goto", (18.6, leg()))
+    assert len([at for at in legs_sent(seen) if at < 60]) <= 2
+
+
+def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:
+    """On the first frames after 5 s of silence every other signal was stale: what is judged there lands the vehicle."""
+    seen = flown("arducopter-dropout", (14.5, leg()))
+    (lost, why), *_ = seen.of(LinkLost)
+    (back, _), *_ = seen.of(LinkBack)
+    assert why.why == "silent"
+    assert 17.5 < lost < 19.5
+    assert 22.4 < back < 22.7
+    known = seen.states[24]
+    assert {name for name, value in known.items() if value is None} <= {
+        "wind.speed",
+        "link.quality",
+        "obstacle.distance",
+    }
+    assert not [frame for _, frame in seen.sent if frame.name == "COMMAND_LONG" and frame.message.command in LANDS]
+
+
+LANDS = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_NAV_LAND)

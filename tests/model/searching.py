@@ -133,6 +133,8 @@ class Found:
     transitions: int = 0
     edges: list[list[tuple[int, int, int]]] = field(default_factory=list)
     falling: list[bool] = field(default_factory=list)
+    next: list[list[int]] = field(default_factory=list)  # by event
+    doubles: list[tuple[int, bytes]] = field(default_factory=list)
     whole: bool = True
     endings: set[str] = field(default_factory=set)
     parents: list[tuple[int, str]] = field(default_factory=list)
@@ -158,33 +160,33 @@ class Search:
         self._template = self._snapshots.take(template)
         self._documents = {name: DOCUMENTS[name](template) for name in of.documents}
 
-    def run(self, most: int | None = None) -> Found:
-        """All states from a first run, and from one that goes on after a crash; at most so many."""
+    def run(self, most: int | None = None, double_of: int | None = None) -> Found:
+        """All states from a first run, and from one that goes on after a crash of the program; at most so many.
+
+        With `double_of`, after every so many transitions one that led to a state which was found before is looked at
+        closer: what follows from it is what follows from the one that was found.
+        """
         found = Found()
         numbers: dict[bytes, int] = {}
         parents = found.parents
         waiting: deque[tuple[int, bytes]] = deque()
 
         def number(at: World, parent: int, event: str) -> int:
-            ending = "left" if at.left else at.runtime.ending
-            parts: object = ending  # when it is over, how it was is over too
-            if ending is None:
-                parts = (at.runtime, at.of, at.watch, at.profile, at.heard_us, at.restarted, at.handed)
-            conduct = at.runtime._conduct
-            standing = conduct.dispatcher._standing
-            permit = None if standing is None else standing[1]
-            digest = self._snapshots.canonical(parts, at.now_us, conduct.stage, permit)
+            ending, digest = _ending(at), self._digest(at)
             known = numbers.get(digest)
             if known is not None:
+                if double_of is not None and ending is None and found.transitions % double_of == 0:
+                    found.doubles.append((known, self._snapshots.take(at)))
                 return known
             new = numbers[digest] = len(parents)
             parents.append((parent, event))
             found.edges.append([])
-            found.falling.append(conduct.stage is Stage.FALLING)
+            found.next.append([])
+            found.falling.append(at.runtime._conduct.stage is Stage.FALLING)
             if at.runtime.ending is not None:
                 _guarded(found, new, "(over)", _over, at)
             if ending is not None:
-                found.endings.add(str(ending))
+                found.endings.add(ending)
             else:
                 waiting.append((new, self._snapshots.take(at)))
             return new
@@ -203,10 +205,29 @@ class Search:
                 _guarded(found, state, name, happen, at)
                 found.transitions += 1
                 target = number(at, state, name)
+                found.next[state].append(target)
                 if name != "restarted":  # that is another run
                     found.edges[state].append((target, units, heard))
         found.states = len(parents)
+        for known, data in found.doubles:
+            self._compare(found, numbers, known, data)
         return found
+
+    def _compare(self, found: Found, numbers: dict[bytes, int], known: int, data: bytes) -> None:
+        """Two states that count as one must lead to states that do, whatever happens."""
+        for (name, _, happen), target in zip(self._events(), found.next[known], strict=True):
+            at = self._snapshots.restore(data)
+            happen(at)
+            if numbers.get(self._digest(at)) != target:
+                raise Broken(f"not alike after {[*found.way(known), name]}")
+
+    def _digest(self, at: World) -> bytes:
+        parts: object = _ending(at)  # when it is over, how it was is over too
+        if parts is None:
+            parts = (at.runtime, at.of, at.watch, at.profile, at.heard_us, at.restarted, at.handed)
+        conduct = at.runtime._conduct
+        standing = conduct.dispatcher._standing
+        return self._snapshots.canonical(parts, at.now_us, conduct.stage, None if standing is None else standing[1])
 
     def _begin(self, *, resumed: bool) -> World:
         of = self._loaded()
@@ -243,6 +264,10 @@ class Search:
         for name, document in self._documents.items():
             happen.append((name, 0, partial(_presented, document=document)))
         return happen + [(name, 0, partial(_turns, profile=name)) for name in self._of.profiles]
+
+
+def _ending(at: World) -> str | None:
+    return "left" if at.left else None if at.runtime.ending is None else at.runtime.ending.value
 
 
 def _guarded(found: Found, state: int, name: str, happen: Callable[[World], None], at: World) -> None:

@@ -12,6 +12,7 @@ from model.searching import Broken, Found, Search
 from model.small import BACK, DOWN, HOLD, LINK, VEHICLE, WORST, Small, small
 from reference.flat_case import GOTO, HOME, TAKEOFF
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.policy import AfterSilence
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.onboard.runtime.conduct import Conduct
@@ -24,6 +25,11 @@ from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
 LITTLE = small("little", (TAKEOFF, HOME), ("good",), VEHICLE, contingency=(BACK, DOWN), chain=(HOLD,))
 #: it holds in the air for an approval that does not come
 HOLDING = small("holding", (TAKEOFF, GOTO), ("good",), VEHICLE, confirm=True)
+#: a silence of any length ends nothing
+GOING_ON = small(
+    "going on", (TAKEOFF, HOME), ("good", "blind"), (*VEHICLE, *LINK), contingency=(DOWN,), chain=(HOLD,),
+    after=AfterSilence.CONTINUE,
+)  # fmt: skip
 
 
 def with_events(*events: str) -> Small:
@@ -139,7 +145,7 @@ AFTER: dict[str, tuple[type, str, Callable[[Any], Any], str, Small]] = {
         Link, "awaits", judges_at_once, "judged what was known before a silence", with_events(*LINK, "silence")),
     "grace runs through silence": (
         Grace, "stood", grace_runs, "its grace ran while the link was down",
-        with_fields(with_events(*LINK), profiles=("good", "blind"))),
+        GOING_ON),
     "a failed stop flies on": (Conduct, "fall_back", flies_on, "left flying after a stop that failed", HOLDING),
 }  # fmt: skip
 

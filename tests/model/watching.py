@@ -239,7 +239,8 @@ class Watch:
             assert key in fresh or self.allowed, "a link that nothing stands for"
             assert kind == 2 or step in self.allowed or key in fresh
             chain = policy.contingency if kind == 2 else of.bundle.mission.invocations[step].contract.fallback
-            contract = policy.contracts[chain[link].skill if link >= 0 else policy.rules[-1 - link].target.skill]  # type: ignore[union-attr]
+            targets = [rule.target.skill for rule in policy.rules if rule.target is not None]  # no policy here has two
+            contract = policy.contracts[chain[link].skill if link >= 0 else targets[0]]
             assert dispatch.not_after_us <= now_us + LINK_VALID_US or key not in fresh
             self.homeward = self.homeward or contract.motion.kind in _HOMEWARD
         assert (command.skill, command.kind) == (contract.name, contract.motion.kind), "another skill"

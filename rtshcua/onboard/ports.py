@@ -30,9 +30,13 @@ class Readings(Frozen, frozen=True):
 
 
 class Ready(Frozen, frozen=True):
-    """The vehicle is connected, its estimator has a position and it would accept arming."""
+    """The vehicle is connected, its estimator has a position and it would accept arming, or it flies already.
+
+    `others`: it flies, and in a way that nothing of ours makes it fly (the name of a mode, or `landing`).
+    """
 
     at_us: int
+    others: str = ""
 
 
 class AirState(Frozen, frozen=True):
@@ -92,13 +96,14 @@ class Crashed(Frozen, frozen=True):
 
 
 class LinkLost(Frozen, frozen=True):
-    """Nothing came from the vehicle, or nothing that was asked was answered, for longer than the link's limit.
+    """Nothing came from the vehicle for longer than the link's limit; `heard_us` is when it was last heard.
 
-    `why` says which of the two.
+    With 0 it was heard just now.
     """
 
     at_us: int
     why: str = ""
+    heard_us: int = 0
 
 
 class LinkBack(Frozen, frozen=True):

@@ -46,6 +46,7 @@ class Vehicle(Flight):
             self._activity, self.landed = Activity.REST, Landed.ON_GROUND
         else:
             self._activity = Activity.FALL
+            self.landed = Landed.ON_GROUND  # autopilots call a vehicle landed that is disarmed, wherever it is
         self.events.append(event)
         if self.handling.after_landing is not None and not self.in_air:
             self.mode = self.handling.after_landing

@@ -184,6 +184,8 @@ class Recorded:
             self._receive(self._beat)
 
     def _answer_clock(self, at_us: int, ts1_ns: int) -> None:
+        if self._now_us - self._alive_us > SILENT_US:
+            return
         boot_us = at_us - self.round_trip_us // 2 + max(self._boots)
         answer = mavlink.MAVLink_timesync_message(boot_us * 1_000, ts1_ns)
         self._take(self.driver.receive(Codec(1, 1).pack(answer), self._now_us).events)

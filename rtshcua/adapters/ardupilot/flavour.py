@@ -35,7 +35,7 @@ _ARM_US = 8_000_000
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
 #: link time within which a climb, a leg, a return (it hovers over home for 5 s) and a landing get a metre further
-_CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 20_000_000, 15_000_000
+_CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 45_000_000, 15_000_000
 _GUIDED = frozenset({modes.GUIDED})
 _POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
 
@@ -71,7 +71,7 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                 *others,
             ]  # fmt: skip
         case MotionKind.HOME:
-            return _down(system, modes.RETURN, Expected(homeward, _RETURNS_US))
+            return _down(system, modes.RETURN, Expected(homeward, _RETURNS_US, either_way=True))
         case MotionKind.LAND:
             return _down(system, modes.LAND, Expected(to_the_ground, _LANDS_US))
         case _:
@@ -129,6 +129,7 @@ ARDUPILOT = Flavour(
     stages=stages,
     estimator="EKF_STATUS_REPORT",
     natural=frozenset(),
+    ours=frozenset({modes.GUIDED, modes.HOLD, modes.RETURN}),
     mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
     bytewise=False,

@@ -31,10 +31,10 @@ from rtshcua.onboard.ports import Command
 _MODE_US = 5_000_000
 _ARM_US = 8_000_000
 #: link time within which a climb, a leg, a return and a landing get a metre further
-_CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 20_000_000, 15_000_000
+_CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 45_000_000, 15_000_000
 #: mm: how far from where it is it may say that it takes off, or that it will come to stand;
 _TAKES_OFF, _STOPS = 20_000, 10_000
-_STOPS_S = 3  # and how many seconds' way further, if it moves
+_STOPS_S = 3  # and how many seconds' way further, and what braking at 1 m/s^2 takes, if it moves
 _HOLD = frozenset({modes.HOLD})
 
 
@@ -58,7 +58,7 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                 for latitude, longitude in zip(command.geo[::2], command.geo[1::2], strict=True)
             ]
         case MotionKind.HOME:
-            return _down(system, modes.RETURN, modes.SUB_RETURN, Expected(homeward, _RETURNS_US))
+            return _down(system, modes.RETURN, modes.SUB_RETURN, Expected(homeward, _RETURNS_US, either_way=True))
         case MotionKind.LAND:
             return _down(system, modes.LAND, modes.SUB_LAND, Expected(to_the_ground, _LANDS_US))
         case _:
@@ -89,7 +89,8 @@ def _climb(command: Command, seen: Observed, system: int) -> list[Stage]:
 
 def _stop(seen: Observed, system: int) -> Stage:
     """Not DO_SET_MODE: in Hold already, flying to a place, PX4 acknowledges that and flies on (vehicles.md 5)."""
-    within = _STOPS + _STOPS_S * (seen.speed or 0)
+    speed = seen.speed or 0
+    within = _STOPS + _STOPS_S * speed + speed * speed // 2_000
     here = Target(seen.latitude, seen.longitude, None, within) if seen.located else None
     stop = messages.stop_here(system)
     return Stage(stop, messages.REPOSITION, None, _HOLD, _MODE_US, powered=True, target=here, stops=True)
@@ -111,6 +112,7 @@ PX4 = Flavour(
     stages=stages,
     estimator="ESTIMATOR_STATUS",
     natural=frozenset({(modes.TAKEOFF, modes.HOLD)}),
+    ours=frozenset({modes.TAKEOFF, modes.HOLD, modes.RETURN}),
     mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     bytewise=True,

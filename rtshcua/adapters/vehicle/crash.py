@@ -7,10 +7,11 @@ from typing import Final
 
 from rtshcua.adapters.vehicle.observed import Observed
 
-#: mm above home: motors that stop higher than this were not stopped by a landing. Lower, the report of the landing may
-#: still be on its way.
+#: mm above home: motors that stop higher than this, without a landing before, did not stop for one
 ABOVE: Final = 3_000
-#: us for which motors off, or a tilt, must be seen: two reports may come in either order
+#: us: how old the last report of its flight may be when they stop; after a silence it may have landed meanwhile
+RECENT_US: Final = 2_000_000
+#: us between two reports of a tilt, of which a single one proves nothing
 LASTS_US: Final = 400_000
 #: mm/s: no landing comes down so fast,
 FALLS: Final = 3_000
@@ -30,7 +31,7 @@ class CrashWatch:
     def __init__(self) -> None:
         self._flown = False
         self._told = False
-        self._unpowered_us: int | None = None
+        self._flew: tuple[int, int, bool] | None = None  # when it was last seen to, how high, and whether to land
         self._tilted_us: int | None = None
         self._fell: tuple[int, int] | None = None  # when, and how fast it came down
         self._impact: tuple[int, int] | None = None
@@ -46,22 +47,23 @@ class CrashWatch:
         return how
 
     def _motors(self, seen: Observed, now_us: int) -> str | None:
-        if seen.armed or not seen.airborne or seen.height < ABOVE:
-            self._unpowered_us = None
+        """Autopilots call a vehicle landed that is disarmed: what counts is how it flew when it was last seen armed."""
+        if seen.armed:
+            if seen.airborne and seen.levelled:
+                self._flew = now_us, seen.height, seen.landing
             return None
-        if self._unpowered_us is None:
-            self._unpowered_us = now_us
-        if now_us - self._unpowered_us < LASTS_US:
+        flew, self._flew = self._flew, None
+        if flew is None or now_us - flew[0] > RECENT_US or flew[1] < ABOVE or flew[2]:
             return None
-        return f"its motors stopped {seen.height // 1_000} m above home"
+        return f"its motors stopped {flew[1] // 1_000} m above home"
 
     def _attitude(self, seen: Observed, now_us: int) -> str | None:
-        if seen.tilt < TILTED:
+        if seen.tilt < TILTED or not (seen.armed or seen.airborne):
             self._tilted_us = None
             return None
         if self._tilted_us is None:
-            self._tilted_us = now_us
-        return f"it leans {seen.tilt} degrees" if now_us - self._tilted_us >= LASTS_US else None
+            self._tilted_us = seen.tilt_us
+        return f"it leans {seen.tilt} degrees" if seen.tilt_us - self._tilted_us >= LASTS_US else None
 
     def _fall(self, seen: Observed, now_us: int) -> str | None:
         if seen.descent >= FALLS:

@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle.datum import NoDatum
 from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
 from rtshcua.adapters.vehicle.flavour import Flavour, Message, Stages, mode_name
 from rtshcua.adapters.vehicle.link import Heard, Link
-from rtshcua.adapters.vehicle.link_watch import LinkWatch
+from rtshcua.adapters.vehicle.link_watch import SILENT, UNANSWERED, LinkWatch
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Manoeuvre
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.preflight import HEEDED, Preflight
@@ -80,6 +80,7 @@ class Driver:
         self._commander = Commander(slack)
         self._aids: Aids | None = None
         self._manoeuvre: Manoeuvre | None = None
+        self._others: str | None = None  # what showed that somebody else flies it: nothing of ours is begun any more
         self._unsent: int | None = None  # the token of a command of which no frame left yet
         self._moving = False  # a frame that moves the vehicle is among those to be packed
         self._watch = LinkWatch(slack)
@@ -157,7 +158,7 @@ class Driver:
         send += self._ask(now_us)
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
-            events.append(Ready(now_us))
+            events.append(Ready(now_us, self._flown_by_others()))
         events += self._notes(now_us)
         send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         return events, self._pack(send, now_us, events)
@@ -169,6 +170,8 @@ class Driver:
         """
         if self._flavour is None or self._aids is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
+        if self._others is not None:  # also where this was on its way while the takeover showed
+            return [Failed(now_us, command.token, "taken-over", self._others)], []
         self.link.begin()
         before = frozenset[int]() if self._manoeuvre is None else self._manoeuvre.modes
         try:
@@ -237,6 +240,7 @@ class Driver:
         crashed = self._crash.look(self._seen, now_us)
         if crashed is not None:
             events.append(Crashed(now_us, crashed))
+            self._others = "crashed"
         match name:
             case "HEARTBEAT":
                 self._watch_mode(before, now_us, events)
@@ -279,7 +283,8 @@ class Driver:
         if self._manoeuvre is not None or self._released or not self._seen.airborne or mode is None or flavour is None:
             return
         if before not in (None, mode) and (before, mode) not in flavour.natural:
-            events.append(TakenOver(now_us, mode_name(flavour, mode)))
+            self._others = mode_name(flavour, mode)
+            events.append(TakenOver(now_us, self._others))
 
     def _prepare(self, now_us: int) -> list[Message]:
         """On the ground, before it is ready: what has to be settled with the vehicle."""
@@ -300,10 +305,21 @@ class Driver:
 
     def _look(self, now_us: int, events: list[Event]) -> None:
         """Whether the link is up, and how long it was so far."""
+        was = self._watch.down
         if self._watch.look(now_us):
-            why = self._watch.down
-            events.append(LinkBack(now_us) if why is None else LinkLost(now_us, why))
+            events += self._link_changed(was, self._watch.down, now_us)
         self._seen.up_us = self._watch.up_us
+
+    def _link_changed(self, was: str | None, down: str | None, now_us: int) -> list[Event]:
+        """What is made of it: one that is heard and does not hear us may still be sent what stops it."""
+        events: list[Event] = []
+        if SILENT in (was, down):
+            events.append(LinkBack(now_us) if was == SILENT else LinkLost(now_us, SILENT, self._watch.heard_us or 0))
+        if UNANSWERED in (was, down):
+            events.append(
+                Noted(now_us, "it is heard, but answers nothing" if down == UNANSWERED else "it answers again")
+            )
+        return events
 
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
         """Go on with the manoeuvre; where a frame of it waits for the mode, ask at once."""
@@ -318,6 +334,9 @@ class Driver:
         self._moving = self._moving or bool(out)
         send += out
         events += happened
+        for event in happened:
+            if isinstance(event, TakenOver):
+                self._others = event.how
         if manoeuvre.waits:
             send += self._ask(now_us)
 
@@ -337,13 +356,24 @@ class Driver:
         manoeuvre.over = True
         return [Failed(now_us, manoeuvre.token, "broken-manoeuvre", str(error))]
 
+    def _flown_by_others(self) -> str:
+        """How it flies already, if nothing of ours would make it; what lands is left to it."""
+        seen, flavour = self._seen, self._flavour
+        if not seen.airborne or flavour is None or seen.mode is None:
+            return ""
+        if seen.landing:
+            return "landing"
+        return "" if seen.mode in flavour.ours else mode_name(flavour, seen.mode)
+
     def _is_ready(self, now_us: int) -> bool:
         seen = self._seen
-        if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us) or self._mute:
+        if self.link.crowd is not None or not seen.ready or not self._streams.settled(now_us):
             return False
         if seen.airborne:
             return True
-        return self.source.unready is None and (self._preflight is None or self._preflight.unready is None)
+        if self._mute is not None or self.source.unready is not None:
+            return False
+        return self._preflight is None or self._preflight.unready is None
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""

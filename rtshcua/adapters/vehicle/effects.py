@@ -93,9 +93,8 @@ def to_the_ground(seen: Observed) -> tuple[int, ...] | None:
 
 
 def homeward(seen: Observed) -> tuple[int, ...] | None:
-    """The way to where it took off from, and up or down: a return climbs first, then crosses, then descends."""
+    """Where it is: a return climbs first, then crosses, to home or to a rally point, then descends; but it moves."""
     if not (seen.located and seen.levelled and seen.airborne):
         return None
-    began = seen.began
-    away = 0 if began is None else round(apart(seen.latitude, seen.longitude, *began))
-    return away, seen.height, -seen.height
+    east = seen.longitude * _MM_PER_UNIT * cos(radians(seen.latitude / 1e7))
+    return round(seen.latitude * _MM_PER_UNIT), round(east), seen.height

@@ -55,10 +55,10 @@ class Flavour:
     """An autopilot: its name, the names of its modes, how it is made to do each kind of motion, and its own ways.
 
     `estimator` is the message in which its estimator reports. `natural` are changes of mode (from, to) that it makes
-    in the course of what it was told. `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is
-    older (the link's delay comes on top): what the fastest report of the mode that it really gives allows. `returns`
-    are parameters of which one is there. `bytewise`: integer parameters travel as their bytes. `fence` says how it
-    takes a geofence.
+    in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay.
+    `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
+    top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
+    there. `bytewise`: integer parameters travel as their bytes. `fence` says how it takes a geofence.
     """
 
     name: str
@@ -67,6 +67,7 @@ class Flavour:
     stages: Stages
     estimator: str
     natural: frozenset[tuple[int, int]]
+    ours: frozenset[int]
     mode_within_us: int
     returns: tuple[ReturnAltitude, ...]
     bytewise: bool

@@ -20,7 +20,8 @@ class LinkWatch:
 
     def __init__(self, slack: int = 1) -> None:
         self._slack = slack
-        self._heard_us: int | None = None
+        #: when it was last heard
+        self.heard_us: int | None = None
         self._unanswered_us: int | None = None  # since when a question stands open
         self._seen_us: int | None = None
         self._up_us = 0
@@ -36,7 +37,7 @@ class LinkWatch:
 
     def heard(self, now_us: int) -> None:
         """A frame of the autopilot came."""
-        self._heard_us = now_us
+        self.heard_us = now_us
 
     def asked(self, now_us: int) -> None:
         """Something was asked that the autopilot answers."""
@@ -49,16 +50,16 @@ class LinkWatch:
 
     def look(self, now_us: int) -> bool:
         """Let time pass; True when the link went down, or came up again, since the last look."""
-        if self._heard_us is None:
+        if self.heard_us is None:
             return False
         if self._seen_us is not None and self.down is None:
-            self._up_us += now_us - self._seen_us
+            self._up_us += min(now_us - self._seen_us, SILENT_US * self._slack)  # we may have been held up ourselves
         self._seen_us = now_us
         was, self.down = self.down, self._why(now_us)
         return (was is None) != (self.down is None)
 
     def _why(self, now_us: int) -> str | None:
-        if self._heard_us is not None and now_us - self._heard_us > SILENT_US * self._slack:
+        if self.heard_us is not None and now_us - self.heard_us > SILENT_US * self._slack:
             # What was asked meanwhile could not be answered; the question is put anew when it is heard again.
             self._unanswered_us = None
             return SILENT

@@ -23,6 +23,9 @@ UNKNOWN: Final = "unknown/no-answer"
 MODE_UNKNOWN_US: Final = 5_000_000
 #: mm: a vehicle that holds, and is further than this from where it came to stand, does not hold
 HOLDS_WITHIN: Final = 15_000
+#: so long after it accepted a mode, in us of link time, and so many heartbeats, the mode shows
+TAKEN_BACK_US: Final = 1_500_000
+TAKEN_BACK_BEATS: Final = 2
 #: these stop the vehicle, or bring it home or down: they leave on the last mode report, while it is young
 _URGENT: Final = (MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
@@ -64,6 +67,7 @@ class Manoeuvre:
         self._modes: frozenset[int] = frozenset()
         self._was_landing = seen.landing
         self._taken = False
+        self._accepted: tuple[int, int] | None = None  # when the present stage was, and after how many heartbeats
         self.over = False
         #: until then `advance` has nothing to say, unless something is observed or acknowledged
         self.due_us = 0
@@ -146,7 +150,7 @@ class Manoeuvre:
         self._waits, self._entered_us = False, seen.up_us
         self._aids.mode.sent()
         target = self._left[0].target
-        if target is not None or self._command.kind in _HOMEWARD:  # else it is what it was: a mode, a speed, an arming
+        if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
             self._aids.targets.expect(target, seen)
         if self._left[0].spare and self._is_done(seen):
             return []
@@ -155,11 +159,13 @@ class Manoeuvre:
     def _again(self, seen: Observed, now_us: int) -> list[Message]:
         """The message once more, where it needs to be: never of a target that the autopilot flies to."""
         commander, stage = self._commander, self._left[0]
-        if self._waits or (stage.command is None and stage.target is not None and self._aids.targets.shown):
+        goes = self._aids.targets.shown or (self._progress is not None and self._progress.shown)
+        if self._waits or (stage.command is None and goes):
             return []
         if seen.up_us < commander.due_us or not self._may_send(seen, now_us):
             return []
         self._aids.mode.sent()
+        self._aids.targets.told_again()
         return commander.due(seen.up_us)
 
     def _due_us(self, seen: Observed, now_us: int) -> int:
@@ -207,7 +213,7 @@ class Manoeuvre:
             self._stands = seen.latitude, seen.longitude
         if seen.located and self._stands is not None:
             away = apart(seen.latitude, seen.longitude, *self._stands)
-            if away > HOLDS_WITHIN and not still(seen):
+            if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)):
                 return "did-not-hold"
         return None
 
@@ -223,12 +229,22 @@ class Manoeuvre:
             return None
         if seen.mode in self._modes:
             self._before = frozenset()
-        elif seen.mode not in self._before:
+        elif seen.mode not in self._before or self._was_taken_back(seen):
             return mode_name(self._flavour, seen.mode)
         self._was_landing = self._was_landing and seen.landing
         if seen.landing and not homeward and not self._was_landing:
             return "landing"
         return "another target" if self._aids.targets.is_foreign(seen) else None
+
+    def _was_taken_back(self, seen: Observed) -> bool:
+        """Whether our mode was accepted, and another shows in several reports since: somebody chose it again."""
+        if not self._commander.accepted or self._commander.refused is not None or self._waits:
+            self._accepted = None
+            return False
+        if self._accepted is None:
+            self._accepted = seen.up_us, seen.beats
+        accepted_us, beats = self._accepted
+        return seen.up_us - accepted_us > TAKEN_BACK_US and seen.beats - beats >= TAKEN_BACK_BEATS
 
     def _failure(self, seen: Observed) -> str | None:
         """Why the present stage cannot be waited for any longer, as a slug."""

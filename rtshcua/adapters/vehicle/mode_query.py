@@ -13,8 +13,10 @@ from rtshcua.adapters.vehicle.observed import Observed
 
 #: An unanswered question is put again after this long.
 AGAIN_US: Final = 100_000
-#: While nothing of ours flies it is asked this often, to know that it answers at all.
+#: While nothing of ours flies it is asked this often, to know that it answers at all;
 IDLE_US: Final = 1_000_000
+#: and while something does, where the mode is streamed fast enough.
+STREAMED_US: Final = 300_000
 
 
 class ModeQuery:
@@ -47,7 +49,7 @@ class ModeQuery:
         elif not flies:
             every_us = IDLE_US
         elif seen.heartbeat_us is not None and now_us - seen.heartbeat_us < self._within_us // 2:
-            every_us = IDLE_US  # it is streamed fast enough
+            every_us = STREAMED_US
         else:
             every_us = self._within_us // 2
         if self._asked_us is not None and now_us - self._asked_us < every_us:

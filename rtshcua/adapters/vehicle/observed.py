@@ -28,8 +28,8 @@ class Observed:
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
     so now, of a position that is not old. `target` is where the autopilot says that it flies to: latitude, longitude,
-    mm above mean sea level. `began` is the place where it last stood. `descent` is how fast it sinks and `tilt` how
-    many degrees it leans, whoever vouches for that. `beats` counts heartbeats; `up_us` is link time, see `LinkWatch`.
+    mm above mean sea level. `descent` is how fast it sinks and `tilt` how many degrees it leans (`tilt_us`: told then),
+    whoever vouches for that. `beats` counts heartbeats; `up_us` is link time, see `LinkWatch`.
     `notes` collects what an operator should know.
     """
 
@@ -46,8 +46,8 @@ class Observed:
     speed: int | None = None
     descent: int = 0
     tilt: int = 0
+    tilt_us: int = 0
     target: tuple[int, int, int] | None = None
-    began: tuple[int, int] | None = None
     fix: int = 0
     prearm: bool = False
     unwell: tuple[str, ...] = ()
@@ -90,7 +90,7 @@ class Observed:
                 if message.coordinate_frame in _ABOVE_SEA and isfinite(message.alt):
                     self.target = message.lat_int, message.lon_int, round(message.alt * 1_000)
             case "ATTITUDE":
-                self.tilt = _tilt(message.roll, message.pitch)
+                self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
             case "GPS_RAW_INT":
                 self.fix = message.fix_type
             case "SYS_STATUS":
@@ -186,8 +186,6 @@ class Observed:
             self.height = message.relative_alt
             if self.located:
                 self.home_amsl = datum.home_amsl_mm(message.alt, message.relative_alt)
-        if self.located and self.down:
-            self.began = self.latitude, self.longitude
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
         # from cm/s; without a speed that the estimator knows, it does not count as still
         self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None

@@ -24,10 +24,14 @@ Measure = Callable[[Observed], tuple[int, ...] | None]
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """How a stage shows its progress: some part of `measure` falls by `LEAST` within `within_us` of link time."""
+    """How a stage shows its progress: some part of `measure` falls by `LEAST` within `within_us` of link time.
+
+    `either_way`: that it changes is enough. A return climbs, crosses and descends, to a place that the autopilot knows.
+    """
 
     measure: Measure
     within_us: int
+    either_way: bool = False
 
 
 class Progress:
@@ -37,6 +41,9 @@ class Progress:
         self._expected = expected
         self._best: tuple[int, ...] | None = None
         self._since_us: int | None = None
+        self._began_us: int | None = None
+        #: whether there was any progress yet
+        self.shown = False
 
     @property
     def due_us(self) -> int | None:
@@ -48,11 +55,22 @@ class Progress:
         left = self._expected.measure(seen)
         if left is None or self._best is None or self._since_us is None:
             self._best, self._since_us = left, None if left is None else seen.up_us
+            self._began_us = seen.up_us if self._began_us is None else self._began_us
             return False
-        if any(best - now >= LEAST for best, now in zip(self._best, left, strict=True)):
-            self._best, self._since_us = left, seen.up_us
+        if self._has_come_further(self._best, left):
+            self._best, self._since_us, self.shown = left, seen.up_us, True
             return False
+        if (
+            not self.shown
+            and self._has_come_further(left, self._best)
+            and seen.up_us - (self._began_us or 0) <= self._expected.within_us
+        ):
+            self._best, self._since_us = left, seen.up_us  # at first it may have to turn round
         return seen.up_us - self._since_us > self._expected.within_us
+
+    def _has_come_further(self, best: tuple[int, ...], left: tuple[int, ...]) -> bool:
+        changes = [before - now for before, now in zip(best, left, strict=True)]
+        return max(map(abs, changes) if self._expected.either_way else changes) >= LEAST
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +113,14 @@ class Stop:
     def has_failed(self, seen: Observed, *, obeyed: bool) -> bool:
         """Whether it is faster than it may be by now, or moves when it must stand still.
 
-        `obeyed`: the command was acknowledged, or its mode shows. A speed that is not known is none that fell; one that
-        was not known at first is taken for the first known.
+        `obeyed`: the command was acknowledged, or its mode shows. The speed that it must lose is the greatest until its
+        effect must show. A speed that is not known is none that fell.
         """
-        if self._speed is None:
-            self._speed = seen.speed
-        if self._since_us is None:
-            self._since_us = seen.up_us if obeyed else None
+        if self._since_us is None and obeyed:
+            self._since_us = seen.up_us
+        if self._since_us is None or seen.up_us - self._since_us <= self._brakes.reaction_us + LAG_US:
+            if seen.speed is not None:  # it may have been told to stop while it still gathered speed
+                self._speed = max(self._speed or 0, seen.speed)
             return False
         passed_us, speed = seen.up_us - self._since_us, self._speed or 0
         if passed_us > self._brakes.stands_us(speed):

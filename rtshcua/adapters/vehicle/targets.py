@@ -49,6 +49,8 @@ class Targets:
         self._expected: Target | None = None
         self._prior: Reported | None = None
         self._settled_us = 0
+        self._wide: Target | None = None  # the present target as it was expected, where the vehicle names it itself
+        self._more = 0  # how often it may name another, for it was told again
         #: whether the autopilot was seen to fly to the present target
         self.shown = False
 
@@ -60,9 +62,14 @@ class Targets:
         """
         settles_us = 0 if self.shown else SETTLES_US
         self._expected, self.shown = target, False
+        self._wide, self._more = target if target is not None and target.within > SAME else None, 0
         self._prior, self._settled_us = seen.target, seen.up_us + settles_us
         if target is not None:
             self._ours.append(target)
+
+    def told_again(self) -> None:
+        """The present target went out once more: each time that it stops anew, it stops somewhere else."""
+        self._more += 1
 
     def is_foreign(self, seen: Observed) -> bool:
         """Whether it flies to somebody else's target."""
@@ -74,9 +81,15 @@ class Targets:
         if expected.matches(reported):
             self._show(expected, reported)
             return False
+        if self.shown and self._more and self._wide is not None and self._wide.matches(reported):
+            self._more, self.shown = self._more - 1, False
+            self._show(self._wide, reported)
+            return False
+        if self.shown:
+            return True
         if any(ours.matches(reported) for ours in self._ours if ours is not expected):
-            return False  # a report that was under way
-        return self.shown or seen.up_us >= self._settled_us
+            return False  # not obeyed yet
+        return seen.up_us >= self._settled_us
 
     def _show(self, expected: Target, reported: Reported) -> None:
         if not self.shown and expected.within > SAME:  # this is the one, from now on

@@ -5,9 +5,13 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Craft:
-    """Whether it is ready, armed and in the air (None: it has not said), and whether it ever flew."""
+    """Whether it is ready, armed and in the air (None: it has not said), and whether it ever flew.
+
+    `others`: how it flew when it was ready, if nothing of ours makes it fly so.
+    """
 
     ready: bool = False
+    others: str = ""
     armed: bool | None = None
     airborne: bool | None = None
     flown: bool = False

@@ -73,7 +73,7 @@ class Happenings:
                 conduct.monitor.update(event)
                 conduct.fresh = True
             case Ready():
-                conduct.craft.ready = True
+                conduct.craft.ready, conduct.craft.others = True, event.others
             case AirState():
                 conduct.link.air_reported()
                 self._air(now, event)
@@ -181,7 +181,7 @@ class Happenings:
         conduct, link = self._conduct, self._conduct.link
         if isinstance(event, LinkLost):
             takes_off = conduct.dispatcher.active is not None and conduct.craft.airborne is not True
-            if not link.lost(now.monotonic_us, takes_off=takes_off):
+            if not link.lost(now.monotonic_us, event.heard_us or now.monotonic_us, takes_off=takes_off):
                 return
             self._journal.effect(now, "link-lost", detail=event.why)
         elif (down_us := link.back(now.monotonic_us)) is not None:

@@ -46,16 +46,19 @@ class Link:
         self._awaited: frozenset[int] = frozenset()
         self._awaits_air = False
 
-    def lost(self, now_us: int, *, takes_off: bool) -> bool:
-        """The link is lost. `takes_off`: it was on the ground, under a command. False if the link was down already."""
+    def lost(self, now_us: int, heard_us: int, *, takes_off: bool) -> bool:
+        """The link is lost: the vehicle was last heard at `heard_us`, and what was current then will be awaited.
+
+        `takes_off`: it was on the ground, under a command. False if the link was down already.
+        """
         if self.down:
             return False
         self.down = True
-        self._lost_us = now_us
+        self._lost_us = heard_us
         if self._since_us is None:
-            self._since_us = self._waits_us = now_us
+            self._since_us = self._waits_us = heard_us
         self._standing_us = now_us if self._standing_us is None else self._standing_us
-        self._awaited |= self._monitor.current(now_us)
+        self._awaited |= self._monitor.current(heard_us)
         self._awaits_air = self._awaits_air or takes_off
         return True
 

@@ -102,6 +102,10 @@ class Turns:
                 return conduct.come_down(now)
             return False
         conduct.journal.effect(now, "ready")
+        if conduct.resumed and craft.airborne and craft.others:  # while this program was gone somebody took it
+            conduct.journal.effect(now, "taken-over", detail=craft.others)
+            conduct.stand_down(now, Ending.STOOD_DOWN)
+            return False
         if conduct.resumed and craft.airborne:
             conduct.journal.effect(now, "resumed")
             conduct.fall_back(CONTINGENCY_LINK)

@@ -18,11 +18,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Failed, Succeeded, TakenOver
+from rtshcua.onboard.ports import Failed, Ready, Succeeded, TakenOver
 from rtshcua.simulation.faults import Fault, LinkDelay, PilotGoto, PilotMode, PilotPause, PilotSticks
 from rtshcua.simulation.modes import Mode
+from virtual.policy import POLICY
 
 Make = Callable[..., Any]
 ASKS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
@@ -142,6 +144,47 @@ def test_our_own_targets_are_nobody_elses(flyer: Make) -> None:
     assert isinstance(one.fly(MotionKind.FLY, (0, 0), altitude=30_000, speed=8_000), Succeeded)
     assert isinstance(one.fly(MotionKind.HOME), Succeeded)
     assert not any(isinstance(event, TakenOver) for event in one.events)
+
+
+def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(flyer: Make, flavour: str) -> None:
+    one = flyer().up()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(5)
+    sent = Sent(one)
+    one.begin(MotionKind.HOME)
+    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, OLD[flavour]))
+    one.until((TakenOver, Failed), 4)
+    taken = [event for event in one.events if isinstance(event, (TakenOver, Failed))]
+    assert isinstance(taken[0], TakenOver), taken
+    before = len(sent.at_us)
+    one.wait(10)
+    assert len(sent.at_us) == before
+
+
+OLD = {"px4": Mode.LOITER, "ardupilot": Mode.GUIDED}
+
+
+def test_nothing_is_begun_once_somebody_else_flies(flyer: Make) -> None:
+    """Neither what waited for its record while the takeover showed, nor anything after it."""
+    one = flyer().up()
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.until(TakenOver, 3)
+    sent = Sent(one)
+    assert one.fly(MotionKind.HOME).reason == "taken-over"
+    assert sent.at_us == []
+
+
+@pytest.mark.parametrize(("mode", "others"), [(Mode.POSITION, True), (Mode.LAND, True), (Mode.LOITER, None)])
+def test_a_program_that_begins_in_the_air_says_who_flies(
+    flyer: Make, flavour: str, mode: Mode, others: bool | None
+) -> None:
+    """PX4 loiters for us too; ArduCopter's LOITER is a pilot's."""
+    one = flyer().up()
+    one.vehicle.simulation.inject(PilotMode(0, mode))
+    one.wait(1)
+    one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
+    ready = one.until(Ready, 20)
+    assert bool(ready.others) == (flavour == "ardupilot" if others is None else others)
 
 
 # ---------------------------------------------------------------- interleavings

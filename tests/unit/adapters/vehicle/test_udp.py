@@ -120,7 +120,7 @@ def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
     assert [event.token for event in poll(link) if isinstance(event, Sent)] == [9]
     kept = [Codec(1, 1).parse(frame)[0].name for _, frame in link.kept]  # type: ignore[attr-defined]
     assert kept[0] == "HEARTBEAT"
-    assert "COMMAND_LONG" in kept
+    assert "COMMAND_INT" in kept, "PX4 is stopped by a DO_REPOSITION"
 
 
 def test_a_busy_port_is_an_os_error(link: UdpVehicle) -> None:
@@ -200,6 +200,7 @@ def test_what_is_waited_for_is_acted_on_as_it_comes(
     vehicle.beat()
     poll(link)
     poll(link)
+    vehicle.answers_time(link)
     both = [mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, left) for left in (57, 56)]
 
     def taken() -> list[int | None]:

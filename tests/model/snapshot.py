@@ -30,6 +30,7 @@ from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.craft import Craft
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.onboard.runtime.happenings import Happenings
 from rtshcua.onboard.runtime.inbox import Inbox
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.queue import InvocationQueue
@@ -54,6 +55,7 @@ _ONCE = (PreparedInvocation, PreparedPolicy, Recorder, Limits, Enum, type, Funct
 _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     Admission: ("_last", "_repeated", "recent"),
     Inbox: ("_refused_us", "_unrecorded"),
+    Happenings: ("_gap",),
     SoftwareBoundary: ("_now_us",),
     StateMonitor: ("_state", "_held"),
 }
@@ -163,6 +165,8 @@ class _Comparison:
         self._unread: dict[type, tuple[str, ...]] = {}
         self._stands = range(0)
         self._seen: dict[int, int] = {}
+        self._alike: dict[int, int] = {}
+        self._values: dict[Any, int] = {}
 
     def plain(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> Any:
         self._now_us = now_us
@@ -198,7 +202,7 @@ class _Comparison:
         if issubclass(kind, Enum):
             return lambda thing: (name, thing.name)
         if fixed(kind):
-            return lambda thing: ("shared", self._refer(thing))
+            return self._shared
         if issubclass(kind, (set, frozenset)):
             return self._members
         if issubclass(kind, dict):
@@ -250,6 +254,14 @@ class _Comparison:
     def _row(self, thing: Any) -> Any:
         rules = self._rules
         return tuple([rules[type(each)](each) if type(each) in rules else self._of(each) for each in thing])
+
+    def _shared(self, thing: Any) -> Any:
+        """What never changes, by its value: a replacement that is opened twice says the same."""
+        number = self._alike.get(id(thing))
+        if number is None:
+            self._refer(thing)  # and it stays where it is
+            number = self._alike[id(thing)] = self._values.setdefault(thing, len(self._values))
+        return "shared", number
 
     def _members(self, thing: Any) -> Any:
         """A set; of serials, those that can still be asked for."""

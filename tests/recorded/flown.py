@@ -87,7 +87,10 @@ class Recorded:
             while self._now_us < entry.at_us:
                 next_us = min(entry.at_us, self._now_us + TICK_US)
                 self._pass(next_us, waiting)
-            self._alive_us = self._now_us if entry.frame[6] == 1 else self._alive_us
+            if entry.frame[6] == 1:
+                if self._now_us - self._alive_us > SILENT_US:
+                    self._boots.clear()  # its clock may have stood still meanwhile
+                self._alive_us = self._now_us
             self._receive(entry.frame)
 
     @property

@@ -16,7 +16,7 @@ from reference.naive_expression import Names, World, truth
 from reference.random_expressions import ENUMERATIONS, PHASES, STEP, ZONES, Maker
 from rtshcua.decision.evaluate import NO_PHASE, Environment, Tables, build
 from rtshcua.decision.places import WellKnown
-from rtshcua.decision.prepared import Limit, PreparedMonitor
+from rtshcua.decision.prepared import Latest, Limit, PreparedMonitor
 from rtshcua.decision.scope import Scope as CodeScope
 from rtshcua.decision.scope import scope_of
 from rtshcua.decision.temporal import initial, observe
@@ -150,7 +150,8 @@ def lowered(node: Condition) -> Lowered | None:
     )
     cells = {cell: CHOICE if name == "look" else QUANTITY for name, cell in cells_of(symbols.skills["probe"]).items()}
     condition = built(clause.code, code_scope._replace(cells=(cells,)))
-    policy = SimpleNamespace(policy=flat, monitors=prepared, limits=(Limit(10**9, MAX_VALUE),) * slots.count)
+    limits = (Limit(10**9, MAX_VALUE),) * slots.count
+    policy = SimpleNamespace(policy=flat, monitors=prepared, limits=limits, latest=Latest())
     return Lowered(policy, condition, clause.code)
 
 

@@ -143,6 +143,6 @@ ALL = (
     _little("degrade", _STEPS, ("good", "low"), *WORST, "interrupted", degrade=True),
     _little("recall", (TAKEOFF, HOME), ("good", "windy"), *LINK, documents=("recall",)),
     _little("approval", (TAKEOFF, GOTO), ("good",), *WORST, confirm=True, documents=("granted", "refused")),
-    _little("waiting", (TAKEOFF, GOTO), ("good",), *LINK, "silence", confirm=True, documents=("granted",), **_HOLDS),
+    _little("waiting", (TAKEOFF, GOTO), ("good",), *LINK, confirm=True, documents=("granted",), **_HOLDS),
     _little("replacement", _STEPS, ("good",), *WORST, documents=("replaced", "recall")),
 )

@@ -83,7 +83,8 @@ def test_anchors_that_the_log_itself_holds_count() -> None:
     whole = signed([*before[: number + 1], effect, *before[number + 1 :]])
     assert audited(whole).report.failure is None
     assert audited(whole).report.anchored == number + 1
-    wrong = edit(effect, detail=mark(note_of(lines, number)).replace("1", "2", 1))
+    good = mark(note_of(lines, number))
+    wrong = edit(effect, detail=f"{good[:-20]}{'A' if good[-20] != 'A' else 'B'}{good[-19:]}")  # in the cosignature
     assert audited(signed([*before[: number + 1], wrong, *before[number + 1 :]])).report.anchored == 0
 
 

@@ -44,7 +44,7 @@ def test_every_kind_of_flight(faults: tuple[Fault, ...], kind: str, mode: Mode) 
     entries = kept(flight)
     found, frames = joined(flight.fly().lines, entries)
     assert found is None
-    assert frames.count >= 3
+    assert frames.count >= 2, "arm, take off: what is so already is not asked for"
 
 
 def test_a_flight_that_was_interrupted() -> None:
@@ -60,4 +60,4 @@ def test_a_flight_that_was_interrupted() -> None:
         return (Interrupted(now_us),)
 
     found, frames = joined(flight.fly(each).lines, entries)
-    assert (found, frames.count > 3) == (None, True)
+    assert (found, frames.count >= 3) == (None, True)

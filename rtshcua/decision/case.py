@@ -53,12 +53,15 @@ def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     A state of the wrong size is a fault of whoever made it; nothing of it is believed. The same goes for the truths of
     temporal monitors, where there are too few or too many, or one is no truth.
     """
+    return remembered(state, policy, now).sets
+
+
+def remembered(state: State, policy: PreparedPolicy, now: Now) -> Seen:
+    """This situation, with what was answered about it so far."""
     seen = policy.latest.seen
-    if seen is not None and seen.now == now and seen.state == state:
-        return seen.sets
-    sets = _situation(state, policy, now)
-    policy.latest.seen = Seen(state, now, sets, [], [], [])
-    return sets
+    if seen is None or seen.now != now or seen.state != state:
+        seen = policy.latest.seen = Seen(state, now, _situation(state, policy, now), [], [], [])
+    return seen
 
 
 def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:

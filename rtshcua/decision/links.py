@@ -8,7 +8,7 @@ the airspace already, as far as its position error tells, may always go home.
 from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.airspace import keeps
-from rtshcua.decision.case import environment, situation
+from rtshcua.decision.case import environment, remembered, situation
 from rtshcua.decision.evaluate import NO_PHASE, Environment
 from rtshcua.decision.lasting import longest
 from rtshcua.decision.link import Choice as Choice
@@ -31,14 +31,11 @@ def choose_fallback(
 
     Pass the index of the link that failed or whose time is over as `after`: the choice never goes backwards.
     """
-    sets = situation(state, policy, now)
-    seen = policy.latest.seen
-    if seen is None or seen.sets is not sets:
-        return next(fallbacks(invocation, sets, policy, after, exact=True))
+    seen = remembered(state, policy, now)
     for known, known_after, choice in seen.choices:
         if known is invocation and known_after == after:
             return choice
-    choice = next(fallbacks(invocation, sets, policy, after, exact=True))
+    choice = next(fallbacks(invocation, seen.sets, policy, after, exact=True))
     seen.choices.append((invocation, after, choice))
     return choice
 

@@ -161,7 +161,7 @@ class Relay(threading.Thread):
 def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
     relay = Relay(port)
     relay.start()
-    ground.start("sim", "--port", str(relay.port), "--speed", "20", "--json").until("ready")
+    ground.start("sim", "--port", str(relay.port), "--speed", "5", "--json").until("ready")
     run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY).end()
     assert run.code == 0, run.stderr
     closed(run, "completed")

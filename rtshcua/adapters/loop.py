@@ -26,7 +26,6 @@ from rtshcua.onboard.ports import (
     Failed,
     Noted,
     Release,
-    Show,
     Vehicle,
 )
 
@@ -36,15 +35,15 @@ WAIT_US = 50_000
 HELD_WAIT_US = 300
 
 
-#: what is recorded and shown, and does nothing to the vehicle
-_TOLD = (Append, Show, Announce)
-
-
 class Stepped(Protocol):
     """The runtime, as far as the loop knows it."""
 
-    def step(self, now: Now, events: Sequence[Event]) -> Sequence[Action]:
-        """What to do at `now` after these events."""
+    def react(self, now: Now, events: Sequence[Event]) -> Dispatch | None:
+        """Take in these events; a command of those that follow that may be sent before all else."""
+        ...
+
+    def actions(self, now: Now) -> Sequence[Action]:
+        """What to do at `now` after these events, in its order."""
         ...
 
     def prepare(self, now: Now) -> None:
@@ -67,18 +66,6 @@ class _Held(NamedTuple):
 
     dispatch: Dispatch
     record: _Record
-
-
-def _reflex(actions: Sequence[Action]) -> Dispatch | None:
-    """A command that waits for no record and comes first of all that is done to the vehicle: it is sent before the
-    records are handed to the sink. They are chained already, and nothing that the sink says could keep it back.
-    """
-    for action in actions:
-        if isinstance(action, Dispatch):
-            return None if action.needs_record else action
-        if not isinstance(action, _TOLD):
-            return None
-    return None
 
 
 class Loop:
@@ -109,12 +96,12 @@ class Loop:
         answers, self._answers = self._answers, []
         now = self._clock.now()
         events = [*also, *answers, *seen]
-        actions = self._runtime.step(now, events)
-        reflex = _reflex(actions)
+        reflex = self._runtime.react(now, events)
         try:
             if reflex is not None:
                 self._send(reflex)
         finally:
+            actions = self._runtime.actions(now)
             ending = self._act(actions, reflex)
         self._watch(now, events, actions)
         self._runtime.prepare(now)

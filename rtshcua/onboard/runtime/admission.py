@@ -1,6 +1,8 @@
 """Admission: asks the boundary, and records each answer before anyone acts on it."""
 
 from collections import deque
+from collections.abc import Iterable
+from functools import partial
 
 from rtshcua.decision.durability import confirmed, durability_of
 from rtshcua.model.durability import WRITTEN
@@ -10,7 +12,7 @@ from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Announce, Show
+from rtshcua.onboard.ports import Action, Announce, Show
 from rtshcua.onboard.runtime.flight import Key
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.queue import InvocationQueue
@@ -82,34 +84,11 @@ class Admission:
         approvals = self._approvals.about(self._in_force.invocations[step].invocation, now) if kind == STEP else ()
         vehicle, version = self._loaded.vehicle, self._policy.version
         context = Context(binding, vehicle, version, answer.consumed, released_us, phase, remaining_us, approvals)
-        clause = self._clause(step, answer)
-        target = self._target(step, answer)
-        self._show(now, key, answer, "" if clause is None else clause.text)
         durability = WRITTEN
         if kind == STEP:
             contract = self._in_force.invocations[step].invocation.contract
             durability = durability_of(contract, answer.outcome, confirmed=confirmed(context), kind=kind)
-        self._journal.decision(
-            self._journal.ready(now).decision(
-                now,
-                kind=kind,
-                step=step,
-                link=link,
-                invocation=identity,
-                state=state,
-                context=context,
-                outcome=answer.outcome,
-                reason=answer.reason,
-                rule_step=answer.rule_step,
-                clause=None if clause is None else clause.text,
-                clause_at=None if clause is None else (clause.source, clause.start, clause.end),
-                target=None if target is None else target.text,
-                target_link=max(answer.target, -1),
-                valid_until_us=answer.valid_until_us,
-                durability=durability,
-            ),
-            durability,
-        )
+        self._journal.tell(partial(self._told, now, key, identity, state, context, answer, durability))
         return answer
 
     def flush(self, now: Now) -> None:
@@ -128,14 +107,42 @@ class Admission:
         own = own_clauses(self._in_force.invocations[step].invocation.contract)
         return own[answer.clause - len(self._shared)]
 
-    def _show(self, now: Now, key: Key, answer: Answer, clause: str) -> None:
+    def _told(
+        self, now: Now, key: Key, identity: bytes, state: State, context: Context, answer: Answer, durability: int
+    ) -> Iterable[Action]:
+        """An answer as it is shown, announced and recorded."""
+        kind, step, link = key
+        clause, target = self._clause(step, answer), self._target(step, answer)
+        yield from self._shown(now, key, answer, "" if clause is None else clause.text)
+        line = partial(
+            self._journal.recorder.decision,
+            now,
+            kind=kind,
+            step=step,
+            link=link,
+            invocation=identity,
+            state=state,
+            context=context,
+            outcome=answer.outcome,
+            reason=answer.reason,
+            rule_step=answer.rule_step,
+            clause=None if clause is None else clause.text,
+            clause_at=None if clause is None else (clause.source, clause.start, clause.end),
+            target=None if target is None else target.text,
+            target_link=max(answer.target, -1),
+            valid_until_us=answer.valid_until_us,
+            durability=durability,
+        )
+        yield from self._journal.record(line, now, durability, awaited=True)
+
+    def _shown(self, now: Now, key: Key, answer: Answer, clause: str) -> Iterable[Action]:
         subject = self._subject(*key)
         outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
         text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
-        self._journal.add(Show("decision", text, key[1]))
+        yield Show("decision", text, key[1])
         why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
-        self._journal.add(Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}"))
+        yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
 
     def _subject(self, kind: int, step: int, link: int) -> str:
         if kind == STEP:

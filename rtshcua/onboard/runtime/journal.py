@@ -1,62 +1,89 @@
 """The journal: turns what the runtime does into actions, each outcome as an evidence line before what it covers."""
 
+from collections.abc import Callable, Iterable
+from functools import partial
+
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Dispatch, Show
 
+#: makes what tells of something: its line, and what is shown of it
+Telling = Callable[[], Iterable[Action]]
+
 
 class Journal:
     """Collects the actions of one `Runtime.step`, in order. All lines carry the moment of that step.
 
-    An epoch that should have been sealed long ago is sealed before anything else is recorded.
+    What only tells of something is made when the actions are taken: a fallback is sent before (`reflex`). An epoch that
+    should have been sealed long ago is sealed before anything else is recorded.
     """
 
     def __init__(self, recorder: Recorder) -> None:
         self.recorder = recorder
-        self._actions: list[Action] = []
+        self._entries: list[Action | Telling] = []
+        self._first: Action | None = None  # of what is done, and not only told
+
+    @property
+    def reflex(self) -> Dispatch | None:
+        """The command that waits for no record, if it comes first of all that is done in this step: nothing that is
+        told could keep it back, so that it may be sent before.
+        """
+        first = self._first
+        return first if isinstance(first, Dispatch) and not first.needs_record else None
 
     def add(self, action: Action) -> None:
-        """Add an action."""
-        self._actions.append(action)
+        """Add something to be done."""
+        if self._first is None:
+            self._first = action
+        self._entries.append(action)
 
-    def ready(self, now: Now) -> Recorder:
-        """The recorder, for one line that is then added."""
+    def tell(self, telling: Telling) -> None:
+        """Add what only tells of something, by how it is made. It is called once, in its turn."""
+        self._entries.append(telling)
+
+    def record(self, line: Callable[[], bytes], now: Now, durability: int, *, awaited: bool) -> Iterable[Action]:
+        """One record, in the telling of something; `line` asks the recorder for it."""
         if self.recorder.overdue(now):
-            self.seal(now)
-        return self.recorder
-
-    def decision(self, line: bytes, durability: int) -> None:
-        """Add the line of a decision; a command that follows waits for it as its class of durability demands."""
-        self._actions.append(Append(line, durability))
-
-    def seal(self, now: Now) -> None:
-        """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""
-        self._actions.append(Append(self.recorder.seal(now), SYNCED_FIRST, awaited=False))
+            yield self._seal(now)
+        yield Append(line(), durability, awaited)
 
     def effect(
         self, now: Now, event: str, *, kind: int = -1, step: int = -1, link: int = -1, token: int = -1,
         detail: str = "", durability: int = WRITTEN,
     ) -> None:  # fmt: skip
         """Record something that happened, and show it. `detail` may be the world's own text."""
-        line = self.ready(now).effect(
-            now, event, kind=kind, step=step, link=link, token=token, detail=detail, durability=durability
-        )
-        self._actions.append(Append(line, durability, awaited=False))
-        self._actions.append(Show(event, detail, step))
+        line = partial(
+            self.recorder.effect,
+            now, event, kind=kind, step=step, link=link, token=token, detail=detail, durability=durability,
+        )  # fmt: skip
+        self._entries.append(partial(self._shown, line, now, durability, Show(event, detail, step)))
 
     def anchor(self, now: Now, note: str) -> None:
         """Record what a witness cosigned. It is for verifiers, and shown to nobody."""
-        line = self.ready(now).effect(now, ANCHORED, detail=note)
-        self._actions.append(Append(line, WRITTEN, awaited=False))
+        line = partial(self.recorder.effect, now, ANCHORED, detail=note)
+        self._entries.append(partial(self.record, line, now, WRITTEN, awaited=False))
 
-    def seal_when_idle(self, now: Now) -> None:
-        """Seal an epoch that is over, unless something is sent in this step."""
-        if self.recorder.due(now) and not any(isinstance(action, Dispatch) for action in self._actions):
-            self.seal(now)
-
-    def take(self) -> list[Action]:
-        """What was collected since the last call."""
-        actions, self._actions = self._actions, []
+    def take(self, now: Now, *, ended: bool) -> list[Action]:
+        """What was collected since the last call. An epoch that is over is sealed, unless something is sent; after the
+        end of the run the close is the seal.
+        """
+        entries, self._entries, self._first = self._entries, [], None
+        actions: list[Action] = []
+        for entry in entries:
+            if callable(entry):
+                actions += entry()
+            else:
+                actions.append(entry)
+        if not ended and self.recorder.due(now) and not any(isinstance(action, Dispatch) for action in actions):
+            actions.append(self._seal(now))
         return actions
+
+    def _shown(self, line: Callable[[], bytes], now: Now, durability: int, show: Show) -> Iterable[Action]:
+        yield from self.record(line, now, durability, awaited=False)
+        yield show
+
+    def _seal(self, now: Now) -> Append:
+        """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""
+        return Append(self.recorder.seal(now), SYNCED_FIRST, awaited=False)

@@ -6,7 +6,7 @@ from rtshcua.decision.links import look_ahead
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Ending, Event, Readings
+from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Readings
 from rtshcua.onboard.runtime.conduct import Conduct
 from rtshcua.onboard.runtime.flight import Limits, Stage
 from rtshcua.onboard.runtime.happenings import Happenings, last_words_first
@@ -46,6 +46,13 @@ class Runtime:
         one observation of the policy's temporal monitors, after what was received and before what is decided. Once the
         run ended, nothing is done any more.
         """
+        self.react(now, events)
+        return self.actions(now)
+
+    def react(self, now: Now, events: Sequence[Event]) -> Dispatch | None:
+        """The first half of a step: a command that is held for no record, and comes first of all that is to be done, so
+        that it may be sent before the records are made. `actions` has it once more, in its place.
+        """
         conduct, monitor, turns = self._conduct, self._conduct.monitor, self._turns
         for event in last_words_first(events):
             if isinstance(event, Readings) and conduct.stage is _RUNNING and monitor.hides(event):
@@ -56,9 +63,11 @@ class Runtime:
         monitor.observe(now)
         while turns.turn(now):
             pass
-        if conduct.stage is not _ENDED:  # then the close is the seal
-            self._journal.seal_when_idle(now)
-        return self._journal.take()
+        return self._journal.reflex
+
+    def actions(self, now: Now) -> list[Action]:
+        """The second half of a step, at the same moment: all that is to be done, in its order."""
+        return self._journal.take(now, ended=self._conduct.stage is _ENDED)
 
     def prepare(self, now: Now) -> None:
         """To be called after `step` when nothing else is to be done: what the running step's fallback would need where

@@ -45,6 +45,7 @@ class World:
         self.script = list(script)
         self.coming: list[Any] = []
         self.prepared: list[Any] = []
+        self.doing: Sequence[Any] = ()
         self.loop = Loop(self, self, self, self, lambda *seen: self.saw.append(seen))
 
     def now(self) -> Now:
@@ -79,9 +80,15 @@ class World:
     def close(self) -> None:
         pass
 
-    def step(self, now: Now, events: Sequence[Any]) -> Sequence[Any]:
+    def react(self, now: Now, events: Sequence[Any]) -> Dispatch | None:
         self.events = list(events)
-        return self.script.pop(0) if self.script else []
+        self.doing = self.script.pop(0) if self.script else []
+        done = [action for action in self.doing if not isinstance(action, Append | Show)]
+        first = done[0] if done else None
+        return first if isinstance(first, Dispatch) and not first.needs_record else None
+
+    def actions(self, now: Now) -> Sequence[Any]:
+        return self.doing
 
     def prepare(self, now: Now) -> None:
         self.prepared.append((now, len(self.did)))
@@ -192,7 +199,7 @@ def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
 def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
     world = held([Append(b"violated", WRITTEN), Dispatch(OTHER, 9_000, False)])
     world.loop.turn()
-    assert world.did == [("begin", 8), b"violated"]  # chained already, and handed over when the frame is on its way
+    assert world.did == [("begin", 8), b"violated"]  # recorded when the frame is on its way
     world.kept = 9
     world.loop.turn()
     assert world.did == [("begin", 8), b"violated"]

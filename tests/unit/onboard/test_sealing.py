@@ -10,7 +10,7 @@ from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Append, Command, Dispatch
+from rtshcua.onboard.ports import Append, Command, Dispatch, Release
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -29,44 +29,78 @@ def journal() -> Journal:
     return Journal(recorder)
 
 
-def told(journal: Journal) -> list[tuple[Any, int]]:
-    """Type or event of each line, and its class."""
-    lines = [(json.loads(each.line), each.durability) for each in journal.take() if isinstance(each, Append)]
+def told(journal: Journal, us: int) -> list[tuple[Any, int]]:
+    """Type or event of each line that is taken at a time, and its class."""
+    taken = journal.take(at(us), ended=False)
+    lines = [(json.loads(each.line), each.durability) for each in taken if isinstance(each, Append)]
     return [(record.get("event", record["type"]), durability) for record, durability in lines]
 
 
 def test_an_epoch_that_is_over_is_sealed_in_a_step_that_sends_nothing(journal: Journal) -> None:
-    journal.seal_when_idle(at(EPOCH_US - 1))
-    assert told(journal) == []
+    assert told(journal, EPOCH_US - 1) == []
     journal.add(DISPATCH)
-    journal.seal_when_idle(at(EPOCH_US))
-    assert told(journal) == []
+    assert told(journal, EPOCH_US) == []
     journal.effect(at(EPOCH_US), "succeeded")
-    journal.seal_when_idle(at(EPOCH_US))
-    assert told(journal) == [("succeeded", WRITTEN), ("seal", SYNCED_FIRST)]
-    journal.seal_when_idle(at(EPOCH_US + 1))
-    assert told(journal) == []
+    assert told(journal, EPOCH_US) == [("succeeded", WRITTEN), ("seal", SYNCED_FIRST)]
+    assert told(journal, EPOCH_US + 1) == []
+
+
+def test_an_epoch_is_not_sealed_when_the_close_is_to_follow(journal: Journal) -> None:
+    assert journal.take(at(EPOCH_US), ended=True) == []
 
 
 def test_an_epoch_that_is_long_over_is_sealed_before_anything_else(journal: Journal) -> None:
-    journal.effect(at(EPOCH_US + EPOCH_US // 5), "link-back")
-    assert told(journal) == [("seal", SYNCED_FIRST), ("link-back", WRITTEN)]
+    late = EPOCH_US + EPOCH_US // 5
+    journal.effect(at(late), "link-back")
+    assert told(journal, late) == [("seal", SYNCED_FIRST), ("link-back", WRITTEN)]
 
 
-def test_an_epoch_of_many_records_is_sealed_though_every_step_sends_something(journal: Journal) -> None:
-    for _ in range(EPOCH_RECORDS * 3):
+@pytest.mark.parametrize("in_a_step", [1, EPOCH_RECORDS // 3])
+def test_an_epoch_of_many_records_is_sealed_though_every_step_sends_something(journal: Journal, in_a_step: int) -> None:
+    lines: list[tuple[Any, int]] = []
+    for number in range(EPOCH_RECORDS * 3):
         journal.effect(at(1), "said")
         journal.add(DISPATCH)
-        journal.seal_when_idle(at(1))
-    seals = [number for number, (what, _) in enumerate(told(journal)) if what == "seal"]
+        if number % in_a_step == in_a_step - 1:
+            lines += told(journal, 1)
+    seals = [number for number, (what, _) in enumerate(lines) if what == "seal"]
     assert len(seals) == 2
     assert all(EPOCH_RECORDS <= number <= EPOCH_RECORDS * 5 // 4 * count for count, number in enumerate(seals, 1))
 
 
 def test_a_command_waits_for_its_decision_and_for_nothing_else(journal: Journal) -> None:
-    journal.effect(at(EPOCH_US * 2), "succeeded")
-    journal.decision(b"{}", SYNCED)
-    journal.effect(at(EPOCH_US * 2), "replaced")
-    lines = [action for action in journal.take() if isinstance(action, Append)]
+    late = at(EPOCH_US * 2)
+    journal.effect(late, "succeeded")
+    journal.tell(lambda: journal.record(lambda: b"{}", late, SYNCED, awaited=True))
+    journal.effect(late, "replaced")
+    lines = [action for action in journal.take(late, ended=False) if isinstance(action, Append)]
     assert [line.durability for line in lines if line.awaited] == [SYNCED]
     assert len(lines) == 4, "with the seal"
+
+
+@pytest.mark.parametrize(
+    ("before", "needs_record", "is_reflex"),
+    [((), False, True), ((), True, False), ((Release(),), False, False)],
+)
+def test_a_command_that_waits_for_nothing_is_a_reflex(
+    journal: Journal, before: tuple[Release, ...], needs_record: bool, is_reflex: bool
+) -> None:
+    for action in before:
+        journal.add(action)
+    journal.effect(at(1), "violated")
+    dispatch = Dispatch(DISPATCH.command, 1 << 40, needs_record)
+    journal.add(dispatch)
+    assert (journal.reflex is dispatch) is is_reflex
+    taken = journal.take(at(1), ended=False)
+    assert dispatch in taken, "in its place among all that is to be done"
+    assert journal.reflex is None
+
+
+def test_records_of_a_reflex_are_made_when_they_are_taken_and_not_before(journal: Journal) -> None:
+    before = journal.recorder.count
+    journal.effect(at(1), "violated")
+    journal.add(Dispatch(DISPATCH.command, 1 << 40, needs_record=False))
+    assert journal.reflex is not None
+    assert journal.recorder.count == before
+    journal.take(at(1), ended=False)
+    assert journal.recorder.count == before + 1

@@ -35,8 +35,9 @@ from rtshcua.cli.tape import Tape
 from rtshcua.cli.unlock import unlock
 from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.unheard import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
@@ -172,7 +173,7 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), peer_is_own_simulator=order.link is None,
     )  # fmt: skip
-    if isinstance(loaded, LoadRefusal):
+    if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)
         raise Refused(code, loaded.slug, loaded.text)
     return loaded

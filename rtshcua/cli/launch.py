@@ -20,7 +20,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
-from rtshcua.cli.faults import code_of
+from rtshcua.cli.faults import code_of, untrusted
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
@@ -89,8 +89,7 @@ def launch(order: Launch) -> ExitCode:
         root, signed_root, log_key = _trust(order, clock.now().utc_us)
         loaded = _load(order, bundle, root, clock)
     except Untrusted as error:
-        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-        raise Refused(code_of(error.slug), error.slug, str(error), help) from None
+        raise Refused(code_of(error.slug), *untrusted(error)) from None
     witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
@@ -175,7 +174,7 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     )  # fmt: skip
     if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)
-        raise Refused(code, loaded.slug, loaded.text)
+        raise Refused(code, *loaded)
     return loaded
 
 

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from rtshcua.cli.faults import code_of, fail
+from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.showing.bundle import claimed, replaced
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
@@ -31,13 +31,7 @@ def unpacked(data: bytes, name: str) -> Subject | ExitCode:
     try:
         bundle = claimed(data)
     except Untrusted as error:
-        code = code_of(error.slug)
-        return fail(
-            code,
-            f"{name}: {error}",
-            "accepted: a source (.rts, .json), a bundle, a log or a run's folder",
-            slug=error.slug,
-        )
+        return distrust(error, "accepted: a source (.rts, .json), a bundle, a log or a run's folder", where=f"{name}: ")
     return prepared(bundle.policy, bundle.mission)
 
 

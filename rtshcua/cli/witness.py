@@ -16,7 +16,7 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.witness_drop import Cosigned, NotCosigned, drop, logs_in
 from rtshcua.adapters.witness_link import WitnessLink
 from rtshcua.cli.faults import as_json as saying_json
-from rtshcua.cli.faults import distrust, exit_code_of, fail
+from rtshcua.cli.faults import distrust, exit_code_of, fail, refuse, untrusted
 from rtshcua.cli.interrupts import terminated_as_interrupted
 from rtshcua.cli.shown import many
 from rtshcua.cli.unlock import unlock
@@ -90,8 +90,7 @@ def witness(
                 ExitCode.REFUSED, str(error), "end that one, or give another witness key with `--key`", slug="in-use"
             )
         except Untrusted as error:
-            help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-            return distrust(error, help)
+            return refuse(untrusted(error))
         except KeyboardInterrupt:
             return ExitCode.OK if link is not None or watch is not None else ExitCode.INTERRUPTED
 

@@ -21,7 +21,7 @@ from rtshcua.cli.interrupts import terminated_as_interrupted
 from rtshcua.cli.shown import many
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.witnessing.witness import Answer, Refusal, Request
+from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
 from rtshcua.wire import cose
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
@@ -180,7 +180,7 @@ class _Desk:
         self._refused("log", str(found.log), found.slug, found.text, found.contradiction, found.proof)
         return ExitCode.ANCHOR if found.contradiction else ExitCode.EVIDENCE
 
-    def _consider(self, request: Request) -> Answer | Refusal:
+    def _consider(self, request: Request) -> Answer | Declined:
         origin, size = request.note.split("\n", 2)[:2]
         found = self._witness.consider(request)
         if isinstance(found, Answer):

@@ -21,9 +21,10 @@ from reference import flat_case as flat
 from rtshcua.decision.authority import authority
 from rtshcua.decision.case import Case, situation
 from rtshcua.decision.decide import decide
-from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation
+from rtshcua.decision.prepare import prepare, prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.verdict import PASSED
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan
@@ -145,14 +146,14 @@ def asked_of_authority(policy: PreparedPolicy, keys: list[Key]) -> Callable[[], 
 def prepared(invocation: flat.Invocation, policy: PreparedPolicy) -> PreparedInvocation:
     """An invocation that is known to be well-formed."""
     found = prepare_invocation(invocation, policy, flat.MISSION.phases)
-    assert not isinstance(found, Malformed), found
+    assert not isinstance(found, Refusal), found
     return found
 
 
 def loaded(policy: Policy) -> PreparedPolicy:
     """A policy that is known to be well-formed."""
     found = prepare(policy)
-    assert not isinstance(found, Malformed), found
+    assert not isinstance(found, Refusal), found
     return found
 
 

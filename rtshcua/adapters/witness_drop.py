@@ -13,7 +13,7 @@ from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.cosign import cosignatures
 from rtshcua.evidence.witnessing.submission import anchor
 from rtshcua.evidence.witnessing.survey import request_of, survey
-from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Refusal
+from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Declined
 
 _LOGS: Final = "*.jsonl"
 
@@ -54,7 +54,7 @@ def drop(log: Path, witness: FileWitness) -> Cosigned | NotCosigned:
     if isinstance(request, Flaw):
         return NotCosigned(log, request.slug, request.text, contradiction=True)
     answer = witness.consider(request)
-    if isinstance(answer, Refusal):
+    if isinstance(answer, Declined):
         proof = witness.store.contradicted(request.note) if answer.contradiction else None
         # all of the log is here, and the proof was made here of its lines: it is the log that does not go on from there
         unlike = answer.status in (CONFLICT, INCONSISTENT) and known is not None

@@ -8,7 +8,7 @@ import socket
 from collections.abc import Callable
 from typing import Final
 
-from rtshcua.evidence.witnessing.witness import MALFORMED, Answer, Refusal, Request, decode
+from rtshcua.evidence.witnessing.witness import MALFORMED, Answer, Declined, Request, decode
 from rtshcua.mavlink.frames import Codec
 from rtshcua.mavlink.tunnel import Assembler, answer_name, messages, name_of
 
@@ -22,7 +22,7 @@ _BUFFER: Final = 1 << 20
 #: the most datagrams that are taken in before anything else is looked at
 _BATCH: Final = 256
 
-Consider = Callable[[Request], Answer | Refusal]
+Consider = Callable[[Request], Answer | Declined]
 
 
 def listen(address: tuple[str, int]) -> socket.socket:
@@ -78,8 +78,8 @@ class WitnessLink:
 
     def _answer(self, name: bytes, data: bytes, asker: tuple[int, int], sender: tuple[str, int]) -> None:
         request = decode(data)
-        found = request if isinstance(request, Refusal) else self._consider(request)
-        if isinstance(found, Refusal):
+        found = request if isinstance(request, Declined) else self._consider(request)
+        if isinstance(found, Declined):
             if found.status == MALFORMED:
                 return  # nobody of ours sends such, and whoever does need not be answered
             found = found.answer()

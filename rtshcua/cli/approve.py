@@ -8,8 +8,8 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import WHERE, deliver, refuse, subject
-from rtshcua.cli.faults import fail
+from rtshcua.cli.documents import WHERE, deliver, subject
+from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Invocation
@@ -72,7 +72,7 @@ def approve(
         key = unlock(KeyStore(data_folder()), Duty.APPROVAL, path=approval_key, passphrase_file=passphrase_file)
         document = sign_approval(said, key)
     except Untrusted as error:
-        return refuse(error)
+        return refuse(untrusted(error))
     what = f"{'refused' if refused else 'approved'} as {role} for {seconds} s: step {step}, `{steps[step].text}`"
     return deliver(document, what, to=to, output=output, as_json=as_json)
 

@@ -3,36 +3,26 @@
 import os
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
-from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.paths import shown
 
 SOURCE, SPECIFICATION = ".rts", ".json"
 
 
-class Unusable(NamedTuple):
-    """Why a command ends before it begins, as `Findings.refuse` takes it."""
-
-    code: ExitCode
-    slug: str
-    message: str
-    help: str | None = None
-
-
-def unfolded(paths: Sequence[Path]) -> tuple[Path, ...] | Unusable:
+def unfolded(paths: Sequence[Path]) -> tuple[Path, ...] | Refusal:
     """The files that are meant, once each: of a folder all sources below it, but for hidden ones, in order."""
     files: dict[str, Path] = {}
     for path in paths:
         below = sorted(_below(path)) if path.is_dir() else [path]
         if not below:
-            return Unusable(ExitCode.INPUT, "no-source", f"there is no source ({SOURCE}) in `{path}`, nor below it")
+            return Refusal("no-source", f"there is no source ({SOURCE}) in `{path}`, nor below it")
         for each in below:
             files.setdefault(shown(str(each)), each)
     specifications = [path for path in files.values() if path.suffix.lower() == SPECIFICATION]
     if len(specifications) > 1 or (specifications and specifications[0] != paths[0]):
         help = "write it first; the sources after it are its policy's"
-        return Unusable(ExitCode.USAGE, "usage", "one specification (.json) is checked at a time", help)
+        return Refusal("usage", "one specification (.json) is checked at a time", help)
     return tuple(files.values())
 
 

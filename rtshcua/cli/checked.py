@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from rtshcua.cli.asked import Unusable, unfolded
+from rtshcua.cli.asked import unfolded
 from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.checking import Mission, check_all
 from rtshcua.cli.earlier import Earlier, earlier_policies
@@ -11,6 +11,7 @@ from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.programs import programs
 from rtshcua.cli.progress import watched
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 
 
 def check_sources(
@@ -24,11 +25,11 @@ def check_sources(
     """Report everything that is wrong with sources; see `rtshcua.cli.check`."""
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
     files = unfolded(paths)
-    if isinstance(files, Unusable):
-        return findings.refuse(*files)
+    if isinstance(files, Refusal):
+        return findings.end(files)
     earlier = Earlier("", ()) if since is None else earlier_policies(since)
-    if isinstance(earlier, Unusable):
-        return findings.refuse(*earlier)
+    if isinstance(earlier, Refusal):
+        return findings.end(earlier)
     found = check_all(watched(programs(files, tuple(with_))), earlier)
     code = exit_code(found.diagnostics) if findings.report(found.diagnostics, found.sources) else ExitCode.OK
     if code is ExitCode.OK and not as_json:

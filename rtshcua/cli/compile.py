@@ -9,7 +9,7 @@ import typer
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.bounds import bounds_told
-from rtshcua.cli.faults import code_of
+from rtshcua.cli.faults import untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with, write_whole
@@ -87,8 +87,7 @@ def compile(
         )
         data = sign(compiled.policy, compiled.mission, policy_key=signers[0], mission_key=signers[1])
     except Untrusted as error:
-        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-        return findings.refuse(code_of(error.slug), error.slug, str(error), help)
+        return findings.end(untrusted(error))
     write_whole(target, data)
     if not as_json:
         print(_told(compiled.policy, compiled.mission, target))

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from rtshcua import __version__
-from rtshcua.cli.asked import Unusable, unfolded
+from rtshcua.cli.asked import unfolded
 from rtshcua.cli.earlier import Earlier, earlier_policies
 from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
@@ -21,6 +21,7 @@ from rtshcua.cli.replacing import write_whole
 from rtshcua.cli.sources import examine, read_sources
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.program import Checked, compile_program
 from rtshcua.ground.handbook.cases import Tried
@@ -67,18 +68,17 @@ def docs(
     if made_at is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
     files = unfolded(paths)
-    if isinstance(files, Unusable):
-        return findings.refuse(*files)
-    if any(path.suffix.lower() == ".json" for path in files):
-        help = "name the policy that it is under, or a source with the mission"
-        return findings.refuse(ExitCode.USAGE, "usage", "a specification has no page of its own", help)
+    if isinstance(files, Refusal):
+        return findings.end(files)
     target = _target(output, paths[0], as_json)
-    refused = None if target is None else _refusal(target, files)
+    refused = _refusal(target, files)
     if refused is not None:
-        return findings.refuse(*refused)
+        return findings.end(refused)
+    if target is not None and not target.parent.is_dir():
+        return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
     earlier = Earlier("", ()) if since is None else earlier_policies(since)
-    if isinstance(earlier, Unusable):
-        return findings.refuse(*earlier)
+    if isinstance(earlier, Refusal):
+        return findings.end(earlier)
     asked = programs(files)
     checked = [examine(each.reading) for each in asked]
     sources: dict[str, Source] = {}
@@ -86,7 +86,7 @@ def docs(
         sources |= each.reading.program.sources
     imported = None if target is None else refusal(target, sources, "a page")
     if imported is not None:
-        return findings.refuse(*imported)
+        return findings.end(imported)
     trials = _trials(asked, files)
     found: dict[tuple[object, ...], Diagnostic] = {}
     versions = (
@@ -140,13 +140,14 @@ def _target(output: Path | None, first: Path, as_json: bool) -> Path | None:
     return Path(f"{first.resolve().name}.html") if first.is_dir() else first.with_suffix(".html")
 
 
-def _refusal(target: Path, files: Sequence[Path]) -> Unusable | None:
-    """Why a page cannot be written there."""
-    if not target.parent.is_dir():
-        return Unusable(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
-    if target.exists() and not target.is_file():
-        return Unusable(ExitCode.USAGE, "output", f"`{target}` is no regular file, and is not replaced by a page")
-    return refusal(target, files, "a page")
+def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
+    """Why there is no page of these files, or none is written there."""
+    if any(path.suffix.lower() == ".json" for path in files):
+        help = "name the policy that it is under, or a source with the mission"
+        return Refusal("usage", "a specification has no page of its own", help)
+    if target is not None and target.exists() and not target.is_file():
+        return Refusal("output", f"`{target}` is no regular file, and is not replaced by a page")
+    return None if target is None else refusal(target, files, "a page")
 
 
 class _Trials(NamedTuple):

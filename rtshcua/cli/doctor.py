@@ -21,7 +21,7 @@ from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
-from rtshcua.cli.faults import code_of, distrust, fail
+from rtshcua.cli.faults import code_of, distrust, fail, refuse
 from rtshcua.cli.meeting import PORT_HELP, unmet
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
@@ -93,8 +93,7 @@ def doctor(
             )
         stack.callback(socket.close)
         if not _listen(socket, vehicle, clock, seconds):
-            text, help = unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected)
-            return fail(ExitCode.LINK, text, help, slug="no-vehicle")
+            return refuse(unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected), ExitCode.LINK)
         findings = list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=clock.now().utc_error_us,

@@ -8,7 +8,7 @@ from rtshcua.adapters.agent_client import hand_in
 from rtshcua.adapters.files.durable import PRIVATE_FILE, naming
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
-from rtshcua.cli.faults import distrust, fail
+from rtshcua.cli.faults import fail
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import cose
@@ -16,7 +16,6 @@ from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, open_bundle
 from rtshcua.wire.document import MAX_DOCUMENT
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
-from rtshcua.wire.untrusted import Untrusted
 
 #: help for what a document may be handed to
 WHERE = "give `--to` (the flight's agent socket) or `--output`"
@@ -35,12 +34,6 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
         newer = open_replacement(document, root=trusted, vehicle=vehicle, bundle=found, now=now)
         found = fit_replacement(newer, found, released=0)
     return found
-
-
-def refuse(error: Untrusted) -> ExitCode:
-    """How a command ends that was given what is not to be trusted."""
-    help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-    return distrust(error, help)
 
 
 def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:

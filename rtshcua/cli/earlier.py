@@ -3,12 +3,11 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.cli.asked import SOURCE, SPECIFICATION, Unusable, unfolded
-from rtshcua.cli.faults import code_of
+from rtshcua.cli.asked import SOURCE, SPECIFICATION, unfolded
 from rtshcua.cli.programs import programs
 from rtshcua.cli.sources import examine
 from rtshcua.diagnostics.diagnostic import has_errors
-from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import MAX_BUNDLE
 from rtshcua.wire.untrusted import Untrusted
@@ -21,34 +20,33 @@ class Earlier(NamedTuple):
     policies: tuple[Policy, ...]
 
 
-def earlier_policies(path: Path) -> Earlier | Unusable:
+def earlier_policies(path: Path) -> Earlier | Refusal:
     """The policies of a bundle, whoever signed it, or of sources, which must be free of errors."""
     if not path.is_dir() and path.suffix.lower() not in (SOURCE, SPECIFICATION):
         return _bundled(path)
     files = unfolded([path])
-    if isinstance(files, Unusable):
+    if isinstance(files, Refusal):
         return files
     policies: list[Policy] = []
     for each in programs(files):
         checked = examine(each.reading)
         if has_errors(checked.diagnostics):
             message = f"`{each.name}` has errors, so nothing can be held against it"
-            return Unusable(ExitCode.INPUT, "since", message, f"`rtshcua check {path}` shows them")
+            return Refusal("since", message, f"`rtshcua check {path}` shows them")
         policies += [lowered.policy for lowered in checked.policies]
     return Earlier(str(path), tuple(policies))
 
 
-def _bundled(path: Path) -> Earlier | Unusable:
+def _bundled(path: Path) -> Earlier | Refusal:
     try:
         with path.open("rb") as opened:
             data = opened.read(MAX_BUNDLE + 1)
     except OSError as error:
         why = (error.strerror or "it is unreadable").lower()
-        return Unusable(ExitCode.INPUT, "since", f"cannot read `{path}`: {why}")
+        return Refusal("since", f"cannot read `{path}`: {why}")
     from rtshcua.cli.showing.bundle import claimed  # brings cryptography
 
     try:
         return Earlier(str(path), (claimed(data).policy,))
     except Untrusted as error:
-        code = code_of(error.slug)
-        return Unusable(code, error.slug, f"`{path}`: {error}", "accepted: a bundle, a source or a folder of sources")
+        return Refusal(error.slug, f"`{path}`: {error}", "accepted: a bundle, a source or a folder of sources")

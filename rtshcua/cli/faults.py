@@ -14,6 +14,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire.untrusted import Untrusted
 
 _json = ContextVar("json", default=False)  # whether this command was asked for JSON
@@ -27,6 +28,11 @@ _INPUT = {
     errno.E2BIG, errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.ENOTEMPTY, errno.ENXIO, errno.EPERM,
 }  # fmt: skip
+
+_NO_KEYS = "`rtshcua keys init` makes a development root"
+#: of what is refused for another reason than that it is not to be trusted, by slug
+_CODES = dict.fromkeys(("usage", "output"), ExitCode.USAGE)
+_CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "since"), ExitCode.INPUT)
 
 
 @contextmanager
@@ -45,24 +51,34 @@ def fail(code: ExitCode, message: str, help: str | None = None, *, slug: str | N
     `slug` is for programs, where there is a more exact one than the exit code's own.
     """
     if _json.get():
-        _print_object(code, slug or code.slug, message, help)
+        _print_object(code, slug or code.slug, message, help or None)
     return tell(code, message, help)
 
 
-def distrust(error: Untrusted, help: str | None = None, *, where: str = "") -> ExitCode:
+def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
     """Fails for something that is not to be trusted; `where` says what it was, before the text."""
-    return fail(code_of(error.slug), f"{where}{error}", help, slug=error.slug)
+    return refuse(Refusal(error.slug, f"{where}{error}", help))
+
+
+def untrusted(error: Untrusted) -> Refusal:
+    """What is not to be trusted, with what to do where it is that there are no keys at all."""
+    return Refusal(error.slug, str(error), _NO_KEYS if error.slug == "no-keys" else "")
+
+
+def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:
+    """Fails with a refusal, and with the exit code of its slug unless there is another."""
+    return fail(code or code_of(refusal.slug), refusal.text, refusal.help, slug=refusal.slug)
 
 
 def code_of(slug: str) -> ExitCode:
-    """The exit code for an `Untrusted`: what cannot be read at all is bad input, whoever signed it."""
-    return ExitCode.INPUT if slug == "malformed" else ExitCode.UNTRUSTED
+    """The exit code for a refusal or an `Untrusted`: what cannot be read at all is bad input, whoever signed it."""
+    return _CODES.get(slug, ExitCode.UNTRUSTED)
 
 
 def tell(code: ExitCode, message: str, help: str | None = None) -> ExitCode:
     """`fail` for a person alone: of a command that has told the program in its own way."""
     say(f"error: {message}")
-    if help is not None:
+    if help:
         say(f" help: {help}")
     return code
 

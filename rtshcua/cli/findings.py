@@ -6,10 +6,11 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rtshcua.cli.faults import fail, say
+from rtshcua.cli.faults import code_of, fail, say
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.serialise import as_json
 from rtshcua.diagnostics.span import Source
@@ -44,7 +45,11 @@ class Findings:
         """End with a refusal that is about no source."""
         if not self._json:
             return fail(code, message, help)
-        return self.finish(code, error={"slug": slug, "message": message, "help": help})
+        return self.finish(code, error={"slug": slug, "message": message, "help": help or None})
+
+    def end(self, refusal: Refusal) -> ExitCode:
+        """`refuse` for a value, whose slug says the exit code."""
+        return self.refuse(code_of(refusal.slug), *refusal)
 
     def finish(self, code: ExitCode, **result: Any) -> ExitCode:
         """End; with `json`, print everything."""

@@ -8,16 +8,16 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.project import Projects
-from rtshcua.cli.asked import SPECIFICATION, Unusable, unfolded
+from rtshcua.cli.asked import SPECIFICATION, unfolded
 from rtshcua.cli.faults import exit_code_of, say, tell, words_of
 from rtshcua.cli.findings import Findings
 from rtshcua.cli.formatting.each import Laid, of_file, of_text
 from rtshcua.cli.formatting.shown import difference
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.format.finding import not_formatted
 from rtshcua.ground.language.size import MAX_SIZE
-from rtshcua.ground.project.settings import Refused
 
 app = typer.Typer(add_completion=False)
 
@@ -63,14 +63,14 @@ def fmt(
         return findings.refuse(ExitCode.USAGE, "usage", "`--stdin-filename` is for `-`", "leave it out, or write `-`")
     skipped = [path for path in given if path.suffix.lower() == SPECIFICATION and not path.is_dir()]
     files = unfolded([path for path in given if path not in skipped])
-    if isinstance(files, Unusable):
-        return findings.refuse(*files)
+    if isinstance(files, Refusal):
+        return findings.end(files)
     if not as_json:
         for path in skipped:
             say(f"skipped {path}: a mission specification is JSON, for which others have formatters")
     wide = _widths(files, Projects(config, isolated=isolated))
-    if isinstance(wide, Refused):
-        return findings.refuse(ExitCode.INPUT, "configuration", str(wide), wide.help)
+    if isinstance(wide, Refusal):
+        return findings.end(wide)
     laid = []
     for path, width in wide:
         laid.append(of_file(path, width, write=not (check or diff)))
@@ -79,12 +79,12 @@ def fmt(
     return _told(findings, laid, check=check, diff=diff, quiet=diff, as_json=as_json)
 
 
-def _widths(files: Sequence[Path], projects: Projects) -> list[tuple[Path, int]] | Refused:
+def _widths(files: Sequence[Path], projects: Projects) -> list[tuple[Path, int]] | Refusal:
     """The files that no configuration excludes, and how wide their lines may be; before anything is written."""
     found = []
     for path in files:
         project = projects.of(path)
-        if isinstance(project, Refused):
+        if isinstance(project, Refusal):
             return project
         if not project.excludes(path, project.settings.format.exclude):
             found.append((path, project.settings.format.width))
@@ -94,8 +94,8 @@ def _widths(files: Sequence[Path], projects: Projects) -> list[tuple[Path, int]]
 def _standard_input(findings: Findings, name: Path | None, projects: Projects, *, check: bool, diff: bool) -> ExitCode:
     path = name or Path("stdin.rts")
     project = projects.of(path)
-    if isinstance(project, Refused):
-        return findings.refuse(ExitCode.INPUT, "configuration", str(project), project.help)
+    if isinstance(project, Refusal):
+        return findings.end(project)
     data = sys.stdin.buffer.read(MAX_SIZE + 1) if sys.stdin is not None else b""
     excluded = project.excludes(path, project.settings.format.exclude)
     laid = Laid(path.as_posix(), data, data) if excluded else of_text(path, data, project.settings.format.width)

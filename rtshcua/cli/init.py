@@ -12,6 +12,7 @@ import typer
 from rtshcua.adapters.files.laying import lay
 from rtshcua.cli.faults import fail, words_of
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.library import root
 
 app = typer.Typer(add_completion=False)
@@ -100,7 +101,7 @@ def _named_after(directory: Path) -> str:
 
 def _first_finding(files: Mapping[str, bytes]) -> str | None:
     """What the checker says of it: a name may be a word of the language, or that of something else."""
-    from rtshcua.cli.asked import Unusable, unfolded
+    from rtshcua.cli.asked import unfolded
     from rtshcua.cli.checking import check_all
     from rtshcua.cli.earlier import Earlier
     from rtshcua.cli.programs import programs
@@ -108,7 +109,7 @@ def _first_finding(files: Mapping[str, bytes]) -> str | None:
     with TemporaryDirectory(prefix="rtshcua-init-") as place:
         lay(files, Path(place))
         found = unfolded([Path(place)])
-        assert not isinstance(found, Unusable)
+        assert not isinstance(found, Refusal)
         checked = check_all(programs(found), Earlier("", ()))
     return None if not checked.diagnostics else checked.diagnostics[0].message
 

@@ -14,7 +14,7 @@ import typer
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.signing import fingerprint, write_link_key
-from rtshcua.cli.faults import code_of, fail
+from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
 from rtshcua.cli.unlock import read_passphrase
@@ -175,8 +175,7 @@ def _root(store: KeyStore) -> TrustRoot:
 
 
 def _refused(error: Untrusted) -> ExitCode:
-    help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-    return fail(ExitCode.INPUT if error.slug == "no-keys" else code_of(error.slug), str(error), help, slug=error.slug)
+    return refuse(untrusted(error), ExitCode.INPUT if error.slug == "no-keys" else None)
 
 
 def _new_passphrase(path: Path | None) -> bytes | None:

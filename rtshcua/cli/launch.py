@@ -20,7 +20,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
-from rtshcua.cli.faults import code_of
+from rtshcua.cli.faults import code_of, untrusted
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
@@ -35,8 +35,9 @@ from rtshcua.cli.tape import Tape
 from rtshcua.cli.unlock import unlock
 from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.unheard import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
@@ -88,8 +89,7 @@ def launch(order: Launch) -> ExitCode:
         root, signed_root, log_key = _trust(order, clock.now().utc_us)
         loaded = _load(order, bundle, root, clock)
     except Untrusted as error:
-        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-        raise Refused(code_of(error.slug), error.slug, str(error), help) from None
+        raise Refused(code_of(error.slug), *untrusted(error)) from None
     witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
@@ -172,9 +172,9 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), peer_is_own_simulator=order.link is None,
     )  # fmt: skip
-    if isinstance(loaded, LoadRefusal):
+    if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)
-        raise Refused(code, loaded.slug, loaded.text)
+        raise Refused(code, *loaded)
     return loaded
 
 

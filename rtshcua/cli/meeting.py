@@ -10,6 +10,7 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.signing import Signing
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.ports import Event
 
 #: How long a heartbeat is waited for, in seconds,
@@ -25,13 +26,13 @@ _KEY_HELP: Final = "has the vehicle the key of `--signing-key`, and are both clo
 _SYSTEM_HELP: Final = "`--system` names another id, or leave it out"
 
 
-def unmet(where: str, seconds: float, system: int | None, rejected: str | None) -> tuple[str, str]:
+def unmet(where: str, seconds: float, system: int | None, rejected: str | None) -> Refusal:
     """That no heartbeat came within so many seconds, and what to do. `rejected` is what came and was not believed."""
     of = where if system is None else f"system {system} of {where}"
     text = f"no heartbeat of {of} within {seconds:.0f} s"
     if rejected is not None:
-        return f"{text}: {rejected}", _KEY_HELP
-    return text, _HELP if system is None else _SYSTEM_HELP
+        return Refusal("no-vehicle", f"{text}: {rejected}", _KEY_HELP)
+    return Refusal("no-vehicle", text, _HELP if system is None else _SYSTEM_HELP)
 
 
 def meet(
@@ -48,7 +49,7 @@ def meet(
             raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
         if time.monotonic() > until_s:
             where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
-            raise Refused(ExitCode.LINK, "no-vehicle", *unmet(where, HEARTBEAT_S, system, signing.rejected))
+            raise Refused(ExitCode.LINK, *unmet(where, HEARTBEAT_S, system, signing.rejected))
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     until_s = time.monotonic() + (0 if link is None else ANOTHER_S)
     while time.monotonic() < until_s and vehicle.driver.link.crowd is None:

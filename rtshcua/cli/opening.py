@@ -10,6 +10,7 @@ from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, Opening
 
@@ -21,7 +22,7 @@ _POLL_S: Final = 0.05
 def flown_before(state: Path, loaded: Loaded) -> str | None:
     """Why the bundle would not be opened, in words; nothing of it is used up."""
     opening = _looked_up(state, loaded)
-    return None if opening is Opening.OPENED else _not_opened(loaded, opening)
+    return None if opening is Opening.OPENED else _not_opened(loaded, opening).text
 
 
 def _looked_up(state: Path, loaded: Loaded) -> Opening:
@@ -29,11 +30,14 @@ def _looked_up(state: Path, loaded: Loaded) -> Opening:
     return looked_up(state, loaded.vehicle, digest, loaded.expires_us, policy.name, policy.version)
 
 
-def _not_opened(loaded: Loaded, opening: Opening) -> str:
-    policy = loaded.bundle.policy
+def _not_opened(loaded: Loaded, opening: Opening) -> Refusal:
+    policy, vehicle = loaded.bundle.policy, loaded.vehicle
     if opening is Opening.OLD_POLICY:
-        return f"a later version of `{policy.name}` than {policy.version} was in force on `{loaded.vehicle}`"
-    return f"this bundle was opened before on `{loaded.vehicle}`: a bundle flies once"
+        text = f"a later version of `{policy.name}` than {policy.version} was in force on `{vehicle}`"
+        help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
+        return Refusal(opening, text, help)
+    text = f"this bundle was opened before on `{vehicle}`: a bundle flies once"
+    return Refusal(opening, text, "compile the mission again, which issues it anew")
 
 
 def broke_off(state: Path, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
@@ -45,14 +49,14 @@ def broke_off(state: Path, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock
     if opening is Opening.OPENED:
         return False
     if opening is Opening.OLD_POLICY:
-        raise _not_again(loaded, opening)
+        raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
     seen = vehicle.driver.seen
     until_s = time.monotonic() + AIR_S
     while not seen.landed_state and time.monotonic() < until_s:
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if seen.airborne:
         return True
-    raise _not_again(loaded, opening)
+    raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
 
 
 def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -> None:
@@ -69,11 +73,4 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -
         raise
     if opening is not Opening.OPENED:
         flight.refuse()
-        raise _not_again(loaded, opening)
-
-
-def _not_again(loaded: Loaded, opening: Opening) -> Refused:
-    help = "compile the mission again, which issues it anew"
-    if opening is Opening.OLD_POLICY:
-        help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
-    return Refused(ExitCode.REFUSED, opening, _not_opened(loaded, opening), help)
+        raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.cli.asked import SPECIFICATION as SPECIFICATION
-from rtshcua.cli.asked import Unusable as Unusable
 from rtshcua.cli.asked import roots
 from rtshcua.cli.asked import unfolded as unfolded
 from rtshcua.cli.sources import Reading, read_sources

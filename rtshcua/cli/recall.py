@@ -8,8 +8,8 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import WHERE, deliver, refuse, subject
-from rtshcua.cli.faults import fail
+from rtshcua.cli.documents import WHERE, deliver, subject
+from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.document import MAX_LIFE_US
@@ -50,6 +50,6 @@ def recall(
         key = unlock(KeyStore(data_folder()), Duty.APPROVAL, path=approval_key, passphrase_file=passphrase_file)
         document = sign_recall(said, key)
     except Untrusted as error:
-        return refuse(error)
+        return refuse(untrusted(error))
     name = f"all under `{flying.policy.name}`" if policy else f"`{flying.mission.name}`"
     return deliver(document, f"recalled {name} on `{vehicle}`", to=to, output=output, as_json=as_json)

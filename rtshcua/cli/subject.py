@@ -2,11 +2,12 @@
 
 from typing import NamedTuple
 
-from rtshcua.cli.faults import code_of, fail
+from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.showing.bundle import claimed, replaced
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.untrusted import Untrusted
@@ -30,22 +31,16 @@ def unpacked(data: bytes, name: str) -> Subject | ExitCode:
     try:
         bundle = claimed(data)
     except Untrusted as error:
-        code = code_of(error.slug)
-        return fail(
-            code,
-            f"{name}: {error}",
-            "accepted: a source (.rts, .json), a bundle, a log or a run's folder",
-            slug=error.slug,
-        )
+        return distrust(error, "accepted: a source (.rts, .json), a bundle, a log or a run's folder", where=f"{name}: ")
     return prepared(bundle.policy, bundle.mission)
 
 
 def prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
     """Both made ready, as on board."""
     ready = prepare(policy)
-    invocations = ready if isinstance(ready, Malformed) else prepare_mission(mission, ready)
-    if isinstance(ready, Malformed) or isinstance(invocations, Malformed):
-        what = ready.what if isinstance(ready, Malformed) else ""
+    invocations = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
+    if isinstance(ready, Refusal) or isinstance(invocations, Refusal):
+        what = ready.text if isinstance(ready, Refusal) else ""
         return fail(ExitCode.INPUT, f"this would be refused on board: {what}")
     return Subject(ready, mission, invocations)
 

@@ -9,14 +9,14 @@ from rtshcua.adapters.files.durable import naming
 from rtshcua.adapters.files.project import Projects
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
-from rtshcua.cli.programs import SPECIFICATION, Unusable, unfolded
+from rtshcua.cli.programs import SPECIFICATION, unfolded
 from rtshcua.cli.testing.generating import Wanted, generate
 from rtshcua.cli.testing.running import Results, run_all
 from rtshcua.cli.testing.told import Told
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.report.junit import junit
-from rtshcua.ground.project.settings import Refused
 from rtshcua.ground.testing.coverage.coverage import enough
 from rtshcua.ground.testing.report import coverage_json, suites, summary_json, tests_json
 
@@ -72,31 +72,31 @@ def run_tests(
         return findings.refuse(ExitCode.USAGE, "usage", "there is nothing to write without `--generate`", help)
     projects = Projects(config, isolated=isolated)
     files = _files(paths or [Path()], projects, keep=generating)
-    if isinstance(files, Unusable):
-        return findings.refuse(*files)
+    if isinstance(files, Refusal):
+        return findings.end(files)
     if generating:
         return generate(files, Wanted(policy, tuple(skill or ()), nominal, output, force), findings, quiet=as_json)
     refused = None if junit_file is None else refusal(junit_file, files, _REPORT)
     if refused is not None:
-        return findings.refuse(*refused)
+        return findings.end(refused)
     least = fail_under if fail_under is not None else _least(paths or [Path()], projects)
     results = run_all(files, chosen, with_coverage=coverage or least is not None)
     return _finish(results, findings, least, junit_file, verbose=verbose, quiet=as_json)
 
 
-def _files(paths: list[Path], projects: Projects, *, keep: bool) -> tuple[Path, ...] | Unusable:
+def _files(paths: list[Path], projects: Projects, *, keep: bool) -> tuple[Path, ...] | Refusal:
     """The sources that are meant, but for those that a configuration leaves out; `keep` says to keep these too."""
     files = unfolded(paths)
-    if isinstance(files, Unusable):
+    if isinstance(files, Refusal):
         return files
     left: list[Path] = []
     for path in files:
         if path.suffix.lower() == SPECIFICATION:
-            return Unusable(ExitCode.USAGE, "usage", f"`{path}` is a mission specification, and has no tests")
+            return Refusal("usage", f"`{path}` is a mission specification, and has no tests")
         project = projects.of(path)
-        if isinstance(project, Refused):
-            where = project.file if project.line is None else f"{project.file}:{project.line}"
-            return Unusable(ExitCode.INPUT, "configuration", f"`{where}`: {project.message}", project.help)
+        if isinstance(project, Refusal):
+            where, _, what = project.text.partition(": ")
+            return project._replace(text=f"`{where}`: {what}")
         if keep or path in paths or not project.excludes(path, project.settings.test.exclude):
             left.append(path)
     return tuple(left)
@@ -105,7 +105,7 @@ def _files(paths: list[Path], projects: Projects, *, keep: bool) -> tuple[Path, 
 def _least(paths: list[Path], projects: Projects) -> int | None:
     """The greatest of the thresholds that the configurations of what was asked for set."""
     found = [projects.of(path) for path in paths]
-    set_ = [one.settings.test.fail_under for one in found if not isinstance(one, Refused)]
+    set_ = [one.settings.test.fail_under for one in found if not isinstance(one, Refusal)]
     return max((each for each in set_ if each is not None), default=None)
 
 
@@ -116,7 +116,7 @@ def _finish(
     ran, covered = results.ran, results.covered
     refused = None if junit_file is None else refusal(junit_file, results.sources, _REPORT)
     if refused is not None:
-        return findings.refuse(*refused)
+        return findings.end(refused)
     told = Told(results.sources)
     if not quiet:
         for line in told.tests(ran, verbose=verbose):

@@ -84,7 +84,7 @@ def verify_log(
     try:
         pinned = pin(root)
     except Untrusted as error:
-        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else None
+        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
         return distrust(error, help, where="no root to trust: ")
     if explain is not None:
         from rtshcua.cli.explaining import explained

@@ -42,7 +42,7 @@ def verify_proof(
     try:
         pinned = pin(root)
     except Untrusted as error:
-        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else None
+        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
         return distrust(error, help, where="no root to trust: ")
     kept = None
     if checkpoint is not None:

@@ -9,7 +9,7 @@ import typer
 
 from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import fail, refuse
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.showing.page import Page, for_terminal
@@ -19,7 +19,8 @@ from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.subject import Subject, prepared, unpacked
 from rtshcua.cli.why_log import from_log
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.why.given import Refused, given
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.why.given import given
 from rtshcua.ground.why.nominal import lasting, nominal
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.situation import Context, Now
@@ -111,8 +112,8 @@ def _by_hand(
     for last in (False, True):  # what is set over time outweighs what follows from what is set of signals
         for setting in settings:
             changed = given(situation, setting, policy.policy)
-            if isinstance(changed, Refused):
-                return fail(ExitCode.USAGE, changed.what, changed.help)
+            if isinstance(changed, Refusal):
+                return refuse(changed)
             situation = changed
         if not last:
             situation = lasting(situation, policy, now)

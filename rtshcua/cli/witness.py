@@ -16,12 +16,12 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.witness_drop import Cosigned, NotCosigned, drop, logs_in
 from rtshcua.adapters.witness_link import WitnessLink
 from rtshcua.cli.faults import as_json as saying_json
-from rtshcua.cli.faults import distrust, exit_code_of, fail
+from rtshcua.cli.faults import distrust, exit_code_of, fail, refuse, untrusted
 from rtshcua.cli.interrupts import terminated_as_interrupted
 from rtshcua.cli.shown import many
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.witnessing.witness import Answer, Refusal, Request
+from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
 from rtshcua.wire import cose
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
@@ -90,8 +90,7 @@ def witness(
                 ExitCode.REFUSED, str(error), "end that one, or give another witness key with `--key`", slug="in-use"
             )
         except Untrusted as error:
-            help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
-            return distrust(error, help)
+            return refuse(untrusted(error))
         except KeyboardInterrupt:
             return ExitCode.OK if link is not None or watch is not None else ExitCode.INTERRUPTED
 
@@ -181,7 +180,7 @@ class _Desk:
         self._refused("log", str(found.log), found.slug, found.text, found.contradiction, found.proof)
         return ExitCode.ANCHOR if found.contradiction else ExitCode.EVIDENCE
 
-    def _consider(self, request: Request) -> Answer | Refusal:
+    def _consider(self, request: Request) -> Answer | Declined:
         origin, size = request.note.split("\n", 2)[:2]
         found = self._witness.consider(request)
         if isinstance(found, Answer):

@@ -6,8 +6,9 @@ the mission; a replacement puts its steps in the place of those that were not re
 
 from typing import Final, NamedTuple
 
-from rtshcua.decision.prepare import Malformed, prepare_mission
+from rtshcua.decision.prepare import prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.situation import Approval, Now
 from rtshcua.wire import names
@@ -150,6 +151,6 @@ class InForce:
 
     def _prepared(self, mission: Mission) -> tuple[PreparedInvocation, ...]:
         prepared = prepare_mission(mission, self._policy)
-        if isinstance(prepared, Malformed):
-            raise DocumentError("malformed", f"the mission does not make sense: {prepared.what}")
+        if isinstance(prepared, Refusal):
+            raise DocumentError("malformed", f"the mission does not make sense: {prepared.text}")
         return prepared

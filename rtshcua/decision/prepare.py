@@ -4,8 +4,6 @@ The bundle may come from the wrong people or be damaged, so everything that deci
 malformed is refused with a value that names it. Signatures, digests and bindings are verified before, by `wire`.
 """
 
-from typing import NamedTuple
-
 from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.decision.checks.policy import problems
 from rtshcua.decision.compiler import Compiler
@@ -25,6 +23,7 @@ from rtshcua.decision.reads import monitored, slots_read, where
 from rtshcua.decision.rules import RuleIndex
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner, flown_at
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import MAX_DURATION, MAX_GAP, MAX_VALUE
@@ -34,17 +33,11 @@ from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.zone import MAX_COORDINATE
 
 
-class Malformed(NamedTuple):
-    """Why a policy or a mission is refused: the first thing that is wrong with it."""
-
-    what: str
-
-
-def prepare(policy: Policy) -> PreparedPolicy | Malformed:
+def prepare(policy: Policy) -> PreparedPolicy | Refusal:
     """The policy, compiled, or what is wrong with it."""
     problem = next(problems(policy), None)
     if problem is not None:
-        return Malformed(problem)
+        return Refusal("malformed", problem)
     compiler = Compiler(policy)
     return PreparedPolicy(
         policy=policy,
@@ -63,29 +56,29 @@ def prepare(policy: Policy) -> PreparedPolicy | Malformed:
     )
 
 
-def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedInvocation, ...] | Malformed:
+def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedInvocation, ...] | Refusal:
     """The mission's invocations in order, compiled, or what is wrong with them."""
     problem = next(mission_checks.mission(mission, policy.policy), None)
     if problem is not None:
-        return Malformed(problem)
+        return Refusal("malformed", problem)
     prepared: list[PreparedInvocation] = []
     for step, invocation in enumerate(mission.invocations):
         found = prepare_invocation(invocation, policy, mission.phases)
-        if isinstance(found, Malformed):
-            return Malformed(f"step {step}: {found.what}")
+        if isinstance(found, Refusal):
+            return Refusal("malformed", f"step {step}: {found.text}")
         prepared.append(found)
     return tuple(prepared)
 
 
 def prepare_invocation(
     invocation: Invocation, policy: PreparedPolicy, phases: tuple[str, ...]
-) -> PreparedInvocation | Malformed:
+) -> PreparedInvocation | Refusal:
     """The invocation of a mission with these phases, compiled, or what is wrong with it. An argument out of range is
     for `decide` to refuse.
     """
     problem = next(mission_checks.invocation(invocation, policy.policy, policy.tables.zones), None)
     if problem is not None:
-        return Malformed(problem)
+        return Refusal("malformed", problem)
     compiler, contract, plan = policy.compiler, invocation.contract, invocation.plan
     candidates = policy.rules.candidates(invocation.skill, invocation.role, invocation.source)
     clauses = [*contract.require, *contract.assume, *contract.maintain]

@@ -4,9 +4,9 @@ from typing import Final
 
 import msgspec
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire import artefact, names
 from rtshcua.wire.artefact import ArtefactError
-from rtshcua.wire.response import Unusable
 
 #: what a document was
 UNKNOWN, APPROVAL, RECALL, REPLACEMENT = range(4)
@@ -40,10 +40,10 @@ def encode(receipt: Receipt) -> bytes:
     return artefact.wrap(names.RECEIPT, msgspec.to_builtins(receipt))
 
 
-def decode(data: bytes) -> Receipt | Unusable:
+def decode(data: bytes) -> Receipt | Refusal:
     """Read a receipt. Raises nothing."""
     try:
         receipt = msgspec.convert(artefact.unwrap(names.RECEIPT, data), Receipt)
     except (ArtefactError, msgspec.ValidationError) as error:
-        return Unusable(str(error))
-    return receipt if encode(receipt) == data else Unusable("not the octets that this receipt encodes to")
+        return Refusal("malformed", str(error))
+    return receipt if encode(receipt) == data else Refusal("malformed", "not the octets that this receipt encodes to")

@@ -16,6 +16,7 @@ from typing import Final
 
 import msgspec
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_STALE, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, names
@@ -56,12 +57,6 @@ class Request(msgspec.Struct, frozen=True):
     remaining_us: int
 
 
-class Malformed(msgspec.Struct, frozen=True):
-    """The answer to octets that are no request: which rule they break."""
-
-    text: str
-
-
 def encode(request: Request) -> bytes:
     """The request's octets. Raises `struct.error` for what no monitor and no clock makes."""
     state, now = request.state, request.now
@@ -83,30 +78,31 @@ def encode(request: Request) -> bytes:
     )
 
 
-def decode(data: bytes, slots: int, monitors: int) -> Request | Malformed:
-    """Read a request for a state of so many slots and temporal monitors. Accepts only the octets that `encode` makes;
-    raises nothing.
+def decode(data: bytes, slots: int, monitors: int) -> Request | Refusal:
+    """Read a request for a state of so many slots and temporal monitors, or say which rule its octets break. Accepts
+    only the octets that `encode` makes; raises nothing.
     """
     prefix, layout = _form(slots, monitors)
     if len(data) != len(prefix) + layout.size or not data.startswith(prefix):
         version = names.REQUEST.version
-        return Malformed(f"not a request of version {version} for a state of {slots} slots and {monitors} monitors")
+        what = f"not a request of version {version} for a state of {slots} slots and {monitors} monitors"
+        return Refusal("malformed", what)
     fields = layout.unpack_from(data, len(prefix))
     kind, step, link, binding, at_us, utc_us, utc_error_us, released_us, remaining_us, phase = fields[:_HEAD_FIELDS]
     if kind > CONTINGENCY_LINK or step < -1 or link < -1:
-        return Malformed("a kind, step or link out of range")
+        return Refusal("malformed", "a kind, step or link out of range")
     if max(at_us, utc_us, utc_error_us, released_us, remaining_us) > MAX_VALUE:
-        return Malformed("a time out of range")
+        return Refusal("malformed", "a time out of range")
     values: tuple[int | None, ...] = fields[_HEAD_FIELDS : _HEAD_FIELDS + slots]
     known = fields[_HEAD_FIELDS : _HEAD_FIELDS + slots]
     if UNKNOWN in known:
         values = tuple([None if value == UNKNOWN else value for value in known])
         known = tuple([value for value in known if value != UNKNOWN])
     if known and not -MAX_VALUE <= min(known) <= max(known) <= MAX_VALUE:
-        return Malformed("a state value out of range")
+        return Refusal("malformed", "a state value out of range")
     ages, said = fields[_HEAD_FIELDS + slots : _HEAD_FIELDS + 2 * slots], fields[_HEAD_FIELDS + 2 * slots :]
     if not _TRUTHS.issuperset(said):
-        return Malformed("what a monitor says is no truth")
+        return Refusal("malformed", "what a monitor says is no truth")
     now = Now(at_us, utc_us, utc_error_us)
     return Request(kind, step, link, binding, now, State(values, ages, said), released_us, phase, remaining_us)
 

@@ -10,6 +10,7 @@ from typing import Final
 
 import msgspec
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
@@ -53,12 +54,6 @@ class Answer(msgspec.Struct, frozen=True):
     permit: bytes = b""
 
 
-class Unusable(msgspec.Struct, frozen=True):
-    """Octets that are no response."""
-
-    text: str
-
-
 def shared_clauses(policy: Policy) -> tuple[Rule | Airspace, ...]:
     """What can decide any request, numbered by position: the rules, then the airspace if there is one."""
     return (*policy.rules, *(() if policy.airspace is None else (policy.airspace,)))
@@ -89,20 +84,20 @@ def encode_refusal(status: Status) -> bytes:
     return _WITHOUT_PERMIT + _HEAD.pack(status, 0, 0, 0, 0, 0, 0, 0)
 
 
-def decode(data: bytes) -> Answer | Status | Unusable:
-    """Read a response; a refusal is its status. Raises nothing."""
+def decode(data: bytes) -> Answer | Status | Refusal:
+    """Read a response; a refusal to decide is its status. Raises nothing."""
     prefix = _WITHOUT_PERMIT if len(data) == len(_WITHOUT_PERMIT) + _HEAD.size else _WITH_PERMIT
     start = len(prefix) + _HEAD.size
     if not data.startswith(prefix) or len(data) - start != (SIZE if prefix is _WITH_PERMIT else 0):
-        return Unusable(f"not a response of version {names.RESPONSE.version}")
+        return Refusal("malformed", f"not a response of version {names.RESPONSE.version}")
     status, outcome, reason, rule_step, *numbers = _HEAD.unpack_from(data, len(prefix))
     if status != Status.DECIDED:
         refused = Status(status) if status < len(Status) else None
         if refused is None or data != encode_refusal(refused):
-            return Unusable("a refusal with more than its status")
+            return Refusal("malformed", "a refusal with more than its status")
         return refused
     if outcome >= len(_OUTCOMES) or reason >= len(WIRE_REASONS):
-        return Unusable("an outcome or a reason that there is not")
+        return Refusal("malformed", "an outcome or a reason that there is not")
     clause, target, valid_until_us, consumed = numbers
     return Answer(
         _OUTCOMES[outcome], WIRE_REASONS[reason], rule_step, clause, target, valid_until_us, consumed, data[start:]

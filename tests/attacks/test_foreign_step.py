@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from reference.world import START, allowed, answer_to, loaded, request_for
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.executor import PermitRefusal
+from rtshcua.onboard.enforcement.executor import BACKWARDS, MISSION_OVER, OUT_OF_TURN
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.response import Answer, Status, decode
 
@@ -58,9 +58,9 @@ def test_a_step_out_of_turn_is_not_sent() -> None:
     first = allowed(of)
     second = allowed(of, step=1)
     assert isinstance(of.executor.dispatch(second, AT), Dispatch)
-    assert of.executor.dispatch(first, AT) is PermitRefusal.OUT_OF_TURN, "behind the one that runs"
+    assert of.executor.dispatch(first, AT) is OUT_OF_TURN, "behind the one that runs"
     of.executor.ended()
-    assert of.executor.dispatch(first, AT) is PermitRefusal.OUT_OF_TURN, "and behind the one that ran"
+    assert of.executor.dispatch(first, AT) is OUT_OF_TURN, "and behind the one that ran"
 
 
 def test_two_steps_never_run_at_once() -> None:
@@ -68,7 +68,7 @@ def test_two_steps_never_run_at_once() -> None:
     first = allowed(of)
     second = allowed(of, step=1)
     assert isinstance(of.executor.dispatch(first, AT), Dispatch)
-    assert of.executor.dispatch(second, AT) is PermitRefusal.OUT_OF_TURN
+    assert of.executor.dispatch(second, AT) is OUT_OF_TURN
 
 
 def test_no_step_follows_a_return_that_a_fallback_began() -> None:
@@ -78,13 +78,13 @@ def test_no_step_follows_a_return_that_a_fallback_began() -> None:
     of.executor.dispatch(first, AT)
     home = allowed(of, 2, -1, 1)
     assert isinstance(of.executor.dispatch(home, AT), Dispatch)
-    assert of.executor.dispatch(second, AT) is PermitRefusal.MISSION_OVER
+    assert of.executor.dispatch(second, AT) is MISSION_OVER
     hold = allowed(of, 2, -1, 0)
-    assert of.executor.dispatch(hold, AT) is PermitRefusal.BACKWARDS
+    assert of.executor.dispatch(hold, AT) is BACKWARDS
     again = allowed(of, 2, -1, 1)
     assert isinstance(of.executor.dispatch(again, AT), Dispatch), "the same link may be tried again"
     chain = allowed(of, 1, 1, 0)
-    assert of.executor.dispatch(chain, AT) is PermitRefusal.BACKWARDS, "from the contingency there is no way back"
+    assert of.executor.dispatch(chain, AT) is BACKWARDS, "from the contingency there is no way back"
 
 
 def test_a_chain_never_goes_backwards() -> None:
@@ -94,8 +94,8 @@ def test_a_chain_never_goes_backwards() -> None:
     permits = {link: allowed(of, 1, 1, link) for link in range(3)}
     earlier = allowed(of, 1, 1, 0)
     assert isinstance(of.executor.dispatch(permits[1], AT), Dispatch)
-    assert of.executor.dispatch(permits[0], AT) is PermitRefusal.BACKWARDS
-    assert of.executor.dispatch(earlier, AT) is PermitRefusal.BACKWARDS
+    assert of.executor.dispatch(permits[0], AT) is BACKWARDS
+    assert of.executor.dispatch(earlier, AT) is BACKWARDS
     assert isinstance(of.executor.dispatch(permits[2], AT), Dispatch)
 
 

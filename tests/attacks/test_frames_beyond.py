@@ -6,9 +6,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frames import HOME_MOVES, OURS, FrameRefusal, FrameSession
+from rtshcua.onboard.enforcement.frames import HOME_MOVES, NOT_COVERED, OURS, OUT_OF_ORDER, FrameSession
 from rtshcua.onboard.ports import Command
 
 AUTOPILOT, ADAPTER = Codec(1, 1), Codec(1, OURS)
@@ -54,7 +55,7 @@ def test_a_lie_about_home_in_flight_moves_no_height() -> None:
     opened = gate(PX4, MotionKind.CLIMB)
     for home in (HOME + 1_000_000, HOME - 1_000_000, HOME + HOME_MOVES + 1):
         opened.observe(at(*A, home=home))
-        assert opened.seal(takeoff((home + 20_000) / 1_000), AT) is FrameRefusal.NOT_COVERED
+        assert opened.seal(takeoff((home + 20_000) / 1_000), AT) is NOT_COVERED
         assert isinstance(opened.seal(takeoff(508.0), AT), bytes), "and what was true is true still"
 
 
@@ -62,7 +63,7 @@ def test_home_does_not_creep_away_by_small_lies() -> None:
     opened = gate(PX4, MotionKind.CLIMB)
     for home in range(HOME, HOME + 5 * HOME_MOVES, HOME_MOVES // 4):
         opened.observe(at(*A, home=home))
-    assert opened.seal(takeoff((HOME + 20_000 + 2 * HOME_MOVES) / 1_000), AT) is FrameRefusal.NOT_COVERED
+    assert opened.seal(takeoff((HOME + 20_000 + 2 * HOME_MOVES) / 1_000), AT) is NOT_COVERED
 
 
 def test_home_may_drift_a_little_and_be_settled_anew_by_the_next_takeoff() -> None:
@@ -81,10 +82,10 @@ def test_no_corner_is_cut_by_sending_the_whole_path_at_once(autopilot: int) -> N
     opened.observe(at(*C))
     first, second, third = (target(autopilot, point) for point in (A, B, C))
     assert opened.seal(first, AT) == first
-    assert opened.seal(second, AT) is FrameRefusal.OUT_OF_ORDER
+    assert opened.seal(second, AT) is OUT_OF_ORDER
     opened.observe(at(*A))
     assert opened.seal(second, AT) == second
-    assert opened.seal(third, AT) is FrameRefusal.OUT_OF_ORDER
+    assert opened.seal(third, AT) is OUT_OF_ORDER
     opened.observe(at(B[0] - 300, B[1] + 300))
     assert opened.seal(third, AT) == third
 
@@ -94,7 +95,7 @@ def test_who_never_says_where_it_is_is_sent_to_the_first_point_alone() -> None:
     opened.observe(says(mavlink.MAVLink_heartbeat_message(2, ARDUPILOT, 0, 0, 0, 3)))
     opened.open(Command(7, "skill", MotionKind.COVER, (), (*A, *B), 20_000, 0), 2 * AT)
     assert isinstance(opened.seal(target(ARDUPILOT, A), AT), bytes)
-    assert opened.seal(target(ARDUPILOT, B), AT) is FrameRefusal.OUT_OF_ORDER
+    assert opened.seal(target(ARDUPILOT, B), AT) is OUT_OF_ORDER
 
 
 @pytest.mark.parametrize("current", [1, 2, 3])
@@ -107,4 +108,4 @@ def test_no_item_of_a_fence_is_an_order_to_go_there(current: int) -> None:
         return ADAPTER.pack(mavlink.MAVLink_mission_item_int_message(1, 1, 0, 6, 5001, now, 1, 0, 0, 0, 0, *A, 9.0, 1))
 
     assert isinstance(opened.seal(item(0), AT), bytes)
-    assert isinstance(opened.seal(item(current), AT), FrameRefusal)
+    assert isinstance(opened.seal(item(current), AT), Refusal)

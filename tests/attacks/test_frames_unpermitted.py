@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from reference.flat_case import S
 from reference.world import SESSION_KEY, START, allowed, loaded
 from rtshcua.mavlink.frames import Codec
-from rtshcua.onboard.enforcement.frames import OURS, FrameRefusal
+from rtshcua.onboard.enforcement.frames import FORCED_ARMING, OURS
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.permit import open_permit
@@ -59,7 +59,7 @@ def test_a_permit_lets_out_its_own_command() -> None:
 def test_arming_by_force_is_refused_under_any_permit() -> None:
     of = heard()
     of.executor.dispatch(allowed(of), AT)
-    assert of.executor.frames.seal(FORCE, AT) is FrameRefusal.FORCED_ARMING
+    assert of.executor.frames.seal(FORCE, AT) is FORCED_ARMING
 
 
 def test_a_late_or_used_permit_lets_nothing_more_out() -> None:

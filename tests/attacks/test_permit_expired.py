@@ -4,7 +4,7 @@ import pytest
 
 from reference.flat_case import S
 from reference.world import SESSION_KEY, START, allowed, loaded
-from rtshcua.onboard.enforcement.executor import PermitRefusal
+from rtshcua.onboard.enforcement.executor import FORGED, LAPSED, LATE, NOT_COVERED
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.permit import open_permit
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
@@ -18,7 +18,7 @@ def test_a_late_step_is_not_sent() -> None:
     opened = open_permit(permit, SESSION_KEY)
     assert opened is not None
     assert AT < opened.not_after_us <= AT + 2 * S, "at most the deadline"
-    assert of.executor.dispatch(permit, opened.not_after_us + 1) is PermitRefusal.LATE
+    assert of.executor.dispatch(permit, opened.not_after_us + 1) is LATE
     dispatch = of.executor.dispatch(permit, opened.not_after_us)
     assert isinstance(dispatch, Dispatch)
     assert dispatch.not_after_us == opened.not_after_us, "whoever sends looks at the clock again"
@@ -28,7 +28,7 @@ def test_a_permit_for_a_link_that_was_just_decided_lasts_a_second() -> None:
     of = loaded()
     allowed(of)
     permit = allowed(of, kind=2, step=-1, link=0)
-    assert of.executor.dispatch(permit, AT + S + 1) is PermitRefusal.LATE
+    assert of.executor.dispatch(permit, AT + S + 1) is LATE
 
 
 def test_the_fallback_of_a_step_that_is_over_has_lapsed() -> None:
@@ -38,15 +38,15 @@ def test_the_fallback_of_a_step_that_is_over_has_lapsed() -> None:
     of.executor.ended()
     following = allowed(of, step=1)
     assert isinstance(of.executor.dispatch(following, AT), Dispatch)
-    assert of.executor.stand_in(step, FALLBACK_LINK, 0, AT) is PermitRefusal.LAPSED
+    assert of.executor.stand_in(step, FALLBACK_LINK, 0, AT) is LAPSED
     assert isinstance(of.executor.stand_in(following, FALLBACK_LINK, 0, AT), Dispatch)
 
 
 def test_nothing_stands_behind_a_step_that_was_not_sent() -> None:
     of = loaded()
     step = allowed(of)
-    assert of.executor.stand_in(step, FALLBACK_LINK, 0, AT) is PermitRefusal.LAPSED
-    assert of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT) is PermitRefusal.LAPSED
+    assert of.executor.stand_in(step, FALLBACK_LINK, 0, AT) is LAPSED
+    assert of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT) is LAPSED
 
 
 @pytest.mark.parametrize(("kind", "link"), [(1, 1), (1, -1), (2, 3), (2, -1), (0, 3)])
@@ -54,14 +54,14 @@ def test_a_permit_stands_for_its_own_links_alone(kind: int, link: int) -> None:
     of = loaded()
     step = allowed(of)
     of.executor.dispatch(step, AT)
-    assert of.executor.stand_in(step, kind, link, AT) is PermitRefusal.NOT_COVERED
+    assert of.executor.stand_in(step, kind, link, AT) is NOT_COVERED
 
 
 def test_nothing_stands_behind_the_permit_of_a_link() -> None:
     of = loaded()
     of.executor.dispatch(allowed(of), AT)
     hold = allowed(of, kind=2, step=-1, link=0)
-    assert of.executor.stand_in(hold, FALLBACK_LINK, 0, AT) is PermitRefusal.NOT_COVERED
+    assert of.executor.stand_in(hold, FALLBACK_LINK, 0, AT) is NOT_COVERED
 
 
 def test_landing_ends_what_stands() -> None:
@@ -70,10 +70,10 @@ def test_landing_ends_what_stands() -> None:
     of.executor.dispatch(step, AT)
     of.executor.landed()
     for kind in (FALLBACK_LINK, CONTINGENCY_LINK):
-        assert of.executor.stand_in(step, kind, 0, AT) is PermitRefusal.LAPSED
+        assert of.executor.stand_in(step, kind, 0, AT) is LAPSED
     following = allowed(of, step=1)
     assert isinstance(of.executor.dispatch(following, AT), Dispatch)
-    assert of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT) is PermitRefusal.LAPSED, "that was another flight"
+    assert of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT) is LAPSED, "that was another flight"
 
 
 def test_the_contingency_stands_through_all_steps_of_a_flight() -> None:
@@ -88,4 +88,4 @@ def test_the_contingency_stands_through_all_steps_of_a_flight() -> None:
 def test_a_forged_permit_stands_for_nothing() -> None:
     of = loaded()
     of.executor.dispatch(allowed(of), AT)
-    assert of.executor.stand_in(bytes(56), CONTINGENCY_LINK, 0, AT) is PermitRefusal.FORGED
+    assert of.executor.stand_in(bytes(56), CONTINGENCY_LINK, 0, AT) is FORGED

@@ -25,7 +25,7 @@ from reference.world import (
     renewed,
     request_for,
 )
-from rtshcua.onboard.enforcement.executor import PermitRefusal
+from rtshcua.onboard.enforcement.executor import MISSION_OVER
 from rtshcua.onboard.enforcement.load import Loaded, session
 from rtshcua.onboard.ports import Dispatch, Ending, LinkBack, LinkLost, Presented
 from rtshcua.wire import cose, names
@@ -107,7 +107,7 @@ def test_after_it_the_boundary_decides_no_step_and_the_executor_sends_none() -> 
     of = fresh()
     permit = allowed(of)
     assert presented(of, recall(of)).accepted
-    assert of.executor.dispatch(permit, START.monotonic_us) is PermitRefusal.MISSION_OVER
+    assert of.executor.dispatch(permit, START.monotonic_us) is MISSION_OVER
     assert answer_to(of, request_for(of, step=1)) is Status.NOT_CURRENT
     home = allowed(of, 2, -1, 1)
     assert isinstance(of.executor.dispatch(home, START.monotonic_us), Dispatch)

@@ -4,7 +4,7 @@ from reference.world import START, Run, allowed, answer_to, loaded, request_for
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal
+from rtshcua.onboard.enforcement.executor import FORGED, USED, Executor
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.response import Answer
 
@@ -46,12 +46,12 @@ def test_a_permit_sends_one_command_once() -> None:
     of = loaded()
     permit = allowed(of)
     assert isinstance(of.executor.dispatch(permit, START.monotonic_us), Dispatch)
-    assert of.executor.dispatch(permit, START.monotonic_us) is PermitRefusal.USED
+    assert of.executor.dispatch(permit, START.monotonic_us) is USED
     assert isinstance(of.executor.stand_in(permit, 1, 0, START.monotonic_us), Dispatch)
-    assert of.executor.stand_in(permit, 1, 0, START.monotonic_us) is PermitRefusal.USED
+    assert of.executor.stand_in(permit, 1, 0, START.monotonic_us) is USED
 
 
 def test_a_permit_of_another_session_is_worth_nothing() -> None:
     of = loaded()
     later = Executor(bytes(32), Commands(of.bundle.policy, of.bundle.mission))
-    assert later.dispatch(allowed(of), START.monotonic_us) is PermitRefusal.FORGED
+    assert later.dispatch(allowed(of), START.monotonic_us) is FORGED

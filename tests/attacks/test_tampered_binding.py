@@ -5,8 +5,8 @@ from msgspec.structs import replace
 
 from reference.flat_case import INVOCATIONS, MISSION, POLICY
 from reference.world import MISSION_KEY, POLICY_KEY, Run, allowed, answer_to, loaded, request_for, sealed, try_load
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.outcome import Outcome, Reason
-from rtshcua.onboard.enforcement.load import LoadRefusal
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.response import NO_TARGET, Answer
 
@@ -50,7 +50,7 @@ def test_what_the_published_binding_leaves_out_is_bound(field: str) -> None:
     mission = replace(bound, invocations=(*bound.invocations[:2], weaker, bound.invocations[3]))
     data = bundle.seal(payload, bundle.mission_payload(mission), policy_key=POLICY_KEY, mission_key=MISSION_KEY)
     refusal = try_load(data)
-    assert isinstance(refusal, LoadRefusal)
+    assert isinstance(refusal, Refusal)
     assert refusal.slug == "binding-mismatch"
 
 
@@ -58,7 +58,7 @@ def test_what_the_published_binding_leaves_out_is_bound(field: str) -> None:
 def test_a_mission_that_weakens_its_policy_is_refused_even_when_bound(field: str) -> None:
     weaker = replace(INVOCATIONS[2], contract=replace(INVOCATIONS[2].contract, **{field: ()}))
     refusal = try_load(sealed(mission=replace(MISSION, invocations=(*INVOCATIONS[:2], weaker, INVOCATIONS[3]))))
-    assert isinstance(refusal, LoadRefusal)
+    assert isinstance(refusal, Refusal)
     assert refusal.slug == "malformed"
 
 

@@ -8,10 +8,10 @@ import pytest
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
-from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Refusal
+from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Declined
 
 
-def show(log: Log, witness: Judge, known: int | None = None) -> str | Refusal:
+def show(log: Log, witness: Judge, known: int | None = None) -> str | Declined:
     """Show the whole log to a witness that is at `known`."""
     request = log.submission.request(known, len(log.lines))
     assert request is not None
@@ -76,11 +76,11 @@ def test_one_after_the_other_to_one_witness(futures: tuple[Log, Log]) -> None:
     for known in (None, 4, 9):
         request = told.submission.request(known, 10)
         if request is not None:
-            assert isinstance(witness.consider(request), Refusal)
+            assert isinstance(witness.consider(request), Declined)
     told.effects(5)
     told.recover()
     refusal = show(told, witness, 9)
-    assert isinstance(refusal, Refusal)
+    assert isinstance(refusal, Declined)
     assert refusal.status == INCONSISTENT
 
 
@@ -93,7 +93,7 @@ def test_what_was_seen_is_taken_back(futures: tuple[Log, Log]) -> None:
     early.seal()
     mark = anchored(flown, witness)
     refusal = show(early, witness)
-    assert isinstance(refusal, Refusal)
+    assert isinstance(refusal, Declined)
     assert (refusal.status, refusal.size) == (CONFLICT, 9)
     assert slug(early, [mark]) == "anchor/beyond"
     early.effects(9)

@@ -15,11 +15,11 @@ from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
 from rtshcua.evidence.witnessing.submission import Submission
 from rtshcua.evidence.witnessing.survey import survey
-from rtshcua.evidence.witnessing.witness import CONFLICT, FORBIDDEN, INCONSISTENT, Refusal, Request, judge
+from rtshcua.evidence.witnessing.witness import CONFLICT, FORBIDDEN, INCONSISTENT, Declined, Request, judge
 from rtshcua.wire.keys import Duty
 
 
-def shown(log: Log, witness: Judge, known: int | None = None) -> str | Refusal:
+def shown(log: Log, witness: Judge, known: int | None = None) -> str | Declined:
     request = log.submission.request(known, len(log.lines))
     assert request is not None
     return witness.consider(request)
@@ -27,7 +27,7 @@ def shown(log: Log, witness: Judge, known: int | None = None) -> str | Refusal:
 
 def refused(log: Log, witness: Judge, known: int | None) -> tuple[int, bool]:
     found = shown(log, witness, known)
-    assert isinstance(found, Refusal), found
+    assert isinstance(found, Declined), found
     return found.status, found.contradiction
 
 
@@ -94,7 +94,7 @@ def test_a_record_in_between_is_left_out() -> None:
     request = log.submission.request(0, len(log.lines))
     assert request is not None
     found = witness.consider(request._replace(chain=()))
-    assert isinstance(found, Refusal)
+    assert isinstance(found, Declined)
     assert found.status == INCONSISTENT
     assert isinstance(witness.consider(request), str)
 
@@ -104,7 +104,7 @@ def test_a_genesis_that_follows_something() -> None:
     assert isinstance(genesis, Checkpoint)
     note = sign(genesis._replace(after=bytes(32)), LOG_KEY.public, lambda text: LOG_KEY.sign(text, duty=Duty.LOG))
     found = judge(Request(0, (), note), None, lambda vehicle: (LOG_KEY.public,))
-    assert isinstance(found, Refusal)
+    assert isinstance(found, Declined)
     assert found.status == FORBIDDEN
 
 

@@ -1,14 +1,15 @@
 """What the compiler lets through, the vehicle loads; and whatever it is asked then, it answers."""
 
 from reference import world
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import ANY
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, encode
-from rtshcua.wire.response import Unusable, decode
+from rtshcua.wire.response import decode
 from rtshcua.wire.trust import TrustRoot
 
 S = 1_000_000  # us
@@ -34,7 +35,7 @@ def sealed(policy: bytes, mission: bytes) -> bytes:
     return bundle.seal(policy, mission, policy_key=world.POLICY_KEY, mission_key=world.MISSION_KEY)
 
 
-def opened(data: bytes, vehicle: str, utc_us: int) -> Loaded | LoadRefusal:
+def opened(data: bytes, vehicle: str, utc_us: int) -> Loaded | Refusal:
     """`load` on the vehicle of that identity at that time."""
     return load(
         data,
@@ -79,4 +80,4 @@ def ask(loaded: Loaded, utc_us: int) -> None:
 def answer(loaded: Loaded, request: bytes) -> None:
     """Any octets are answered, by octets that can be read."""
     said = decode(loaded.boundary.enforce(request))
-    assert not isinstance(said, Unusable), said
+    assert not isinstance(said, Refusal), said

@@ -9,7 +9,7 @@ from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
 from rtshcua.evidence.witnessing.submission import anchor
-from rtshcua.evidence.witnessing.witness import Refusal, Request, Seen, decode, decode_answer
+from rtshcua.evidence.witnessing.witness import Declined, Request, Seen, decode, decode_answer
 from rtshcua.mavlink.frames import Codec
 from rtshcua.mavlink.tunnel import MOST_OF_ONE, Assembler, Whole, messages
 
@@ -78,12 +78,12 @@ def mutated(of: Random, data: bytes, others: list[bytes]) -> bytes:
 def tamper_request(of: Random) -> str:
     """A witness that saw the log up to record 13 cosigns nothing but a later checkpoint of this log."""
     request = decode(mutated(of, of.choice(REQUESTS), REQUESTS))
-    if isinstance(request, Refusal):
+    if isinstance(request, Declined):
         return str(request.status)
     witness = Judge()
     witness.seen[ORIGIN] = SEEN
     found = witness.consider(request)
-    if isinstance(found, Refusal):
+    if isinstance(found, Declined):
         return str(found.status)
     text = split(found)[0]
     # The other future is as consistent with record 13 as this one: the witness has not seen yet which is flown.

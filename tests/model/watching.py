@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from model.small import GRACE, LIMITS, UNIT
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.executor import PermitRefusal
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     Action,
@@ -71,7 +71,7 @@ class Gate:
             raise AttributeError(name)
         return getattr(self._of, name)
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | PermitRefusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
         result = self._of.dispatch(sealed, now_us)
         if isinstance(result, Dispatch):
             permit = open_permit(sealed, self._key)
@@ -82,7 +82,7 @@ class Gate:
             self._ear.passed.append(result)
         return result
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | PermitRefusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
         result = self._of.stand_in(sealed, kind, link, now_us)
         if isinstance(result, Dispatch):
             permit = open_permit(sealed, self._key)

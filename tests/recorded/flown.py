@@ -14,7 +14,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua import library
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.cli.sources import compile_sources
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import tlog
 from rtshcua.mavlink.frames import Codec, Received
 from rtshcua.model.flat.contract import MotionKind
@@ -71,7 +72,7 @@ class Recorded:
 
     def __post_init__(self) -> None:
         prepared = prepare(self.policy)
-        assert not isinstance(prepared, Malformed)
+        assert not isinstance(prepared, Refusal)
         self._monitor = StateMonitor(prepared)
         self._frames = FrameSession()
         self.driver = Driver(self.policy, self._frames, fence=False)

@@ -6,7 +6,7 @@ from copy import deepcopy
 from rtshcua.evidence.chain import Recorder, origin_of
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.evidence.witnessing.submission import Submission, anchor
-from rtshcua.evidence.witnessing.witness import Refusal, Request, Seen, judge
+from rtshcua.evidence.witnessing.witness import Declined, Request, Seen, judge
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -100,11 +100,11 @@ class Judge:
         self.seen: dict[str, Seen] = {}
         self.time_s = 1_750_000_000
 
-    def consider(self, request: Request) -> str | Refusal:
+    def consider(self, request: Request) -> str | Declined:
         """The anchor, or the refusal."""
         origin = request.note.partition("\n")[0]
         found = judge(request, self.seen.get(origin), log_keys)
-        if isinstance(found, Refusal):
+        if isinstance(found, Declined):
             return found
         self.seen[origin] = found
         made = anchor(request.note, self.line(found.text), [self.key.public])

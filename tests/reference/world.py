@@ -26,6 +26,7 @@ from reference.flat_case import (
 )
 from reference.seeds import epoch_seeds
 from reference.verifiers import agree
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.ground.auditor.audit import audit
 from rtshcua.model.flat.contract import MotionKind
@@ -33,7 +34,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load, session
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load, session
 from rtshcua.onboard.ports import (
     Action,
     AirState,
@@ -54,7 +55,7 @@ from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import CONTINGENCY_LINK, Request, encode
-from rtshcua.wire.response import Answer, Status, Unusable, decode
+from rtshcua.wire.response import Answer, Status, decode
 from rtshcua.wire.trust import TrustRoot
 
 VEHICLE = POLICY.vehicle.identity
@@ -93,7 +94,7 @@ def _seal(policy: Policy, bound: Mission) -> bytes:
     return bundle.seal(payload, mission, policy_key=POLICY_KEY, mission_key=MISSION_KEY)
 
 
-def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = False) -> Loaded | LoadRefusal:
+def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = False) -> Loaded | Refusal:
     """`load` with the keys of this world."""
     return load(
         data,
@@ -359,7 +360,7 @@ def request_for(of: Loaded, kind: int = 0, step: int = 0, link: int = -1, **chan
 def answer_to(of: Loaded, request: bytes) -> Answer | Status:
     """What the boundary answers."""
     answer = decode(of.boundary.enforce(request))
-    assert not isinstance(answer, Unusable)
+    assert not isinstance(answer, Refusal)
     return answer
 
 

@@ -10,11 +10,12 @@ import msgspec
 from reference.seeds import epoch_seeds
 from reference.verifiers import agree
 from rtshcua.adapters.loop import Loop
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST
 from rtshcua.ground.auditor.audit import Audit, Auditor
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.ports import Action, Ending, Event
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
@@ -110,7 +111,7 @@ class Flight:
         loaded = load(
             bundle, root=root, vehicle="quad-07", now=now, mode=mode, session_key=bytes(32), peer_is_own_simulator=True
         )
-        assert not isinstance(loaded, LoadRefusal), loaded
+        assert not isinstance(loaded, Refusal), loaded
         self.loaded = loaded
         frames = loaded.executor.frames
         self.vehicle = vehicle or VirtualVehicle(loaded.bundle.policy, config, self.clock, frames, fence=fence)

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from os.path import normpath, relpath
 from pathlib import Path
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.patterns import matches
-from rtshcua.ground.project.settings import NAMES, SHARED, Refused, Settings, parse_settings
+from rtshcua.ground.project.settings import NAMES, SHARED, Settings, misconfigured, parse_settings
 
 #: a configuration is a page or two; more than this of it is not read
 _LARGEST = 1 << 20
@@ -35,23 +36,23 @@ class Projects:
     """
 
     def __init__(self, config: Path | None = None, *, isolated: bool = False) -> None:
-        self._given: Project | Refused | None = None
+        self._given: Project | Refusal | None = None
         if config is not None:
-            self._given = _read(config) or Refused(str(config), "it has no table `[tool.rtshcua]`")
+            self._given = _read(config) or misconfigured(str(config), "it has no table `[tool.rtshcua]`")
         elif isolated:
             self._given = Project(Settings(), _absolute(Path()))
-        self._by_folder: dict[Path, Project | Refused] = {}
+        self._by_folder: dict[Path, Project | Refusal] = {}
 
-    def of(self, path: Path) -> Project | Refused:
+    def of(self, path: Path) -> Project | Refusal:
         """The configuration that counts for a file or a folder."""
         if self._given is not None:
             return self._given
         place = _absolute(path)
         return self._of_folder(place if place.is_dir() else place.parent)
 
-    def _of_folder(self, folder: Path) -> Project | Refused:
+    def _of_folder(self, folder: Path) -> Project | Refusal:
         passed = []
-        found: Project | Refused | None = None
+        found: Project | Refusal | None = None
         for each in (folder, *folder.parents):
             found = self._by_folder.get(each) or _standing_in(each)
             passed.append(each)
@@ -62,7 +63,7 @@ class Projects:
         return found
 
 
-def _standing_in(folder: Path) -> Project | Refused | None:
+def _standing_in(folder: Path) -> Project | Refusal | None:
     for name in NAMES:
         file = folder / name
         if file.is_file():
@@ -72,20 +73,20 @@ def _standing_in(folder: Path) -> Project | Refused | None:
     return None
 
 
-def _read(file: Path) -> Project | Refused | None:
+def _read(file: Path) -> Project | Refusal | None:
     name = _shown(file)
     try:
         with file.open("rb") as opened:
             data = opened.read(_LARGEST + 1)
         text = data.decode("utf-8")
     except OSError as error:
-        return Refused(name, f"it cannot be read: {(error.strerror or 'it is unreadable').lower()}")
+        return misconfigured(name, f"it cannot be read: {(error.strerror or 'it is unreadable').lower()}")
     except UnicodeDecodeError as error:
-        return Refused(name, f"byte {error.start} is not UTF-8, so it is not text")
+        return misconfigured(name, f"byte {error.start} is not UTF-8, so it is not text")
     if len(data) > _LARGEST:
-        return Refused(name, f"it is larger than {_LARGEST >> 20} MiB, which no configuration is")
+        return misconfigured(name, f"it is larger than {_LARGEST >> 20} MiB, which no configuration is")
     found = parse_settings(text, name, shared=file.name == SHARED)
-    return found if found is None or isinstance(found, Refused) else Project(found, _absolute(file).parent, file)
+    return found if found is None or isinstance(found, Refusal) else Project(found, _absolute(file).parent, file)
 
 
 def _absolute(path: Path) -> Path:

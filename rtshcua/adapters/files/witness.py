@@ -17,7 +17,7 @@ from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_fo
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import parse
 from rtshcua.evidence.witnessing.cosign import cosign
-from rtshcua.evidence.witnessing.witness import OK, Answer, LogKeys, Refusal, Request, Seen, judge
+from rtshcua.evidence.witnessing.witness import OK, Answer, Declined, LogKeys, Request, Seen, judge
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.untrusted import Untrusted
 
@@ -115,12 +115,12 @@ class FileWitness:
         before = self.store.seen(origin)
         return None if before is None else int(before[0].text.split("\n", 2)[1])
 
-    def consider(self, request: Request) -> Answer | Refusal:
+    def consider(self, request: Request) -> Answer | Declined:
         """The cosignature, once it is remembered what for; or why there is none. Raises WitnessError and OSError."""
         origin = request.note.partition("\n")[0]
         before = self.store.seen(origin)
         found = judge(request, None if before is None else before[0], self._log_keys)
-        if isinstance(found, Refusal):
+        if isinstance(found, Declined):
             return found
         time_s = max(self._now_s(), 0 if before is None else before[1])
         self.store.keep(origin, found, time_s)

@@ -9,10 +9,11 @@ from rtshcua.adapters.language_server import convert
 from rtshcua.adapters.language_server.session import Session
 from rtshcua.adapters.language_server.texts import Texts
 from rtshcua.diagnostics.diagnostic import Fix
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.editor.actions import actions, all_safe
 from rtshcua.ground.editor.positions import Lines, difference
-from rtshcua.ground.editor.rename import Refused, renamable
+from rtshcua.ground.editor.rename import renamable
 from rtshcua.ground.format.format import formatted
 
 REQUEST_FAILED = -32803  # LSPErrorCodes.RequestFailed
@@ -34,8 +35,8 @@ def may_rename(session: Session, params: lsp.PrepareRenameParams) -> lsp.Prepare
     if lines is None:
         raise NotDone("this text is not open")
     found = renamable(session.desk, view, name, lines.offset(convert.place(params.position)))
-    if isinstance(found, Refused):
-        raise NotDone(found.why)
+    if isinstance(found, Refusal):
+        raise NotDone(found.text)
     return lsp.PrepareRenamePlaceholder(convert.range_of(lines, found.start, found.end), view.slice(found))
 
 

@@ -8,11 +8,12 @@ from rtshcua.adapters.language_server import convert
 from rtshcua.adapters.language_server.changes import NotDone, workspace_edit
 from rtshcua.adapters.language_server.searching import Search
 from rtshcua.adapters.language_server.texts import Texts
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.navigation import imported_at, importers, references, targets
 from rtshcua.ground.editor.outline import outline
-from rtshcua.ground.editor.rename import Refused, rename
+from rtshcua.ground.editor.rename import rename
 
 _MOST = 500
 """Symbols of a workspace that are listed."""
@@ -69,8 +70,8 @@ def renamed(texts: Texts, search: Search, params: lsp.RenameParams) -> lsp.Works
 
     files = search.steps(_names(texts))
     found = rename(texts.desk, files, view, name, offset, params.new_name, texts.dialect, steps)
-    if isinstance(found, Refused):
-        raise NotDone(found.why)
+    if isinstance(found, Refusal):
+        raise NotDone(found.text)
     return workspace_edit(texts, {file: [(span, found.name) for span in spans] for file, spans in found.places.items()})
 
 

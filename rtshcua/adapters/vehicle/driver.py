@@ -381,7 +381,7 @@ class Driver:
         moving, self._moving = self._moving, False
         if refused and self._manoeuvre is not None and not self._manoeuvre.over:
             self._manoeuvre.over = True
-            events.append(Failed(now_us, self._manoeuvre.token, refused[0]))
+            events.append(Failed(now_us, self._manoeuvre.token, refused[0].slug))
         elif moving and not refused and self._unsent is not None:
             events.append(Sent(now_us, self._unsent))
             self._unsent = None

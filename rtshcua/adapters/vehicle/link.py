@@ -5,10 +5,11 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.company import Company
 from rtshcua.adapters.vehicle.flavour import Message
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.frames import Codec, Received, Verifier
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
-from rtshcua.onboard.enforcement.frames import OURS, FrameRefusal, Gate
+from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.ports import Event
 
 #: what we call ourselves before we know whose system we belong to; nothing is sent under it
@@ -74,13 +75,13 @@ class Link:
                 self._verifier.temper(each.message, now_us)
         return received
 
-    def pack(self, send: Iterable[Message], now_us: int) -> tuple[list[bytes], list[FrameRefusal]]:
+    def pack(self, send: Iterable[Message], now_us: int) -> tuple[list[bytes], list[Refusal]]:
         """The frames that may be sent, and why others may not."""
         frames: list[bytes] = []
-        refused: list[FrameRefusal] = []
+        refused: list[Refusal] = []
         for message in send:
             sealed = self._frames.seal(self._codec.pack(message), now_us)
-            if isinstance(sealed, FrameRefusal):
+            if isinstance(sealed, Refusal):
                 refused.append(sealed)
             else:
                 frames.append(sealed)

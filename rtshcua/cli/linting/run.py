@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rtshcua.adapters.files.changed import Changes, NoChanges, changed_files
-from rtshcua.cli.asked import Unusable
 from rtshcua.cli.faults import exit_code_of, say, tell, words_of
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.linting.fixing import Fixed, fix
@@ -21,6 +20,7 @@ from rtshcua.cli.overwriting import refusal
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import listed, nearest
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import LEVELS
@@ -35,10 +35,10 @@ def run(options: Options) -> ExitCode:
     findings = Findings(json=form == "json" and options.output is None)
     wrong = _misused(options, form)
     if wrong is not None:
-        return findings.refuse(*wrong)
+        return findings.end(wrong)
     about = scope(options)
-    if isinstance(about, Unusable):
-        return findings.refuse(*about)
+    if isinstance(about, Refusal):
+        return findings.end(about)
     session = Session()
     changed: Changes | None = None
     if options.changed or options.base is not None:
@@ -50,7 +50,7 @@ def run(options: Options) -> ExitCode:
     read: tuple[Path | str, ...] = (*about.files, *session.names)
     forbidden = None if options.output is None else refusal(options.output, read, "a report")
     if forbidden is not None:
-        return findings.refuse(*forbidden)
+        return findings.end(forbidden)
     mended: Fixed | None = None
     if options.fixes:
         mended = fix(
@@ -72,14 +72,14 @@ def run(options: Options) -> ExitCode:
     return _report(options, form, told, names, about, code, mended)
 
 
-def _misused(options: Options, form: str) -> Unusable | None:
+def _misused(options: Options, form: str) -> Refusal | None:
     for name, value, words in (("--format", form, FORMATS), ("--fail-on", options.fail_on, LEVELS)):
         if value is not None and value not in words:
             near = nearest(value, words)
             help = f"accepted: {listed(words)}" if near is None else f"did you mean `{near}`?"
-            return Unusable(ExitCode.USAGE, "usage", f"`{value}` is nothing that `{name}` can be", help)
+            return Refusal("usage", f"`{value}` is nothing that `{name}` can be", help)
     if options.config is not None and options.isolated:
-        return Unusable(ExitCode.USAGE, "usage", "`--config` and `--isolated` exclude each other")
+        return Refusal("usage", "`--config` and `--isolated` exclude each other")
     return None
 
 

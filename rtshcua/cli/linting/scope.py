@@ -9,11 +9,11 @@ from rtshcua.adapters.files.folders import lint_secret_folder
 from rtshcua.adapters.files.lint_cache import FOLDER, LintCache
 from rtshcua.adapters.files.lint_secret import lint_secret
 from rtshcua.adapters.files.project import Project, Projects
-from rtshcua.cli.asked import SOURCE, Unusable, unfolded
+from rtshcua.cli.asked import SOURCE, unfolded
 from rtshcua.cli.linting.options import Options
-from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.project.settings import Ignored, Refused
+from rtshcua.ground.project.settings import Ignored, misconfigured
 
 
 class Scope(NamedTuple):
@@ -31,25 +31,25 @@ class Scope(NamedTuple):
         return {shown(str(path)): _ignored(self.projects[path], path) for path in self.files}
 
 
-def scope(options: Options) -> Scope | Unusable:
+def scope(options: Options) -> Scope | Refusal:
     """The files that are asked for, but for those that their configuration excludes; what is wrong with either ends the
     run.
     """
     files = unfolded(options.paths)
-    if isinstance(files, Unusable):
+    if isinstance(files, Refusal):
         return files
     projects = Projects(options.config, isolated=options.isolated)
     found: dict[Path, Project] = {}
     looked_at: set[int] = set()
     for path in files:
         project = projects.of(path)
-        if isinstance(project, Refused):
-            return refused(project)
+        if isinstance(project, Refusal):
+            return project
         if id(project) not in looked_at and not options.with_:
             looked_at.add(id(project))
             wrong = _no_further(project)
             if wrong is not None:
-                return refused(wrong)
+                return wrong
         if not project.excludes(path, project.settings.lint.exclude):
             found[path] = project
     kept = tuple(found)
@@ -62,11 +62,6 @@ def scope(options: Options) -> Scope | Unusable:
         len(files) - len(kept),
         {path: project.settings.format.width for path, project in found.items() if _looks_at_layout(project, path)},
     )
-
-
-def refused(configuration: Refused) -> Unusable:
-    """A configuration that is none ends a run: it may be what ignores, or what must not be ignored."""
-    return Unusable(ExitCode.INPUT, "configuration", str(configuration), configuration.help)
 
 
 def _looks_at_layout(project: Project, path: Path) -> bool:
@@ -86,12 +81,13 @@ def _further(project: Project) -> tuple[Path, ...]:
     return tuple(each.relative_to(here) if each.is_relative_to(here) else each for each in placed)
 
 
-def _no_further(project: Project) -> Refused | None:
+def _no_further(project: Project) -> Refusal | None:
     """The first further source of a configuration that is no file, as a fault of the configuration."""
     for name, place in zip(project.settings.lint.further, _further(project), strict=True):
         if not place.is_file():
             what = "is a folder" if place.is_dir() else "is no file" if lexists(place) else "is not there"
-            return Refused(shown(str(project.file)), f"`{name}` in `with` {what}", "accepted: a list of sources (.rts)")
+            help = "accepted: a list of sources (.rts)"
+            return misconfigured(shown(str(project.file)), f"`{name}` in `with` {what}", help)
     return None
 
 

@@ -11,7 +11,8 @@ from rtshcua.cli.showing.mission import show_mission
 from rtshcua.cli.showing.named import named
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.showing.policy import show_policy
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire import cose, names
@@ -38,9 +39,9 @@ def claimed(data: bytes) -> Claimed:
     first, second = (cose.unverified(envelope) for envelope in envelopes(data))
     policy, mission = parse(names.POLICY, first.payload, Policy), parse(names.MISSION, second.payload, Mission)
     prepared = prepare(policy)
-    checked = prepared if isinstance(prepared, Malformed) else prepare_mission(mission, prepared)
-    if isinstance(checked, Malformed):
-        raise Untrusted("malformed", f"the bundle makes no sense: {checked.what}")
+    checked = prepared if isinstance(prepared, Refusal) else prepare_mission(mission, prepared)
+    if isinstance(checked, Refusal):
+        raise Untrusted("malformed", f"the bundle makes no sense: {checked.text}")
     return Claimed(policy, mission, digest(BUNDLE, data), policy_digest(first.payload), first.kid, second.kid)
 
 

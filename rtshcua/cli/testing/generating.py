@@ -59,7 +59,7 @@ def generate(files: Sequence[Path], wanted: Wanted, findings: Findings, *, quiet
     output = wanted.output
     refused = None if output is None else refusal(output, files, _TESTS)
     if refused is not None:
-        return findings.refuse(*refused)
+        return findings.end(refused)
     if output is not None and os.path.lexists(output) and not (wanted.force and output.is_file()):
         help = "`--force` replaces it" if output.is_file() else None
         return findings.refuse(ExitCode.USAGE, "output", f"`{output}` exists, and is not written over", help)
@@ -68,7 +68,7 @@ def generate(files: Sequence[Path], wanted: Wanted, findings: Findings, *, quiet
         reading = read_sources([path])
         refused = None if output is None else refusal(output, reading.program.sources, _TESTS)
         if refused is not None:
-            return findings.refuse(*refused)
+            return findings.end(refused)
         checked = examine(reading)
         if findings.report(_wrong(checked.diagnostics), reading.program.sources):
             return findings.finish(exit_code(checked.diagnostics))

@@ -59,7 +59,7 @@ class Seen(NamedTuple):
     signer: bytes
 
 
-class Refusal(NamedTuple):
+class Declined(NamedTuple):
     """Why nothing is cosigned. `status` is one of HTTP's, as c2sp.org/tlog-witness uses them.
 
     `size` is that of the tree that the witness saw, with a conflict. `contradiction`: the log's own key signed what
@@ -101,52 +101,52 @@ def decode_answer(data: bytes) -> Answer | None:
     return Answer(int(status), body.decode("utf-8", "replace"))
 
 
-def decode(data: bytes) -> Request | Refusal:
+def decode(data: bytes) -> Request | Declined:
     """The request in a body; never raises, whatever the bytes."""
     try:
         head, *parts = data.decode().split("\n\n")
     except UnicodeDecodeError:
-        return Refusal(MALFORMED, "the request is not UTF-8")
+        return Declined(MALFORMED, "the request is not UTF-8")
     first, *proof = head.split("\n")
     old = first.removeprefix("old ")
     number = int(old) if old.isascii() and old.isdigit() and len(old) <= _LONGEST_SIZE else 0
     # a part is the text of a note, the next one its signatures; the last ends with one newline
     texts = [f"{body}\n\n{lines}\n" for body, lines in zip(parts[::2], parts[1::2], strict=False)]
     if not texts or len(parts) % 2 or not data.endswith(b"\n") or len(proof) > MOST_PROOF:
-        return Refusal(MALFORMED, "the request has not the form of one")
+        return Declined(MALFORMED, "the request has not the form of one")
     texts[-1] = texts[-1][:-1]
     request = Request(number, tuple(strict_base64(each) for each in proof), texts[0], tuple(texts[1:]))
     if {len(each) for each in request.proof} - {_HASH_BYTES} or request.encode() != data:
-        return Refusal(MALFORMED, "the request has not the form of one")
+        return Declined(MALFORMED, "the request has not the form of one")
     return request
 
 
-def judge(request: Request, seen: Seen | None, log_keys: LogKeys) -> Seen | Refusal:
+def judge(request: Request, seen: Seen | None, log_keys: LogKeys) -> Seen | Declined:
     """What may be cosigned, or why it may not. `seen` is what was cosigned last for this origin, if anything was."""
     text, lines = split(request.note)
     checkpoint = parse(text)
     if not lines or isinstance(checkpoint, Flaw):
-        return Refusal(MALFORMED, "what is to be cosigned is not the checkpoint of a log")
+        return Declined(MALFORMED, "what is to be cosigned is not the checkpoint of a log")
     known = None if seen is None else parse(seen.text)
     assert not isinstance(known, Flaw), "what was cosigned is a checkpoint"
     vehicle = vehicle_of(checkpoint.origin)
     keys = tuple(log_keys(vehicle)) if vehicle else ()
     if not keys:
-        return Refusal(UNKNOWN, f"nothing is known of `{checkpoint.origin}`")
+        return Declined(UNKNOWN, f"nothing is known of `{checkpoint.origin}`")
     size = 0 if known is None else known.size
     if request.old > checkpoint.size:
-        return Refusal(MALFORMED, f"a tree of {checkpoint.size} records does not begin with one of {request.old}")
+        return Declined(MALFORMED, f"a tree of {checkpoint.size} records does not begin with one of {request.old}")
     if request.old != size:
-        return Refusal(CONFLICT, f"the tree of {size} records was cosigned last, not that of {request.old}", size)
+        return Declined(CONFLICT, f"the tree of {size} records was cosigned last, not that of {request.old}", size)
     if seen is not None and text == seen.text:
         return seen  # again, for the answer may have been lost
     signer = _follow(request, known, seen, keys)
-    if isinstance(signer, Refusal):
+    if isinstance(signer, Declined):
         return signer
     root = EMPTY if known is None else known.root
     if not verify_consistency(size, root, checkpoint.size, checkpoint.root, request.proof):
         # Anyone can put a wrong proof to a right note: that alone is no contradiction.
-        return Refusal(INCONSISTENT, f"it is not shown that the tree begins with that of {size} records")
+        return Declined(INCONSISTENT, f"it is not shown that the tree begins with that of {size} records")
     return Seen(text, signer)
 
 
@@ -159,7 +159,7 @@ def vehicle_of(origin: str) -> str:
 
 def _follow(
     request: Request, known: Checkpoint | None, seen: Seen | None, log_keys: tuple[bytes, ...]
-) -> bytes | Refusal:
+) -> bytes | Declined:
     """The key that signed the last note, if each is signed by the key that the one before it names, or by the log key,
     and goes on from there.
     """
@@ -172,16 +172,16 @@ def _follow(
         signer, checkpoint = _opened(note, origin, (*named, *log_keys))
         if checkpoint is None:
             twice = seen is not None and _opened(note, origin, (seen.signer,))[1] is not None
-            return _conflict(known, contradiction=True) if twice else Refusal(FORBIDDEN, _STRANGER)
+            return _conflict(known, contradiction=True) if twice else Declined(FORBIDDEN, _STRANGER)
         if before is None and (checkpoint.size or checkpoint.root != EMPTY or checkpoint.after is not None):
-            return Refusal(FORBIDDEN, "the first that is seen of a log is the checkpoint of its genesis")
+            return Declined(FORBIDDEN, "the first that is seen of a log is the checkpoint of its genesis")
         if before is not None and (before.key is None or checkpoint.size <= before.size):
             return _conflict(known, contradiction=before is known and checkpoint.size >= before.size)
         if before is not None and checkpoint.after != before.digest():
             # The log key may sign more than once, and there may be others in between: that alone is no contradiction.
             if before is known and signer == before.key:
                 return _conflict(known, contradiction=True)
-            return Refusal(INCONSISTENT, "it does not follow the checkpoint that is to come before it")
+            return Declined(INCONSISTENT, "it does not follow the checkpoint that is to come before it")
         before = checkpoint
     return signer
 
@@ -195,7 +195,7 @@ def _opened(note: str, origin: str, keys: Iterable[bytes]) -> tuple[bytes, Check
     return b"", None
 
 
-def _conflict(known: Checkpoint | None, *, contradiction: bool) -> Refusal:
+def _conflict(known: Checkpoint | None, *, contradiction: bool) -> Declined:
     size = 0 if known is None else known.size
     text = "it contradicts what was cosigned before, or the order of a log"
-    return Refusal(CONFLICT, text, size, contradiction)
+    return Declined(CONFLICT, text, size, contradiction)

@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 from rtshcua.decision.in_force import InForce
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Genesis
 from rtshcua.evidence.rooted import octets, rooted
@@ -56,9 +57,9 @@ def _prepared(genesis: Genesis, root: TrustRoot, bundle: Bundle) -> Basis | Flaw
             "genesis/mission", "the log names another mission than its bundle", genesis.mission, bundle.mission.name
         )
     policy = prepare(bundle.policy)
-    if isinstance(policy, Malformed):
-        return Flaw("trust/bundle-malformed", f"the bundle's policy makes no sense: {policy.what}")
+    if isinstance(policy, Refusal):
+        return Flaw("trust/bundle-malformed", f"the bundle's policy makes no sense: {policy.text}")
     invocations = prepare_mission(bundle.mission, policy)
-    if isinstance(invocations, Malformed):
-        return Flaw("trust/bundle-malformed", f"the bundle's mission makes no sense: {invocations.what}")
+    if isinstance(invocations, Refusal):
+        return Flaw("trust/bundle-malformed", f"the bundle's mission makes no sense: {invocations.text}")
     return Basis(root, policy, InForce(bundle, policy, invocations, root, genesis.vehicle))

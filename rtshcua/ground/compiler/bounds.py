@@ -11,9 +11,10 @@ from math import isqrt
 from typing import NamedTuple
 
 from rtshcua.decision.lasting import longest
-from rtshcua.decision.prepare import Malformed, prepare_invocation
+from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.decision.truth import TRUE
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US
@@ -72,7 +73,7 @@ def _approval(ground: Ground, mission: Mission, invocation: Invocation) -> int:
     if not rules.confirms:
         return 0
     prepared = prepare_invocation(invocation, ground.prepared, mission.phases)
-    if isinstance(prepared, Malformed):
+    if isinstance(prepared, Refusal):
         return 0  # reported by the proofs
     at = ground.case(prepared).at
     return max((each.rule.within_us for each in rules.confirms if each.condition(at) & TRUE), default=0)

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.check import check_declarations
 from rtshcua.ground.checker.context import Context
@@ -268,7 +269,7 @@ class Compilation:
         prepared = None if lowered is None else prepare(lowered.policy)
         if lowered is None or prepared is None:
             return None
-        if isinstance(prepared, Malformed):
+        if isinstance(prepared, Refusal):
             refused(self.context, lowered, prepared)
             return None
         return Tested(lowered, prepared)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.symbols import WORDS
@@ -32,13 +33,6 @@ _READ = dict.fromkeys(WELL_KNOWN, "every decision needs it") | dict.fromkeys(
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
-    """Why it gets no other name, for a person."""
-
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
 class Renaming:
     """The places that change, by file, and what is written there."""
 
@@ -52,10 +46,10 @@ class Renaming:
         return text
 
 
-def renamable(desk: Desk, view: View, file: str, offset: int) -> Span | Refused:
+def renamable(desk: Desk, view: View, file: str, offset: int) -> Span | Refusal:
     """The name at a place, if it may be changed."""
     found = _target(desk, view, file, offset)
-    return found if isinstance(found, Refused) else at(view.occurrences(file), offset)[0].span
+    return found if isinstance(found, Refusal) else at(view.occurrences(file), offset)[0].span
 
 
 def rename(
@@ -67,14 +61,14 @@ def rename(
     name: str,
     dialect: Dialect,
     steps: Steps = iter,
-) -> Renaming | Refused:
+) -> Renaming | Refusal:
     """Renames what stands at a place in the programs of `files`, and of all that are open.
 
     Every program that has a file which changes is checked under the new name before this answers, `steps` giving one
     after the other.
     """
     target = _target(desk, view, file, offset)
-    if isinstance(target, Refused):
+    if isinstance(target, Refusal):
         return target
     if name == target.name:
         return Renaming({}, name)
@@ -83,19 +77,20 @@ def rename(
     concerned = [each for each in views if declared_at(each, target) == home]
     why = _unfit(view, target, name) or _clash(concerned, target, name)
     if why is not None:
-        return Refused(why)
+        return Refusal("rename", why)
     places = tuple(references(views, view, target))
     views = list({each.name: each for each in (*views, *_tested(desk, concerned, target))}.values())
     changed = {span.file for span in places}
     affected = [each for each in views if not changed.isdisjoint(each.units)]
     why = _faulty(affected)
     if why is not None:
-        return Refused(why)
+        return Refusal("rename", why)
     before = {each.name: judged(each, dialect) for each in steps(affected)}
     for each in affected:
         span = unread(each, before[each.name].cases, target.name)
         if span is not None:
-            return Refused(f"a test of `{span.file}` has errors, so nobody knows what it quotes: correct these first")
+            why = f"a test of `{span.file}` has errors, so nobody knows what it quotes: correct these first"
+            return Refusal("rename", why)
         places = (*places, *quoted(each, before[each.name].cases, places))
     return _checked(desk, affected, before, Renamed(target, name, _by_file(places)), dialect, steps)
 
@@ -107,11 +102,11 @@ def _checked(
     made: Renamed,
     dialect: Dialect,
     steps: Steps,
-) -> Renaming | Refused:
+) -> Renaming | Refusal:
     """The renaming, if it changes nothing but the name."""
     shipped = next((each for each in made.places if desk.is_shipped(each)), None)
     if shipped is not None:
-        return Refused(f"`{made.target.name}` is used in `{shipped}`, which ships with the library")
+        return Refusal("rename", f"`{made.target.name}` is used in `{shipped}`, which ships with the library")
     renaming = Renaming(made.places, made.name)
     texts = {file: renaming.applied(file, view.text(file)) for view in affected for file in made.places
              if file in view.units}  # fmt: skip
@@ -120,7 +115,7 @@ def _checked(
         declared = bool(declared_at(old, made.target))
         why = consequence(old, before[old.name], changed.view(old.name), dialect, made, declared=declared)
         if why is not None:
-            return Refused(why)
+            return Refusal("rename", why)
     return renaming
 
 
@@ -138,28 +133,28 @@ def _tested(desk: Desk, concerned: Iterable[View], target: Target) -> Iterator[V
     return (desk.view(file) for file in sorted(files))
 
 
-def _target(desk: Desk, view: View, file: str, offset: int) -> Target | Refused:
+def _target(desk: Desk, view: View, file: str, offset: int) -> Target | Refusal:
     if not at(view.occurrences(file), offset):
-        return Refused("there is no name here, or what it stands in has a syntax error")
+        return Refusal("rename", "there is no name here, or what it stands in has a syntax error")
     found = targets(view, file, offset)
     if len(found) > 1:
         owners = " and ".join(f"`{each.owner}`" for each in found)
-        return Refused(f"this means a parameter of {owners} at once: rename each where it is declared")
+        return Refusal("rename", f"this means a parameter of {owners} at once: rename each where it is declared")
     target = found[0]
     if target.sort not in RENAMED:
-        return Refused(f"a {target.sort.value} is declared nowhere, so it has no other name")
+        return Refusal("rename", f"a {target.sort.value} is declared nowhere, so it has no other name")
     home = declared_at(view, target)
     if not home:
-        return Refused(f"nothing declares `{target.name}`")
+        return Refusal("rename", f"nothing declares `{target.name}`")
     if len(home) > 1 or any(target.name == each.name.text for _, each in view.symbols.duplicates):
-        return Refused(f"`{target.name}` is declared twice")
+        return Refusal("rename", f"`{target.name}` is declared twice")
     if target.sort is Sort.DECLARED and target.name in _READ and target.name in view.symbols.signals:
-        return Refused(f"the signal `{target.name}` is read by this very name: {_READ[target.name]}")
+        return Refusal("rename", f"the signal `{target.name}` is read by this very name: {_READ[target.name]}")
     if desk.is_shipped(home[0].file):
-        return Refused(f"`{target.name}` belongs to the library")
+        return Refusal("rename", f"`{target.name}` belongs to the library")
     enum = view.symbols.enums.get(target.owner) if target.sort is Sort.MEMBER else None
     if enum is not None and enum.dialect is not None and target.name in _sentinels(view, target):
-        return Refused(f"`{target.name}` is a value that the dialect names")
+        return Refusal("rename", f"`{target.name}` is a value that the dialect names")
     return target
 
 

@@ -10,6 +10,7 @@ from posixpath import normpath
 from typing import Any, Literal
 
 from rtshcua.diagnostics.codes import Code
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.tables import NotSo, Table
 
 #: the names under which a configuration is looked for, of one folder the first that has one
@@ -71,23 +72,12 @@ class Settings:
     test: TestSettings = TestSettings()
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """Why a configuration is none: in `file`, at `line` where that is known (from 1), what was found, and what would
-    be accepted.
-    """
-
-    file: str
-    message: str
-    help: str | None = None
-    line: int | None = None
-
-    def __str__(self) -> str:
-        """The place and the message, for one line."""
-        return f"{self.file}{'' if self.line is None else f':{self.line}'}: {self.message}"
+def misconfigured(file: str, what: str, help: str = "", line: int | None = None) -> Refusal:
+    """Why a configuration is none: in `file`, at `line` where that is known (from 1)."""
+    return Refusal("configuration", f"{file}{'' if line is None else f':{line}'}: {what}", help)
 
 
-def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | Refused | None:
+def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | Refusal | None:
     """The settings in a configuration called `file`; `shared` where it is a `pyproject.toml`, in which others have
     tables too: None where that has none of ours.
     """
@@ -96,7 +86,7 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | 
     except tomllib.TOMLDecodeError as error:
         return _not_toml(file, str(error))
     except RecursionError:
-        return Refused(file, "it is nested too deeply to be read")
+        return misconfigured(file, "it is nested too deeply to be read")
     prefix = ""
     if shared:
         tool = found.get("tool")
@@ -106,7 +96,7 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | 
     try:
         return _settings(Table.of(found, prefix))
     except NotSo as error:
-        return Refused(file, error.message, error.help, _line(text, error.key))
+        return misconfigured(file, error.message, error.help, _line(text, error.key))
 
 
 def _settings(table: Table) -> Settings:
@@ -159,12 +149,12 @@ def _test(table: Table) -> TestSettings:
     return settings
 
 
-def _not_toml(file: str, error: str) -> Refused:
+def _not_toml(file: str, error: str) -> Refusal:
     """What `tomllib` says, as our messages are written; its place, which it puts at the end, goes to the front."""
     words, _, place = error.removesuffix(")").partition(" (at ")
     words = words[:1].lower() + words[1:]
     line = place.removeprefix("line ").partition(",")[0]
-    return Refused(file, f"it is not TOML: {words}", None, int(line) if line.isdecimal() else None)
+    return misconfigured(file, f"it is not TOML: {words}", "", int(line) if line.isdecimal() else None)
 
 
 def _line(text: str, key: str) -> int | None:

@@ -13,7 +13,7 @@ T = TypeVar("T", bound=str)
 class NotSo(Exception):
     """A key is not as it must be: which, what was found, and what would be accepted."""
 
-    def __init__(self, key: str, message: str, help: str | None = None) -> None:
+    def __init__(self, key: str, message: str, help: str = "") -> None:
         super().__init__(message)
         self.key, self.message, self.help = key, message, help
 

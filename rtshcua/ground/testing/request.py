@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 
 from msgspec.structs import replace
 
-from rtshcua.decision.prepare import Malformed, prepare_mission
+from rtshcua.decision.prepare import prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.checker.arguments import bind_value, pair
 from rtshcua.ground.checker.checks.tables import unranged
 from rtshcua.ground.checker.context import Bound, Context
@@ -126,12 +127,12 @@ class Requests:
             return None
         flat = _with(lowered.mission, under.contracts.cells(bound))
         prepared = prepare_mission(bind(flat, self._digest), self._policy.prepared)
-        if not isinstance(prepared, Malformed):
+        if not isinstance(prepared, Refusal):
             return prepared[0]
         context.report.add(
             codes.REFUSED_ON_BOARD,
             step.span,
-            f"this request would be refused before anything is decided on it: {prepared.what}",
+            f"this request would be refused before anything is decided on it: {prepared.text}",
             help="ask for what is nearer to what the skill takes",
         )
         return None

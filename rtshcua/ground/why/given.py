@@ -1,9 +1,9 @@
 """A state changed by hand: `battery=20 %`, `gps.fix=fix_3d`, `position=47.39 N, 8.54 E`, `wind.speed=unknown`."""
 
 import re
-from typing import NamedTuple
 
 from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.exact import exact
 from rtshcua.model.flat.limits import MAX_VALUE
@@ -19,35 +19,28 @@ _NUMBER = re.compile(r"(-?)\s*([0-9][0-9_]*(?:\.[0-9]+)?)\s*(\S*)(?:\s+above\s+h
 _PLACE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([NS])\s*,\s*([0-9]+(?:\.[0-9]+)?)\s*([EW])")
 
 
-class Refused(NamedTuple):
-    """Why a setting is none, and what would be accepted."""
-
-    what: str
-    help: str
-
-
-def given(state: State, setting: str, policy: Policy) -> State | Refused:
+def given(state: State, setting: str, policy: Policy) -> State | Refusal:
     """The state with one signal changed; `name=unknown` for one that is missing, `CONDITION=true` over time."""
     name, equals, text = (part.strip() for part in setting.rpartition("="))
     if not equals:
-        return Refused(f"`{setting}` sets nothing", "write a signal and its value: `battery=20 %`")
+        return Refusal("usage", f"`{setting}` sets nothing", "write a signal and its value: `battery=20 %`")
     signal = next((each for each in policy.signals if each.name == name), None)
     if signal is None:
         return _over_time(state, name, text, policy)
     values = list(state.values)
     slots = range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1))
     if text == NOT_KNOWN:
-        found: tuple[int | None, ...] | Refused = (None,) * len(slots)
+        found: tuple[int | None, ...] | Refusal = (None,) * len(slots)
     else:
         found = _value(signal, text, policy)
-    if isinstance(found, Refused):
+    if isinstance(found, Refusal):
         return found
     for slot, value in zip(slots, found, strict=True):
         values[slot] = value
     return State(tuple(values), state.ages, state.monitors)
 
 
-def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Refused:
+def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Refusal:
     """The truth of a condition over time, which is called as it is written."""
     conditions = [" ".join(monitor.when.text.split()) for monitor in policy.monitors]
     if " ".join(name.split()) not in conditions:
@@ -55,10 +48,10 @@ def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Re
         near = nearest(name, [*names, *conditions])
         known = ", ".join(f"`{each}`" for each in [*names, *conditions])
         help = f"did you mean `{near}`?" if near is not None else f"it reads {known}"
-        return Refused(f"the policy reads no signal `{name}`", help)
+        return Refusal("usage", f"the policy reads no signal `{name}`", help)
     truth = _TRUTHS.get(text)
     if truth is None:
-        return Refused(f"`{text}` is no truth of `{name}`", "write `true`, `false` or `unknown`")
+        return Refusal("usage", f"`{text}` is no truth of `{name}`", "write `true`, `false` or `unknown`")
     wanted = " ".join(name.split())
     monitors = tuple(
         truth if condition == wanted else old for condition, old in zip(conditions, state.monitors, strict=True)
@@ -66,7 +59,7 @@ def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Re
     return State(state.values, state.ages, monitors)
 
 
-def _value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refused:
+def _value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refusal:
     if signal.kind == POSITION:
         return _place(signal, text, policy)
     if signal.kind == ENUMERATION:
@@ -74,34 +67,34 @@ def _value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refus
         labels = [label for _, label in signal.labels]
         near = nearest(text, labels)
         help = f"did you mean `{near}`?" if near is not None else f"it is one of {', '.join(labels)}"
-        return Refused(f"`{text}` is no value of `{signal.name}`", help) if value is None else (value,)
+        return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help) if value is None else (value,)
     return _number(signal, text)
 
 
-def _number(signal: Signal, text: str) -> tuple[int, ...] | Refused:
+def _number(signal: Signal, text: str) -> tuple[int, ...] | Refusal:
     dimension = Dimension(signal.dimension)
     measured = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
     units = ", ".join(f"`{name}`" for name, unit in UNITS.items() if unit.dimension is measured)
     help = f"write a {dimension.value} with one of the units {units}" if units else "write a whole number"
     match = _NUMBER.fullmatch(text)
     if match is None:
-        return Refused(f"`{text}` is no value of `{signal.name}`", help)
+        return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help)
     found = exact(match[2], match[3] or None, negative=bool(match[1]))
     if found.trouble is not None or found.dimension is not measured or abs(found.value) > MAX_VALUE:
-        return Refused(f"`{text}` is no {dimension.value} that `{signal.name}` can have", help)
+        return Refusal("usage", f"`{text}` is no {dimension.value} that `{signal.name}` can have", help)
     return (found.value,)
 
 
-def _place(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refused:
+def _place(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refusal:
     match = _PLACE.fullmatch(text)
     help = "write `47.39774 N, 8.54559 E`, within 500 km of home"
     if match is None:
-        return Refused(f"`{text}` is no value of `{signal.name}`", help)
+        return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help)
     latitude = exact(match[1], "deg", negative=match[2] == "S")
     longitude = exact(match[3], "deg", negative=match[4] == "W")
     if latitude.trouble is not None or longitude.trouble is not None:
-        return Refused(f"`{text}` has more than 7 decimals", help)
+        return Refusal("usage", f"`{text}` has more than 7 decimals", help)
     place = project(policy.projection, latitude.value, longitude.value)
     if max(map(abs, place)) > MAX_COORDINATE:
-        return Refused(f"`{text}` is too far from the vehicle's home", help)
+        return Refusal("usage", f"`{text}` is too far from the vehicle's home", help)
     return place

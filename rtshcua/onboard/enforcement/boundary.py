@@ -10,6 +10,7 @@ from rtshcua.decision.decide import Decision, decide
 from rtshcua.decision.in_force import InForce
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.mission import OnInadmissible
@@ -21,7 +22,7 @@ from rtshcua.onboard.enforcement.mint import Mint
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
-from rtshcua.wire.request import FALLBACK_LINK, STEP, Malformed, Request, decode
+from rtshcua.wire.request import FALLBACK_LINK, STEP, Request, decode
 from rtshcua.wire.response import (
     NO_CLAUSE,
     NO_TARGET,
@@ -77,7 +78,7 @@ class SoftwareBoundary:
     def enforce(self, request: bytes) -> bytes:
         """Decide one request. Hostile bytes get a refusal; nothing is raised and nothing is remembered of them."""
         asked = decode(request, self._slots, self._monitors)
-        if isinstance(asked, Malformed):
+        if isinstance(asked, Refusal):
             return encode_refusal(Status.MALFORMED)
         now_us = asked.now.monotonic_us
         if not max(self._now_us, asked.released_us) <= now_us:  # a release to come would move the deadline

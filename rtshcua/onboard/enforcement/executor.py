@@ -7,8 +7,9 @@ and that chains go forward only. A standing permit is good for each of its links
 `AGAIN` times more.
 """
 
-from enum import StrEnum
+from typing import Final
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -21,18 +22,15 @@ _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 _UNTOUCHED = DEGRADE - 1
 _ALWAYS = (1 << 63) - 1  # us
 
-
-class PermitRefusal(StrEnum):
-    """Why a permit sends nothing."""
-
-    FORGED = "permit/forged"
-    USED = "permit/used"
-    LATE = "permit/late"
-    NOT_COVERED = "permit/not-covered"  # a link that does not stand behind this permit
-    LAPSED = "permit/lapsed"  # standing, but its step is over or its flight has landed
-    OUT_OF_TURN = "permit/out-of-turn"  # a step while another runs, or one behind it
-    MISSION_OVER = "permit/mission-over"  # a step after a return or a landing began, or after a recall
-    BACKWARDS = "permit/backwards"  # a link before the one that was flown
+# why a permit sends nothing
+FORGED: Final = Refusal("permit/forged", "it is not sealed with the key of this session")
+USED: Final = Refusal("permit/used", "it was dispatched before")
+LATE: Final = Refusal("permit/late", "its time is over")
+NOT_COVERED: Final = Refusal("permit/not-covered", "the link does not stand behind this permit")
+LAPSED: Final = Refusal("permit/lapsed", "it is standing, but its step is over or its flight has landed")
+OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "it is for a step while another runs, or for one behind it")
+MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was recalled")
+BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
 
 
 class Executor:
@@ -56,23 +54,23 @@ class Executor:
         self._homeward = False  # a link began a return or a landing,
         self._final = False  # and it was one of the contingency
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | PermitRefusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
         """What to send for a permit at a monotonic time, or why nothing is sent."""
         permit = open_permit(sealed, self._key)
         if permit is None:
-            return PermitRefusal.FORGED
+            return FORGED
         return self._dispatch(permit, now_us)
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | PermitRefusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
         permit = open_permit(sealed, self._key)
         if permit is None:
-            return PermitRefusal.FORGED
+            return FORGED
         fallback = kind == FALLBACK_LINK
         if not 0 <= link < (permit.fallbacks if fallback else permit.contingencies):
-            return PermitRefusal.NOT_COVERED
+            return NOT_COVERED
         if permit.kind != STEP or self._lapsed(permit, fallback=fallback):
-            return PermitRefusal.LAPSED
+            return LAPSED
         step = permit.step if fallback else -1
         serial = permit.serial + 1 + link + (0 if fallback else permit.fallbacks)
         if not fallback and link == permit.contingencies - 1:
@@ -80,11 +78,11 @@ class Executor:
             serial = next((each for each in again if each not in self._used), serial + AGAIN)
         return self._dispatch(Permit(kind, step, link, serial, 0, 0, _ALWAYS), now_us)
 
-    def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | PermitRefusal:
+    def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
         if permit.serial in self._used:
-            return PermitRefusal.USED
+            return USED
         if now_us > permit.not_after_us:
-            return PermitRefusal.LATE
+            return LATE
         refusal = self._refuse_step(permit) if permit.kind == STEP else self._refuse_link(permit)
         if refusal is not None:
             return refusal
@@ -127,11 +125,11 @@ class Executor:
         else:
             self._fallback = (permit.step, _position(permit))
 
-    def _refuse_step(self, permit: Permit) -> PermitRefusal | None:
+    def _refuse_step(self, permit: Permit) -> Refusal | None:
         if self._homeward or self._commands.recalled:
-            return PermitRefusal.MISSION_OVER
+            return MISSION_OVER
         if self._running or permit.step <= self._step:
-            return PermitRefusal.OUT_OF_TURN
+            return OUT_OF_TURN
         return None
 
     def _lapsed(self, permit: Permit, *, fallback: bool) -> bool:
@@ -140,15 +138,15 @@ class Executor:
             return True
         return fallback and permit.serial != self._serial
 
-    def _refuse_link(self, permit: Permit) -> PermitRefusal | None:
+    def _refuse_link(self, permit: Permit) -> Refusal | None:
         if permit.kind == CONTINGENCY_LINK:
             # Holds may come and go; once the contingency brings it home or down, it goes on from there.
-            return PermitRefusal.BACKWARDS if self._final and permit.link < self._contingency else None
+            return BACKWARDS if self._final and permit.link < self._contingency else None
         if permit.step < self._step:
-            return PermitRefusal.LAPSED
+            return LAPSED
         step, last = self._fallback
         if self._final or (permit.step == step and _position(permit) <= last):
-            return PermitRefusal.BACKWARDS
+            return BACKWARDS
         return None
 
 

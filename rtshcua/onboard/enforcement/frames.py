@@ -9,9 +9,9 @@ A rule needs to know which autopilot it speaks to and how high its home lies. Bo
 in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
 """
 
-from enum import StrEnum
 from typing import Final, NamedTuple, Protocol
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frame_shape import GLOBAL_POSITION_INT, HEARTBEAT, Frame, read_frame
 from rtshcua.onboard.enforcement.housekeeping_frames import Housekeeping, housekeeping
@@ -26,20 +26,18 @@ AUTOPILOT: Final = 1
 #: sent above sea would move with it.
 HOME_MOVES: Final = 10_000
 
-
-class FrameRefusal(StrEnum):
-    """Why a frame does not leave."""
-
-    NOT_ONE_FRAME = "frame/not-one-frame"  # not exactly one whole, unsigned MAVLink 2 frame
-    NO_VEHICLE = "frame/no-vehicle"  # no autopilot was heard yet
-    NOT_OURS = "frame/not-ours"  # it claims another sender
-    WRONG_TARGET = "frame/wrong-target"  # to another system or component, or to everybody
-    FORCED_ARMING = "frame/forced-arming"  # arming or disarming past the autopilot's own checks
-    AFTER_START = "frame/after-start"  # a fence, once anything flew
-    NO_SESSION = "frame/no-session"  # it moves the vehicle, and nothing that was permitted does so now
-    NOT_COVERED = "frame/not-covered"  # it is no part of the command that was permitted
-    OUT_OF_ORDER = "frame/out-of-order"  # a point of its path before its turn: the leg there was never checked
-    LATE = "frame/late"  # the command's first frame, after its permit's time
+# why a frame does not leave
+NOT_ONE_FRAME: Final = Refusal("frame/not-one-frame", "it is not exactly one whole, unsigned MAVLink 2 frame")
+NO_VEHICLE: Final = Refusal("frame/no-vehicle", "no autopilot was heard yet")
+NOT_OURS: Final = Refusal("frame/not-ours", "it claims another sender")
+WRONG_TARGET: Final = Refusal("frame/wrong-target", "it is to another system or component, or to everybody")
+FORCED_ARMING: Final = Refusal("frame/forced-arming", "it arms or disarms past the autopilot's own checks")
+AFTER_START: Final = Refusal("frame/after-start", "it is about a fence, once anything flew")
+NO_SESSION: Final = Refusal("frame/no-session", "it moves the vehicle, and nothing that was permitted does so now")
+NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command that was permitted")
+#: the leg there was never checked
+OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "it is to a point of the path before its turn")
+LATE: Final = Refusal("frame/late", "it is the command's first frame, after its permit's time")
 
 
 class Signer(Protocol):
@@ -57,7 +55,7 @@ class Gate(Protocol):
         """Take in one good frame from the link."""
         ...
 
-    def seal(self, frame: bytes, now_us: int) -> bytes | FrameRefusal:
+    def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
         """The octets to send for a frame, or why it is not sent."""
         ...
 
@@ -120,45 +118,45 @@ class FrameSession:
             if settled is None or abs(home_amsl - settled) <= HOME_MOVES:
                 self._home_amsl = home_amsl
 
-    def seal(self, frame: bytes, now_us: int) -> bytes | FrameRefusal:
+    def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
         """The octets to send for a frame at a monotonic time, or why it is not sent."""
         refusal = self._refuse(frame, now_us)
         if refusal is not None:
             return refusal
         return frame if self._signer is None else self._signer.sign(frame, now_us)
 
-    def _refuse(self, octets: bytes, now_us: int) -> FrameRefusal | None:
+    def _refuse(self, octets: bytes, now_us: int) -> Refusal | None:
         # 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else
         frame = read_frame(octets)
         if frame is None:
-            return FrameRefusal.NOT_ONE_FRAME
+            return NOT_ONE_FRAME
         if not self._system:
-            return FrameRefusal.NO_VEHICLE
+            return NO_VEHICLE
         if (frame.system, frame.component) != (self._system, OURS):
-            return FrameRefusal.NOT_OURS
+            return NOT_OURS
         target = frame.target
         if target is not None and target != (self._system, AUTOPILOT):
-            return FrameRefusal.WRONG_TARGET
+            return WRONG_TARGET
         # 2. never, whatever is permitted
         if is_forced_arming(frame):
-            return FrameRefusal.FORCED_ARMING
+            return FORCED_ARMING
         # 3. always, or before the flight
         match housekeeping(frame):
             case Housekeeping.ALWAYS:
                 return None
             case Housekeeping.BEFORE_FLIGHT:
-                return FrameRefusal.AFTER_START if self._started else None
+                return AFTER_START if self._started else None
         # 4. what is permitted now
         return self._refuse_motion(frame, now_us)
 
-    def _refuse_motion(self, frame: Frame, now_us: int) -> FrameRefusal | None:
+    def _refuse_motion(self, frame: Frame, now_us: int) -> Refusal | None:
         session = self._session
         if session is None:
-            return FrameRefusal.NO_SESSION
+            return NO_SESSION
         if not carries_out(frame, session.command, self._autopilot, self._home_amsl):
-            return FrameRefusal.NOT_COVERED
+            return NOT_COVERED
         if not self._begun and now_us > session.not_after_us:
-            return FrameRefusal.LATE
+            return LATE
         point = point_of(frame)
         if point is not None:
             path = tuple(zip(session.command.geo[::2], session.command.geo[1::2], strict=True))
@@ -166,7 +164,7 @@ class FrameSession:
             legs = (self._leg, self._leg + 1) if there else (self._leg,)
             turn = [leg for leg in legs if 0 <= leg < len(path) and path[leg] == point]
             if not turn:
-                return FrameRefusal.OUT_OF_ORDER
+                return OUT_OF_ORDER
             self._leg = turn[0]
         self._begun = True
         return None

@@ -11,8 +11,9 @@ from typing import Final
 import msgspec
 
 from rtshcua.decision.in_force import InForce
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.commands import Commands
@@ -32,13 +33,6 @@ class Mode(StrEnum):
 
     NONE = "none"
     SOFTWARE = "software"
-
-
-class LoadRefusal(msgspec.Struct, frozen=True):
-    """Why a bundle does not run here: a stable slug, and a text for a person."""
-
-    slug: str
-    text: str
 
 
 class Loaded(msgspec.Struct, frozen=True):
@@ -78,28 +72,28 @@ def load(
     mode: Mode,
     session_key: bytes,
     peer_is_own_simulator: bool,
-) -> Loaded | LoadRefusal:
+) -> Loaded | Refusal:
     """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else.
 
-    Raises ValueError for a session key of another length; whatever is wrong with the bundle is a `LoadRefusal`.
+    Raises ValueError for a session key of another length; whatever is wrong with the bundle is a `Refusal`.
     """
     if len(session_key) != SESSION_KEY_BYTES:
         raise ValueError(f"a session key has {SESSION_KEY_BYTES} bytes, not {len(session_key)}")
     if mode is Mode.NONE and not peer_is_own_simulator:
-        return LoadRefusal("mode-refused", "mode `none` flies nothing but the simulated vehicle that this run started")
+        return Refusal("mode-refused", "mode `none` flies nothing but the simulated vehicle that this run started")
     try:
         opened = open_bundle(bundle, root=root, vehicle=vehicle, now_us=now.utc_us)
     except Untrusted as error:
-        return LoadRefusal(error.slug, str(error))
+        return Refusal(error.slug, str(error))
     policy = prepare(opened.policy)
-    if isinstance(policy, Malformed):
-        return LoadRefusal("malformed", f"the policy does not make sense: {policy.what}")
+    if isinstance(policy, Refusal):
+        return Refusal("malformed", f"the policy does not make sense: {policy.text}")
     invocations = prepare_mission(opened.mission, policy)
-    if isinstance(invocations, Malformed):
-        return LoadRefusal("malformed", f"the mission does not make sense: {invocations.what}")
+    if isinstance(invocations, Refusal):
+        return Refusal("malformed", f"the mission does not make sense: {invocations.text}")
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
-        return LoadRefusal("malformed", f"the {what}")
+        return Refusal("malformed", f"the {what}")
     return session(opened, policy, invocations, root=root, vehicle=vehicle, mode=mode, session_key=session_key)
 
 

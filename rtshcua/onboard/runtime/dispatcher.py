@@ -1,7 +1,8 @@
 """The dispatcher: hands permits to the executor, and keeps the one command that flies."""
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal
+from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.ports import Dispatch, Release
 from rtshcua.onboard.runtime.flight import Active, Key
 from rtshcua.onboard.runtime.journal import Journal
@@ -38,10 +39,10 @@ class Dispatcher:
         permit = self._standing[1]
         return self._send(now, self._executor.stand_in(permit, kind, link, now.monotonic_us), key, lasting_us)
 
-    def _send(self, now: Now, dispatch: Dispatch | PermitRefusal, key: Key, lasting_us: int | None) -> bool:
+    def _send(self, now: Now, dispatch: Dispatch | Refusal, key: Key, lasting_us: int | None) -> bool:
         kind, step, link = key
-        if isinstance(dispatch, PermitRefusal):
-            self._journal.effect(now, "refused", kind=kind, step=step, link=link, detail=dispatch)
+        if isinstance(dispatch, Refusal):
+            self._journal.effect(now, "refused", kind=kind, step=step, link=link, detail=dispatch.slug)
             return False
         at_us, command = now.monotonic_us, dispatch.command
         self.end(now, "replaced")

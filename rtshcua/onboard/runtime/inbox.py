@@ -7,6 +7,7 @@ what it refused is recorded by its slug, and no more often than `REFUSED_EVERY_U
 from base64 import b64encode
 from typing import Final
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending, Presented, Reply
 from rtshcua.onboard.runtime.conduct import Conduct
@@ -16,7 +17,6 @@ from rtshcua.wire import names
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.receipt import APPROVAL, RECALL, UNKNOWN, Receipt, decode
 from rtshcua.wire.request import STEP
-from rtshcua.wire.response import Unusable
 from rtshcua.wire.untrusted import Untrusted
 
 #: how often a refused document leaves a record, in us: whoever floods the vehicle must not fill its disk
@@ -46,7 +46,7 @@ class Inbox:
         if conduct.stage is Stage.FALLING and not _recalls(document):
             return Receipt(UNKNOWN, "falling-back", "the mission is over: the vehicle falls back")
         receipt = decode(conduct.loaded.boundary.present(document, now, conduct.queue.released))
-        return Receipt(UNKNOWN, "unanswered", receipt.text) if isinstance(receipt, Unusable) else receipt
+        return Receipt(UNKNOWN, "unanswered", receipt.text) if isinstance(receipt, Refusal) else receipt
 
     def _accepted(self, now: Now, receipt: Receipt, document: bytes) -> None:
         conduct = self._conduct

@@ -8,6 +8,7 @@ from zlib import crc32
 
 from fuzz import corpus, world
 from fuzz.mutation.sentences import mutated as mutated
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.compiler.program import check_declared
 from rtshcua.ground.editor.actions import actions
 from rtshcua.ground.editor.colours import colours
@@ -19,7 +20,7 @@ from rtshcua.ground.editor.navigation import definitions, imported_at, importers
 from rtshcua.ground.editor.outline import folds, outline
 from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.positions import Change, Encoding, Lines, difference, edited
-from rtshcua.ground.editor.rename import Refused, renamable, rename
+from rtshcua.ground.editor.rename import renamable, rename
 from rtshcua.ground.editor.signatures import signature
 from rtshcua.ground.language.parse import parse
 from rtshcua.mavlink import dialect
@@ -119,6 +120,6 @@ def _asked(desk: Desk, of: Random) -> None:
         signature(view, now, at)
         for action in actions(found, file, at, min(len(text), at + 50), text):
             assert all(0 <= fix.span.start <= fix.span.end <= len(text) for fix in action.fixes)
-        if not isinstance(renamable(desk, view, file, at), Refused):
+        if not isinstance(renamable(desk, view, file, at), Refusal):
             made = rename(desk, (), view, file, at, of.choice(_NAMES), dialect.load())
-            assert isinstance(made, Refused) or not made.places or made.applied(file, text)
+            assert isinstance(made, Refusal) or not made.places or made.applied(file, text)

@@ -7,10 +7,10 @@ from random import Random
 
 from fuzz import board
 from reference import world as reference
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Malformed, Request, decode, encode
-from rtshcua.wire.response import Unusable
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, decode, encode
 from rtshcua.wire.response import decode as read
 from virtual.case import flat
 from virtual.shipped import shipped
@@ -91,6 +91,6 @@ def one(data: bytes) -> None:
         requests = [prefix + data[at : at + size] for at in range(1, len(data), size)]
     for request in requests:
         asked = decode(request, policy.slots, len(policy.monitors))
-        assert isinstance(asked, Malformed) or encode(asked) == request
+        assert isinstance(asked, Refusal) or encode(asked) == request
         said = read(boundary.enforce(request))
-        assert not isinstance(said, Unusable), said
+        assert not isinstance(said, Refusal), said

@@ -16,7 +16,7 @@ from rtshcua.adapters.files.witness import FileWitness, WitnessStore
 from rtshcua.adapters.witness_client import Anchor, Trouble, WitnessClient
 from rtshcua.adapters.witness_link import ANSWER, REQUEST, WitnessLink
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
-from rtshcua.evidence.witnessing.witness import Answer, Refusal, Request
+from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
 from rtshcua.mavlink.frames import Codec
 from rtshcua.mavlink.tunnel import answer_name, messages, name_of
 from rtshcua.wire.keys import SigningKey
@@ -41,7 +41,7 @@ class Served:
     def address(self) -> tuple[str, int]:
         return HOST, self.link.port
 
-    def consider(self, request: Request) -> Answer | Refusal:
+    def consider(self, request: Request) -> Answer | Declined:
         self.asked.append(request)
         return self.witness.consider(request)
 
@@ -298,7 +298,7 @@ def test_a_witness_that_the_root_does_not_name(serve: Callable[..., Served], wri
 
 
 def test_a_log_that_the_witness_does_not_know(tmp_path: Path, writer: Writer) -> None:
-    link = WitnessLink((HOST, 0), lambda request: Refusal(404, "nothing is known of \x1b[31m it"))
+    link = WitnessLink((HOST, 0), lambda request: Declined(404, "nothing is known of \x1b[31m it"))
     over = threading.Event()
     thread = threading.Thread(target=lambda: [link.serve(0.01) for _ in iter(over.is_set, True)])
     thread.start()

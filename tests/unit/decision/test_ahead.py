@@ -14,11 +14,12 @@ from reference.flat_case import HEIGHT, NOW, POSITION_X, POSITION_Y, M, S
 from rtshcua.decision.ahead import UNKNOWN_AHEAD, ahead
 from rtshcua.decision.case import situation
 from rtshcua.decision.holding import WAY_HOME, holding
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.decision.truth import FALSE, UNKNOWN
 from rtshcua.decision.values import MISSING
 from rtshcua.decision.watch import watch
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import NUMBER, Signal
@@ -215,5 +216,5 @@ def test_without_braking_it_is_where_it_was_measured() -> None:
 def test_a_vehicle_that_makes_no_sense_is_refused(fields: dict[str, int], problem: str) -> None:
     policy = braking(2_000, 0)
     found = prepare(replace(policy, vehicle=replace(policy.vehicle, **fields)))
-    assert isinstance(found, Malformed)
-    assert found.what.startswith(problem)
+    assert isinstance(found, Refusal)
+    assert found.text.startswith(problem)

@@ -5,8 +5,9 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import INSPECT, M
-from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_invocation, prepare_mission
 from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
@@ -32,7 +33,7 @@ def with_link(*arguments: int) -> Policy:
 
 def wrong(policy: Policy) -> str:
     found = prepare(policy)
-    return found.what if isinstance(found, Malformed) else ""
+    return found.text if isinstance(found, Refusal) else ""
 
 
 def test_a_link_flies_no_faster_than_the_vehicle() -> None:
@@ -61,8 +62,8 @@ def test_where_nothing_is_on_earth_nothing_is_flown(projection: Projection, plac
     step = flat.INVOCATIONS[1]
     there = replace(step, arguments=(*place, 20 * M), plan=replace(step.plan, path=place))
     found = prepare_invocation(there, policy, flat.MISSION.phases)
-    assert isinstance(found, Malformed)
-    assert found.what.startswith(f"plan: {at}")
+    assert isinstance(found, Refusal)
+    assert found.text.startswith(f"plan: {at}")
 
 
 def test_a_skill_that_covers_has_one_zone() -> None:
@@ -79,7 +80,7 @@ def test_two_phases_of_one_name() -> None:
     policy = prepare(P)
     assert isinstance(policy, PreparedPolicy)
     twice = replace(flat.MISSION, phases=("departure", "inspection", "inspection"))
-    assert prepare_mission(twice, policy) == Malformed("two phases have the same name")
+    assert prepare_mission(twice, policy) == Refusal("malformed", "two phases have the same name")
 
 
 @pytest.mark.parametrize("numerator", [0, -1])

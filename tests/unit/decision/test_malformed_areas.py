@@ -6,8 +6,9 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.flat_case import H
 from reference.outlines import area, polygon, zig_zag
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import DAY, MAX_TOTAL_VERTICES, MAX_VALUE
 from rtshcua.model.flat.zone import AREA, LOWEST, MAX_COORDINATE, MAX_RINGS, Zone
 
@@ -16,7 +17,7 @@ HOLE = ((-5, -5), (-5, 5), (5, 5), (5, -5))
 GOOD = area([SQUARE, HOLE], floor=0, ceiling=9)
 
 
-def found(*zones: Zone) -> PreparedPolicy | Malformed:
+def found(*zones: Zone) -> PreparedPolicy | Refusal:
     return prepare(replace(flat.POLICY, zones=(*flat.ZONES, *zones)))
 
 
@@ -56,8 +57,8 @@ REFUSED = [
 @pytest.mark.parametrize(("zone", "what"), REFUSED, ids=[what for _, what in REFUSED])
 def test_refused(zone: Zone, what: str) -> None:
     answer = found(zone)
-    assert isinstance(answer, Malformed)
-    assert answer.what.startswith(f"zone {len(flat.ZONES)}: {what}")
+    assert isinstance(answer, Refusal)
+    assert answer.text.startswith(f"zone {len(flat.ZONES)}: {what}")
 
 
 @pytest.mark.parametrize(
@@ -78,5 +79,5 @@ def test_accepted(zone: Zone) -> None:
 def test_the_corners_of_all_zones_are_counted_before_they_are_looked_at() -> None:
     huge = raw(1 << 40, *(0,) * (2 * MAX_TOTAL_VERTICES + 2 * MAX_RINGS + 2))
     answer = found(huge)
-    assert isinstance(answer, Malformed)
-    assert answer.what.startswith("number of vertices")
+    assert isinstance(answer, Refusal)
+    assert answer.text.startswith("number of vertices")

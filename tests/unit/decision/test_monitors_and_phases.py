@@ -13,13 +13,14 @@ from rtshcua.decision.decide import Decision, decide, possible
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.links import choose_contingency, choose_fallback, link_admissible
 from rtshcua.decision.nearest import nearest
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.reads import monitored, slots_read
 from rtshcua.decision.scope import Scope, scope_of
 from rtshcua.decision.tree import InPhase, Monitored, parse
 from rtshcua.decision.values import Sets
 from rtshcua.decision.watch import watch
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP, MAX_MONITORS, MAX_PHASE_NAMES, MAX_WINDOW
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, RuleKind
@@ -114,8 +115,8 @@ def observing(*monitors: Monitor) -> Policy:
 )
 def test_a_malformed_policy(policy: Policy, what: str) -> None:
     found = prepare(policy)
-    assert isinstance(found, Malformed)
-    assert found.what.startswith(what)
+    assert isinstance(found, Refusal)
+    assert found.text.startswith(what)
 
 
 def test_the_largest_monitors_are_well_formed() -> None:
@@ -142,11 +143,11 @@ def _at(when: Clause, number: int) -> tuple[int, ...]:
 
 
 def test_the_reads_of_a_contract_count_its_monitors() -> None:
-    def hovering(reads: tuple[int, ...]) -> PreparedPolicy | Malformed:
+    def hovering(reads: tuple[int, ...]) -> PreparedPolicy | Refusal:
         hover = replace(P.contracts[HOVER], assume=(asks(0),), reads=reads)
         return prepare(replace(P, contracts=(*P.contracts[:HOVER], hover, *P.contracts[HOVER + 1 :])))
 
-    assert hovering((flat.FIX,)) == Malformed("skill `hover`: `reads` is not what the clauses read")
+    assert hovering((flat.FIX,)) == Refusal("malformed", "skill `hover`: `reads` is not what the clauses read")
     assert isinstance(hovering((WIND, flat.FIX)), PreparedPolicy)
 
 

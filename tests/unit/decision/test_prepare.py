@@ -14,9 +14,10 @@ from reference.asking import POLICY, STEP
 from reference.flat_case import GOTO, HOVER, INSPECT, M
 from rtshcua.decision.decide import decide
 from rtshcua.decision.links import choose_contingency, choose_fallback
-from rtshcua.decision.prepare import Malformed, prepare, prepare_invocation, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_invocation, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.watch import watch
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
 from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STALE, MAX_ZONES
 from rtshcua.model.flat.mission import Invocation, Mission
@@ -212,15 +213,16 @@ POLICIES: list[tuple[Policy, str]] = [
 @pytest.mark.parametrize(("policy", "what"), POLICIES, ids=[what for _, what in POLICIES])
 def test_a_malformed_policy(policy: Policy, what: str) -> None:
     found = prepare(policy)
-    assert isinstance(found, Malformed)
-    assert found.what.startswith(what)
+    assert isinstance(found, Refusal)
+    assert found.text.startswith(what)
 
 
 def test_more_combinations_of_skills_and_roles_than_fit() -> None:
     wide = replace(P.rules[3], skills=tuple(range(250)), roles=tuple(range(64)))
     policy = replace(P, contracts=P.contracts[1:2] * 250, roles=("r",) * 64, rules=(wide,) * 17)
     policy = replace(policy, contracts=tuple(replace(c, fallback=()) for c in policy.contracts), contingency=())
-    assert prepare(policy) == Malformed("number of skills times roles in the rules 272000 is not in 0..262144")
+    what = "number of skills times roles in the rules 272000 is not in 0..262144"
+    assert prepare(policy) == Refusal("malformed", what)
 
 
 S = STEP
@@ -309,8 +311,8 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
 @pytest.mark.parametrize(("invocation", "what"), INVOCATIONS, ids=[what for _, what in INVOCATIONS])
 def test_a_malformed_invocation(invocation: Invocation, what: str) -> None:
     found = prepare_invocation(invocation, POLICY, flat.MISSION.phases)
-    assert isinstance(found, Malformed)
-    assert found.what.startswith(what)
+    assert isinstance(found, Refusal)
+    assert found.text.startswith(what)
 
 
 @pytest.mark.parametrize(
@@ -372,7 +374,7 @@ def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: i
 )
 def test_a_malformed_mission(mission: Mission, what: str) -> None:
     found = prepare_mission(mission, POLICY)
-    assert found == Malformed(what)
+    assert found == Refusal("malformed", what)
 
 
 def test_a_bundle_needs_neither_rules_nor_zones() -> None:
@@ -420,10 +422,10 @@ def damage(of: Random, struct: Any) -> Any:
 def test_no_damage_makes_it_fail(of: Random) -> None:
     whole = of.choice([worlds.policy(of), flat.POLICY])
     policy = prepare(damage(of, whole) if of.random() < 0.7 else whole)
-    if isinstance(policy, Malformed):
+    if isinstance(policy, Refusal):
         return
     invocation = prepare_invocation(damage(of, worlds.invocation(of, whole)), policy, flat.MISSION.phases)
-    if isinstance(invocation, Malformed):
+    if isinstance(invocation, Refusal):
         return
     state, now = damage(of, worlds.state(of, len(policy.monitors))), damage(of, worlds.now(of))
     context = damage(of, worlds.context(of, invocation.invocation))

@@ -5,9 +5,10 @@ import pytest
 
 from reference import flat_case as flat
 from rtshcua.decision.places import WellKnown
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner, flown_at
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle
 
@@ -48,5 +49,5 @@ def test_the_leg_home_is_flown_at_that_altitude() -> None:
 
 def test_loading_refuses_a_return_below_ground() -> None:
     found = prepare(returning(-1))
-    assert isinstance(found, Malformed)
-    assert "return altitude" in found.what
+    assert isinstance(found, Refusal)
+    assert "return altitude" in found.text

@@ -9,8 +9,9 @@ from reference import flat_case as flat
 from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract, with_rules
 from reference.flat_case import BATTERY, INSPECT, MIN, NOW, OPERATOR, SUPERVISOR, S, clause, rule
 from rtshcua.decision.decide import Possible, decide, possible
-from rtshcua.decision.prepare import Malformed, prepare_invocation
+from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.decision.values import MISSING, Sets, interval, maybe, point
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.flat.policy import RuleKind
@@ -45,7 +46,7 @@ def test_a_place_out_of_all_coordinates() -> None:
     step = flat.INVOCATIONS[1]
     there = replace(step, arguments=(far + 1, 0, 20_000))
     found = prepare_invocation(there, POLICY, flat.MISSION.phases)
-    assert found == Malformed("plan: the path does not fit the arguments")
+    assert found == Refusal("malformed", "plan: the path does not fit the arguments")
     edge = replace(step, arguments=(far, 0, 20_000), plan=replace(step.plan, path=(far, 0)))
     assert ask(edge).reason is Reason.AIRSPACE
 

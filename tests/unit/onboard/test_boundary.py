@@ -7,7 +7,7 @@ from reference.world import START, FakeVehicle, Run, allowed, answer_to, loaded,
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
-from rtshcua.onboard.enforcement.executor import PermitRefusal
+from rtshcua.onboard.enforcement.executor import LAPSED
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.response import Answer, Status, own_clauses, shared_clauses
 
@@ -64,7 +64,7 @@ def test_a_link_of_an_earlier_step_that_was_minted_in_time_is_lapsed_by_the_next
     allowed(of)
     link = allowed(of, 1, 0, 0)
     of.executor.dispatch(allowed(of, step=1), START.monotonic_us)
-    assert of.executor.dispatch(link, START.monotonic_us) is PermitRefusal.LAPSED
+    assert of.executor.dispatch(link, START.monotonic_us) is LAPSED
 
 
 def test_a_contingency_without_a_hold_leaves_a_deferred_vehicle_where_it_is() -> None:

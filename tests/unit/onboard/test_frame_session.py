@@ -8,10 +8,23 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frame_shape import LAYOUTS
-from rtshcua.onboard.enforcement.frames import FrameRefusal, FrameSession
+from rtshcua.onboard.enforcement.frames import (
+    AFTER_START,
+    FORCED_ARMING,
+    LATE,
+    NO_SESSION,
+    NO_VEHICLE,
+    NOT_COVERED,
+    NOT_ONE_FRAME,
+    NOT_OURS,
+    OUT_OF_ORDER,
+    WRONG_TARGET,
+    FrameSession,
+)
 from rtshcua.onboard.ports import Command
 
 SYSTEM, HOME_AMSL = 3, 488_000
@@ -174,10 +187,10 @@ def test_a_permitted_command_is_carried_out_and_no_other(
     autopilot: int, message: Any, kinds: tuple[MotionKind, ...]
 ) -> None:
     frame = pack(message)
-    assert session(autopilot).seal(frame, NOW) is FrameRefusal.NO_SESSION
+    assert session(autopilot).seal(frame, NOW) is NO_SESSION
     for kind in K:
         sealed = session(autopilot, command(kind)).seal(frame, NOW)
-        assert sealed == (frame if kind in kinds else FrameRefusal.NOT_COVERED), kind
+        assert sealed == (frame if kind in kinds else NOT_COVERED), kind
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
@@ -194,7 +207,7 @@ def test_a_fence_passes_until_something_flies() -> None:
     gate.open(command(K.CLIMB), LATEST)
     gate.close()
     for message in BEFORE_FLIGHT:
-        assert gate.seal(pack(message), NOW) is FrameRefusal.AFTER_START, named(message)
+        assert gate.seal(pack(message), NOW) is AFTER_START, named(message)
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
@@ -210,7 +223,7 @@ def test_nothing_is_armed_or_disarmed_by_force(forced: float, on: int) -> None:
     by_int = reposition(command=400, param1=on, param2=forced)
     for message in (long(400, on, forced), by_int):
         for gate in (session(PX4), session(ARDUPILOT, command(K.CLIMB))):
-            assert gate.seal(pack(message), NOW) is FrameRefusal.FORCED_ARMING
+            assert gate.seal(pack(message), NOW) is FORCED_ARMING
 
 
 REFUSED: list[tuple[str, int, MotionKind, Any]] = [
@@ -273,7 +286,7 @@ REFUSED: list[tuple[str, int, MotionKind, Any]] = [
 
 @pytest.mark.parametrize(("why", "autopilot", "kind", "message"), REFUSED, ids=lambda value: str(value)[:40])
 def test_what_is_nearly_the_command_is_not(why: str, autopilot: int, kind: MotionKind, message: Any) -> None:
-    assert session(autopilot, command(kind)).seal(pack(message), NOW) is FrameRefusal.NOT_COVERED, why
+    assert session(autopilot, command(kind)).seal(pack(message), NOW) is NOT_COVERED, why
 
 
 def test_without_a_speed_the_vehicle_takes_its_own() -> None:
@@ -309,7 +322,7 @@ def test_without_homes_height_nothing_goes_above_sea() -> None:
 
 def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
     gate = FrameSession()
-    assert gate.seal(pack(ALWAYS[0]), NOW) is FrameRefusal.NO_VEHICLE
+    assert gate.seal(pack(ALWAYS[0]), NOW) is NO_VEHICLE
     for nobody in (
         pack(heartbeat(8), component=1),
         pack(heartbeat(PX4), component=2),
@@ -319,33 +332,33 @@ def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
         pack(heartbeat(PX4), component=1)[:-1],
     ):
         gate.observe(nobody)
-        assert gate.seal(pack(ALWAYS[0]), NOW) is FrameRefusal.NO_VEHICLE
+        assert gate.seal(pack(ALWAYS[0]), NOW) is NO_VEHICLE
     gate.observe(pack(heartbeat(ARDUPILOT), component=1))
     gate.observe(pack(heartbeat(PX4), component=1))
     gate.observe(pack(heartbeat(PX4), system=SYSTEM + 1, component=1))
     gate.open(command(K.LAND), LATEST)
     assert covers(gate, long(176, 1, 9))
-    assert gate.seal(pack(ALWAYS[0], system=SYSTEM + 1), NOW) is FrameRefusal.NOT_OURS
+    assert gate.seal(pack(ALWAYS[0], system=SYSTEM + 1), NOW) is NOT_OURS
 
 
 def test_we_speak_as_ourselves_and_to_the_autopilot_alone() -> None:
     gate = session(PX4, command(K.LAND))
-    assert gate.seal(pack(ALWAYS[0], component=190), NOW) is FrameRefusal.NOT_OURS
-    assert gate.seal(pack(ALWAYS[0], system=255), NOW) is FrameRefusal.NOT_OURS
+    assert gate.seal(pack(ALWAYS[0], component=190), NOW) is NOT_OURS
+    assert gate.seal(pack(ALWAYS[0], system=255), NOW) is NOT_OURS
     for system, component in ((0, 1), (SYSTEM + 1, 1), (SYSTEM, 0), (SYSTEM, 154)):
         message = long(176, 1, 4, 6, system=system, component=component)
-        assert gate.seal(pack(message), NOW) is FrameRefusal.WRONG_TARGET
+        assert gate.seal(pack(message), NOW) is WRONG_TARGET
         asking = m.MAVLink_param_request_list_message(system, component)
-        assert gate.seal(pack(asking), NOW) is FrameRefusal.WRONG_TARGET
+        assert gate.seal(pack(asking), NOW) is WRONG_TARGET
 
 
 def test_a_command_begins_in_its_time_and_goes_on_after_it() -> None:
     gate, land = session(PX4, command(K.LAND)), pack(long(176, 1, 4, 6))
-    assert gate.seal(land, LATEST + 1) is FrameRefusal.LATE
+    assert gate.seal(land, LATEST + 1) is LATE
     assert gate.seal(land, LATEST) == land
     assert gate.seal(land, LATEST + 5_000_000) == land
     gate.open(command(K.LAND), LATEST)
-    assert gate.seal(land, LATEST + 5_000_000) is FrameRefusal.LATE, "another command begins anew"
+    assert gate.seal(land, LATEST + 5_000_000) is LATE, "another command begins anew"
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
@@ -360,13 +373,13 @@ def test_a_path_is_flown_point_after_point(autopilot: int) -> None:
         return pack(reposition(x=x, y=y) if autopilot == PX4 else target(lat_int=x, lon_int=y))
 
     gate = session(autopilot, covering)
-    assert gate.seal(to(b), NOW) is FrameRefusal.OUT_OF_ORDER
+    assert gate.seal(to(b), NOW) is OUT_OF_ORDER
     for point, later in ((a, c), (a, c), (b, c), (b, c), (a, (1, 1)), (c, b), (c, a)):
-        assert isinstance(gate.seal(to(later), NOW), FrameRefusal)
+        assert isinstance(gate.seal(to(later), NOW), Refusal)
         assert gate.seal(to(point), NOW) == to(point)
-    assert gate.seal(to(a), NOW) is FrameRefusal.OUT_OF_ORDER, "and never back"
+    assert gate.seal(to(a), NOW) is OUT_OF_ORDER, "and never back"
     gate.open(covering, LATEST)
-    assert gate.seal(to(c), NOW) is FrameRefusal.OUT_OF_ORDER
+    assert gate.seal(to(c), NOW) is OUT_OF_ORDER
     assert gate.seal(to(a), NOW) == to(a)
 
 
@@ -378,7 +391,7 @@ def test_one_command_at_a_time_and_none_after_the_end() -> None:
     assert covers(gate, long(176, 1, 17))
     gate.close()
     assert gate.token is None
-    assert gate.seal(pack(long(176, 1, 17)), NOW) is FrameRefusal.NO_SESSION
+    assert gate.seal(pack(long(176, 1, 17)), NOW) is NO_SESSION
 
 
 def damaged(frame: bytes) -> Iterable[bytes]:
@@ -397,7 +410,7 @@ def damaged(frame: bytes) -> Iterable[bytes]:
 def test_only_one_whole_unsigned_frame_leaves() -> None:
     gate = session(PX4, command(K.LAND))
     for octets in damaged(pack(long(176, 1, 4, 6))):
-        assert gate.seal(octets, NOW) is FrameRefusal.NOT_ONE_FRAME
+        assert gate.seal(octets, NOW) is NOT_ONE_FRAME
 
 
 @EACH
@@ -486,5 +499,5 @@ def test_what_passes_is_signed_and_nothing_else() -> None:
     gate.open(command(K.LAND), LATEST)
     land = pack(long(176, 1, 4, 6))
     assert gate.seal(land, NOW) == b"signed " + land
-    assert gate.seal(pack(long(176, 1, 4, 5)), NOW) is FrameRefusal.NOT_COVERED
+    assert gate.seal(pack(long(176, 1, 4, 5)), NOW) is NOT_COVERED
     assert signer.asked == [(land, NOW)]

@@ -5,15 +5,16 @@ from msgspec.structs import replace
 
 from reference.flat_case import BATTERY, INVOCATIONS, ISSUED, MISSION, POLICY, SIGNALS, H
 from reference.world import MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, loaded, sealed, try_load
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_SLOTS
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.load import Loaded, LoadRefusal, Mode, load
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import MAX_AGE_US
 
 
-def refusal(data: bytes, **changed: object) -> LoadRefusal:
+def refusal(data: bytes, **changed: object) -> Refusal:
     arguments = {
         "root": ROOT,
         "vehicle": VEHICLE,
@@ -23,7 +24,7 @@ def refusal(data: bytes, **changed: object) -> LoadRefusal:
         "peer_is_own_simulator": False,
     }
     result = load(data, **(arguments | changed))  # type: ignore[arg-type]
-    assert isinstance(result, LoadRefusal)
+    assert isinstance(result, Refusal)
     return result
 
 

@@ -12,8 +12,9 @@ from msgspec.structs import replace
 
 from reference.flat_case import OBSTACLE, WIND, M, S
 from reference.world import SESSION_KEY, FakeVehicle, Run, assert_covered, loaded, renewed
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.executor import Executor, PermitRefusal
+from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
@@ -40,13 +41,13 @@ class Watched(Executor):
         super().__init__(SESSION_KEY, commands)
         self.passed: list[Dispatch] = []
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | PermitRefusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
         return self._noted(super().dispatch(sealed, now_us))
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | PermitRefusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
         return self._noted(super().stand_in(sealed, kind, link, now_us))
 
-    def _noted(self, result: Dispatch | PermitRefusal) -> Dispatch | PermitRefusal:
+    def _noted(self, result: Dispatch | Refusal) -> Dispatch | Refusal:
         if isinstance(result, Dispatch):
             self.passed.append(result)
         return result

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire import artefact, names
 from rtshcua.wire.receipt import APPROVAL, Receipt, decode, encode
-from rtshcua.wire.response import Unusable
 
 INTEGERS = st.integers(-(1 << 63), (1 << 63) - 1)
 
@@ -18,12 +18,12 @@ def test_what_is_encoded_is_decoded(receipt: Receipt) -> None:
 
 @given(st.binary(max_size=60))
 def test_no_other_bytes_are_one(data: bytes) -> None:
-    assert isinstance(decode(data), Unusable)
+    assert isinstance(decode(data), Refusal)
 
 
 @pytest.mark.parametrize("body", [1, (), (1,), (1, "a"), (1, 2, "b"), (1, "a", "b", 1, 1, 1, 1, 1), (1, "a", "b")])
 def test_other_bodies_are_none(body: object) -> None:
-    assert isinstance(decode(artefact.wrap(names.RECEIPT, body)), Unusable)
+    assert isinstance(decode(artefact.wrap(names.RECEIPT, body)), Refusal)
 
 
 def test_only_one_slug_is_acceptance() -> None:

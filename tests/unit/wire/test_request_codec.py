@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, cbor, names, request
-from rtshcua.wire.request import MAX_AGE_US, MAX_SIZE, STEP, Malformed, Request
+from rtshcua.wire.request import MAX_AGE_US, MAX_SIZE, STEP, Request
 
 TIME = st.integers(0, MAX_VALUE)
 
@@ -64,7 +65,7 @@ def test_a_changed_byte_is_refused_or_is_another_request(asked: Request, data: s
 
 @given(st.binary(max_size=1500))
 def test_any_bytes_are_an_answer_and_never_an_exception(data: bytes) -> None:
-    assert isinstance(request.decode(data, 4, 2), Malformed)
+    assert isinstance(request.decode(data, 4, 2), Refusal)
 
 
 GOOD = request.encode(plain())
@@ -107,7 +108,7 @@ BIG = (MAX_VALUE + 1).to_bytes(8)
 )
 def test_each_rule_is_named(data: bytes, text: str) -> None:
     read = request.decode(data, 3, 2)
-    assert isinstance(read, Malformed)
+    assert isinstance(read, Refusal)
     assert text in read.text
 
 
@@ -120,8 +121,8 @@ def test_the_body_is_one_artefact() -> None:
 def test_a_state_of_another_policy_is_refused() -> None:
     data = request.encode(plain(3))
     assert isinstance(request.decode(data, 3, 2), Request)
-    assert isinstance(request.decode(data, 4, 2), Malformed)
-    assert isinstance(request.decode(data, 3, 3), Malformed)
+    assert isinstance(request.decode(data, 4, 2), Refusal)
+    assert isinstance(request.decode(data, 3, 3), Refusal)
 
 
 def test_no_monitor_makes_what_does_not_fit() -> None:

@@ -2,10 +2,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import artefact, cbor, names, permit, response
 from rtshcua.wire.permit import SIZE, Permit
-from rtshcua.wire.response import Answer, Status, Unusable
+from rtshcua.wire.response import Answer, Status
 
 ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE)
 
@@ -54,13 +55,13 @@ def changed(data: bytes, at: int, octet: int) -> bytes:
 )
 def test_what_is_no_response_says_why(data: bytes, text: str) -> None:
     read = response.decode(data)
-    assert isinstance(read, Unusable)
+    assert isinstance(read, Refusal)
     assert text in read.text
 
 
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_without_an_exception(data: bytes) -> None:
-    assert isinstance(response.decode(data), Unusable)
+    assert isinstance(response.decode(data), Refusal)
 
 
 KEY = bytes(range(32))

@@ -2,9 +2,10 @@
 
 from functools import lru_cache
 
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.space import signals
 from rtshcua.ground.checker.context import Context
@@ -33,7 +34,7 @@ from rtshcua.model.ir.missions import MissionDecl
 def prove_policy(context: Context, lowered: LoweredPolicy) -> Ground | None:
     """The policy prepared as on board, after its proofs; None where it would be refused there."""
     asked = _asked(lowered.policy)
-    if isinstance(asked, Malformed):
+    if isinstance(asked, Refusal):
         refused(context, lowered, asked)
         return None
     prepared, questions = asked
@@ -44,12 +45,12 @@ def prove_policy(context: Context, lowered: LoweredPolicy) -> Ground | None:
 
 
 @lru_cache(maxsize=32)
-def _asked(policy: Policy) -> tuple[PreparedPolicy, Questions] | Malformed:
+def _asked(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
     """A policy prepared, and what is asked about it: missions in several files are often under the same one, and each
     is a program of its own, in which the same questions come up.
     """
     prepared = prepare(policy)
-    return prepared if isinstance(prepared, Malformed) else (prepared, Questions(prepared))
+    return prepared if isinstance(prepared, Refusal) else (prepared, Questions(prepared))
 
 
 def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> None:
@@ -57,7 +58,7 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     prepared: list[PreparedInvocation] = []
     for invocation in mission.invocations:
         found = ground.prepare(invocation, mission.phases)
-        if isinstance(found, Malformed):
+        if isinstance(found, Refusal):
             refused(ground.context, ground.lowered, found)
             return
         prepared.append(found)
@@ -82,11 +83,11 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     deferral.prove_mission(ground, steps, prepared)
 
 
-def refused(context: Context, lowered: LoweredPolicy, malformed: Malformed) -> None:
+def refused(context: Context, lowered: LoweredPolicy, malformed: Refusal) -> None:
     """Report what would not be loaded on board."""
     context.report.add(
         codes.REFUSED_ON_BOARD,
         lowered.declaration.name.span,
-        f"what `{lowered.declaration.name.text}` was compiled to would be refused on board: {malformed.what}",
+        f"what `{lowered.declaration.name.text}` was compiled to would be refused on board: {malformed.text}",
         help="this is a fault of the compiler, unless a limit is named",
     )

@@ -4,10 +4,11 @@ from dataclasses import dataclass, field
 
 from rtshcua.decision.case import Case
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepare import Malformed, prepare_invocation
+from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.tree import Node
 from rtshcua.decision.values import MISSING, Sets, Value
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.checker.context import Context
@@ -39,7 +40,7 @@ class Ground:
     anything: tuple[Value, ...]
     questions: Questions
     kept: set[tuple[object, ...]] = field(default_factory=set)
-    steps: dict[tuple[Invocation, tuple[str, ...]], PreparedInvocation | Malformed] = field(default_factory=dict)
+    steps: dict[tuple[Invocation, tuple[str, ...]], PreparedInvocation | Refusal] = field(default_factory=dict)
     hopes: dict[tuple[int, bool], Node | None] = field(default_factory=dict)
     impossible: set[int] = field(default_factory=set)
 
@@ -47,7 +48,7 @@ class Ground:
         """Any state, at any time within a day from a UTC time; at any time at all where that is not known (0)."""
         return Sets(self.anything, (0, 0), ((at_us, at_us + DAY - 1 if at_us else EVER),), (0, 0))
 
-    def prepare(self, invocation: Invocation, phases: tuple[str, ...]) -> PreparedInvocation | Malformed:
+    def prepare(self, invocation: Invocation, phases: tuple[str, ...]) -> PreparedInvocation | Refusal:
         """A step of a mission with these phases, prepared as on board, or what is wrong with it."""
         found = self.steps.get((invocation, phases))
         if found is None:

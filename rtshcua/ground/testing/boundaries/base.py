@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.authority import CLASSES
-from rtshcua.decision.prepare import Malformed, prepare_invocation
+from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import Goal
 from rtshcua.ground.analysis.witness import plainest
@@ -183,7 +184,7 @@ def _sketch(
     )
     phases = contract.phases[:1] or ("flight",)
     invocation = prepare_invocation(flat, prepared, phases)
-    if isinstance(invocation, Malformed):
+    if isinstance(invocation, Refusal):
         return None
     context = Context(b"", policy.vehicle.identity, policy.version, 0, 0, 0, 0, ())
     return Scene(invocation, state, context, now)

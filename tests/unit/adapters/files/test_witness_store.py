@@ -10,7 +10,7 @@ from rtshcua.adapters.files import durable, witness
 from rtshcua.adapters.files.witness import FileWitness, WitnessError, WitnessStore
 from rtshcua.evidence.note import Checkpoint, sign, split
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
-from rtshcua.evidence.witnessing.witness import CONFLICT, Answer, Refusal, Request, Seen
+from rtshcua.evidence.witnessing.witness import CONFLICT, Answer, Declined, Request, Seen
 from rtshcua.wire.keys import Duty
 
 
@@ -33,7 +33,7 @@ def asked(log: Log, known: int | None, records: int = 99) -> Request:
     return request
 
 
-def time_of(answer: Answer | Refusal, request: Request) -> int:
+def time_of(answer: Answer | Declined, request: Request) -> int:
     assert isinstance(answer, Answer), answer
     found = read_cosignature(answer.body, split(request.note)[0], PUBLIC)
     assert isinstance(found, Cosignature)
@@ -51,7 +51,7 @@ def test_it_goes_on_after_it_died(tmp_path: Path, log: Log) -> None:
     request = asked(log, 3)
     assert time_of(second.consider(request), request) == 1_000  # time does not go back, whatever the clock says
     refusal = second.consider(asked(log, 3, 7))
-    assert isinstance(refusal, Refusal)
+    assert isinstance(refusal, Declined)
     assert (refusal.status, refusal.size) == (CONFLICT, 9)
     assert {path.stat().st_mode & 0o077 for path in (second.store.folder, *second.store.folder.iterdir())} == {0}
 
@@ -131,7 +131,7 @@ def test_the_proof_of_a_lie_is_kept(tmp_path: Path, log: Log, monkeypatch: pytes
     found = []
     for fork in forks:
         refusal = first.consider(Request(9, (), fork))
-        assert isinstance(refusal, Refusal)
+        assert isinstance(refusal, Declined)
         assert refusal.contradiction
         found.append(first.store.contradicted(fork))
     assert found[0] is not None

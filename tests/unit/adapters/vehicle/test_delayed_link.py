@@ -3,7 +3,8 @@
 from msgspec.structs import replace
 
 from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.ports import Readings, Ready
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.simulation.config import Kind, SimulationConfig
@@ -22,7 +23,7 @@ class Watched:
 
     def __init__(self, flavour: str) -> None:
         prepared = prepare(LATE)
-        assert not isinstance(prepared, Malformed)
+        assert not isinstance(prepared, Refusal)
         self.vehicle = VirtualVehicle(LATE, SimulationConfig(flavour=Kind(flavour)))
         self.monitor = StateMonitor(prepared)
         self.events: list[object] = []

@@ -9,7 +9,7 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frames import FrameRefusal, FrameSession
+from rtshcua.onboard.enforcement.frames import NO_SESSION, NO_VEHICLE, NOT_COVERED, FrameSession
 from rtshcua.onboard.ports import Command, Failed, Sent
 
 LAND = Command(5, "land", MotionKind.LAND, (), (), 0, 0)
@@ -18,7 +18,7 @@ HOLD = Command(6, "hover", MotionKind.HOLD, (), (), 0, 0)
 
 def test_what_the_boundary_does_not_let_out_has_failed() -> None:
     target = Target("px4", keyed=False)
-    assert target.driver.begin(LAND, 7) == ([Failed(7, 5, FrameRefusal.NO_SESSION)], [])
+    assert target.driver.begin(LAND, 7) == ([Failed(7, 5, NO_SESSION.slug)], [])
     assert not [event for event in target.driver.tick(10_000_000)[0] if isinstance(event, Failed)], "told once"
     target.frames.open(LAND, 20_000_000)
     target.now_us = 11_000_000
@@ -31,7 +31,7 @@ def test_what_the_boundary_does_not_let_out_has_failed() -> None:
 def test_another_command_than_the_permitted_one_does_not_leave() -> None:
     target = Target("ardupilot", keyed=False)
     target.frames.open(LAND, 20_000_000)
-    assert target.driver.begin(HOLD, 7) == ([Failed(7, 6, FrameRefusal.NOT_COVERED)], [])
+    assert target.driver.begin(HOLD, 7) == ([Failed(7, 6, NOT_COVERED.slug)], [])
 
 
 def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
@@ -45,7 +45,7 @@ def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
     target.sent.clear()
     target.receive(target.says(mavlink.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3)))
     failed = [event for event in target.events if isinstance(event, Failed)]
-    assert failed == [Failed(1_500_000, 5, FrameRefusal.NO_SESSION)]
+    assert failed == [Failed(1_500_000, 5, NO_SESSION.slug)]
     frames = [*target.sent, *target.driver.tick(1_600_000)[1]]
     messages = [received.message for frame in frames for received in Codec(9, 9).parse(frame)]
     assert mavlink.MAV_CMD_DO_SET_MODE not in [getattr(message, "command", None) for message in messages]
@@ -67,7 +67,7 @@ def test_the_boundary_learns_of_the_vehicle_from_proved_frames_alone() -> None:
     heartbeat = Codec(1, 1).pack(greeting("px4")[0])
     own = mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
     assert link.parse(heartbeat, 0) == []
-    assert link.pack([own], 0) == ([], [FrameRefusal.NO_VEHICLE])
+    assert link.pack([own], 0) == ([], [NO_VEHICLE])
     assert [received.signed for received in link.parse(theirs.sign(heartbeat, 0), 0)] == [True]
     link.settle(1)
     assert [len(part) for part in link.pack([own], 0)] == [1, 0]

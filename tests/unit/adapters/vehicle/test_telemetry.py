@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.vehicle.preflight import distance_from_home
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
-from rtshcua.decision.prepare import Malformed, prepare
+from rtshcua.decision.prepare import prepare
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.frames import Received
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
@@ -145,7 +146,7 @@ class Held:
 
     def __init__(self, policy: Policy) -> None:
         prepared = prepare(policy)
-        assert not isinstance(prepared, Malformed)
+        assert not isinstance(prepared, Refusal)
         self._telemetry, self._source, self._monitor = Telemetry(policy), SourceTime(), StateMonitor(prepared)
         self._number = 0
 

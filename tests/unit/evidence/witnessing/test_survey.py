@@ -5,7 +5,7 @@ import pytest
 from reference.witnessed import Judge, Log
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.witnessing.survey import Survey, request_of, survey
-from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Refusal
+from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Declined
 
 
 def surveyed(log: Log) -> Survey:
@@ -14,7 +14,7 @@ def surveyed(log: Log) -> Survey:
     return found
 
 
-def shown(log: Log, witness: Judge, known: int | None) -> str | Refusal | Flaw:
+def shown(log: Log, witness: Judge, known: int | None) -> str | Declined | Flaw:
     request = request_of(surveyed(log), known, lambda: log.lines)
     return request if isinstance(request, Flaw) else witness.consider(request)
 
@@ -101,10 +101,10 @@ def test_the_holder_of_the_log_key_rewrites_it(log: Log) -> None:
         other.effects(count, "landed")
         other.recover()
     found = shown(other, witness, 78)
-    assert isinstance(found, Refusal)
+    assert isinstance(found, Declined)
     assert (found.status, found.contradiction) == (CONFLICT, True)
     other.effects(1)
     other.recover()
     found = shown(other, witness, 78)
-    assert isinstance(found, Refusal)
+    assert isinstance(found, Declined)
     assert found.status in (CONFLICT, INCONSISTENT)

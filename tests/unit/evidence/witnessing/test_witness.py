@@ -15,7 +15,7 @@ from rtshcua.evidence.witnessing.witness import (
     MOST_PROOF,
     UNKNOWN,
     Answer,
-    Refusal,
+    Declined,
     Request,
     decode,
     decode_answer,
@@ -31,10 +31,10 @@ def asked(log: Log, known: int | None, records: int | None = None) -> Request:
     return request
 
 
-def refused(witness: Judge, request: Request) -> Refusal:
+def refused(witness: Judge, request: Request) -> Declined:
     before = dict(witness.seen)
     found = witness.consider(request)
-    assert isinstance(found, Refusal), found
+    assert isinstance(found, Declined), found
     assert witness.seen == before
     return found
 
@@ -267,9 +267,9 @@ def test_logs_of_others() -> None:
     note = sign(stranger, LOG_KEY.public, lambda text: LOG_KEY.sign(text, duty=Duty.LOG))
     assert refused(Judge(), Request(0, (), note)).status == UNKNOWN
     theirs = Log().notes[0]
-    assert isinstance(found := judge(Request(0, (), theirs), None, lambda vehicle: ()), Refusal)
+    assert isinstance(found := judge(Request(0, (), theirs), None, lambda vehicle: ()), Declined)
     assert found.status == UNKNOWN
-    assert judge(Request(0, (), theirs), None, lambda vehicle: (bytes(32),)) == Refusal(
+    assert judge(Request(0, (), theirs), None, lambda vehicle: (bytes(32),)) == Declined(
         FORBIDDEN, "it is not signed by the key that the record before names, nor by the log's"
     )
 
@@ -329,7 +329,7 @@ def test_the_body_is_that_of_the_page() -> None:
 )
 def test_what_is_no_request(data: bytes) -> None:
     found = decode(data)
-    assert isinstance(found, Refusal)
+    assert isinstance(found, Declined)
     assert found.status == MALFORMED
 
 
@@ -385,10 +385,10 @@ def test_notes_are_found_in_signed_records_alone() -> None:
 
 
 def test_answers() -> None:
-    refusal = Refusal(CONFLICT, "words", 12)
+    refusal = Declined(CONFLICT, "words", 12)
     assert refusal.answer().encode() == b"409\n12\n"
     assert refusal.answer().size == 12
-    assert Refusal(FORBIDDEN, "words").answer() == Answer(FORBIDDEN, "words\n")
+    assert Declined(FORBIDDEN, "words").answer() == Answer(FORBIDDEN, "words\n")
     for answer in (refusal.answer(), Answer(200, "— a b\n")):
         assert decode_answer(answer.encode()) == answer
     assert [Answer(409, body).size for body in ("", "x\n", "9" * 17, "²", "0\n")] == [None, None, None, None, 0]

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import Compiled, check_program, compile_program
 from rtshcua.ground.language.load import Program, load
@@ -62,9 +63,9 @@ def test_what_ships_compiles_without_a_finding_and_is_taken_on_board(name: str) 
     assert found.policy is not None
     assert found.mission is not None
     prepared = prepare(found.policy)
-    assert not isinstance(prepared, Malformed), prepared
+    assert not isinstance(prepared, Refusal), prepared
     steps = prepare_mission(bind(found.mission, b"x" * 32), prepared)
-    assert not isinstance(steps, Malformed), steps
+    assert not isinstance(steps, Refusal), steps
 
 
 @pytest.mark.parametrize("name", [path for path in SHIPPED if "/skills/" not in path])
@@ -264,9 +265,9 @@ def test_a_mutated_source_is_compiled_or_explained(mutation: tuple[str, str]) ->
     assert codes.REFUSED_ON_BOARD not in {diagnostic.code for diagnostic in found.diagnostics}
     if found.mission is not None and found.policy is not None:
         prepared = prepare(found.policy)
-        assert not isinstance(prepared, Malformed), prepared
+        assert not isinstance(prepared, Refusal), prepared
         steps = prepare_mission(bind(found.mission, b"x" * 32), prepared)
-        assert not isinstance(steps, Malformed), steps
+        assert not isinstance(steps, Refusal), steps
         payloads(found)
 
 

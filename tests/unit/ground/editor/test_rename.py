@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.program import check_declared
 from rtshcua.ground.editor.desk import Desk
-from rtshcua.ground.editor.rename import RENAMED, Refused, Renaming, renamable, rename
+from rtshcua.ground.editor.rename import RENAMED, Renaming, renamable, rename
 from rtshcua.mavlink import dialect
 
 DIALECT = dialect.load()
@@ -49,23 +50,23 @@ def place(desk: Desk, file: str, around: str) -> int:
 )
 def test_refused(desk: Desk, file: str, around: str, name: str, why: str) -> None:
     found = rename(desk, FILES, desk.view(DIP), file, place(desk, file, around), name, DIALECT)
-    assert isinstance(found, Refused)
-    assert why in found.why
+    assert isinstance(found, Refusal)
+    assert why in found.text
 
 
 def test_refused_while_a_program_has_errors(desk: Desk) -> None:
     desk.put("/w/half.rts", 'import "site.rts"\nzone half = union(pond')
     found = rename(desk, FILES, desk.view(DIP), SITE, place(desk, SITE, "zone po|nd"), "pool", DIALECT)
-    assert isinstance(found, Refused)
-    assert "half.rts` has errors" in found.why
+    assert isinstance(found, Refusal)
+    assert "half.rts` has errors" in found.text
 
 
 def test_refused_where_a_rule_reads_the_parameter_of_two_skills(desk: Desk) -> None:
     text = (desk.text(LAKE) or "").replace("forbid look by any when target", "forbid look, goto by any when target")
     desk.put(LAKE, text)
     found = renamable(desk, desk.view(DIP), LAKE, place(desk, LAKE, "goto by any when tar|get"))
-    assert isinstance(found, Refused)
-    assert "`look` and `goto` at once" in found.why
+    assert isinstance(found, Refusal)
+    assert "`look` and `goto` at once" in found.text
 
 
 def test_through_all_files(desk: Desk) -> None:
@@ -97,8 +98,8 @@ def test_what_is_renamed_means_the_same(make_lake: Desk, data: st.DataObject, fi
     places = [each for each in view.occurrences(file) if each.target.sort in RENAMED]
     each = data.draw(st.sampled_from(places))
     made = rename(make_lake, FILES, view, file, each.span.start, name, DIALECT)
-    if isinstance(made, Refused):
-        assert made.why
+    if isinstance(made, Refusal):
+        assert made.text
         return
     changed = make_lake.with_texts({other: made.applied(other, view.text(other)) for other in made.places})
     before, after = (

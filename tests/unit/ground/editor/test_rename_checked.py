@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.editor.navigation import targets
-from rtshcua.ground.editor.rename import Refused, Renaming, rename
+from rtshcua.ground.editor.rename import Renaming, rename
 from rtshcua.ground.editor.targets import Sort
 from rtshcua.library import root
 from rtshcua.mavlink import dialect
@@ -48,16 +49,16 @@ SITE = {S: HEAD + OWN + POLICY, T: TESTS}
 Make = Callable[[dict[str, str]], Desk]
 
 
-def asked(desk: Desk, file: str, around: str, name: str, files: tuple[str, ...]) -> Renaming | Refused:
+def asked(desk: Desk, file: str, around: str, name: str, files: tuple[str, ...]) -> Renaming | Refusal:
     text = desk.text(file) or ""
     before, _, after = around.partition("|")
     at = text.index(before + after) + len(before)
     return rename(desk, files, desk.view(file), file, at, name, DIALECT)
 
 
-def refused(found: Renaming | Refused) -> str:
-    assert isinstance(found, Refused)
-    return found.why
+def refused(found: Renaming | Refusal) -> str:
+    assert isinstance(found, Refusal)
+    return found.text
 
 
 @pytest.mark.parametrize("name", ["position", "height", "battery", "velocity.north", "velocity.down"])

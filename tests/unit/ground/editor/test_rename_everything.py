@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import msgspec
 import pytest
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.rename import RENAMED, Refused, rename
+from rtshcua.ground.editor.rename import RENAMED, rename
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.testing.run import run_case
@@ -113,8 +114,8 @@ def hold(desk: Desk, before: dict[str, Told], named: Named, chance: Random, most
     view = desk.view(file)
     old = view.slice(named.span)
     made = rename(desk, named.files, view, file, start, old + NEW, DIALECT)
-    if isinstance(made, Refused):
-        assert made.why
+    if isinstance(made, Refusal):
+        assert made.text
         return False
     changed = desk.with_texts({each: made.applied(each, desk.text(each) or "") for each in made.places})
     programs = [each for each in named.files if made.places.keys() & desk.view(each).units.keys()]
@@ -124,7 +125,7 @@ def hold(desk: Desk, before: dict[str, Told], named: Named, chance: Random, most
         assert told(changed.view(name)) == before[name], (old, name)
     moved = sum(len(NEW) for span in made.places[file] if span.start < start)
     back = rename(changed, named.files, changed.view(file), file, start + moved, old, DIALECT)
-    assert not isinstance(back, Refused), (old, back.why)
+    assert not isinstance(back, Refusal), (old, back.text)
     assert all(back.applied(each, changed.text(each) or "") == desk.text(each) for each in made.places)
     return True
 

@@ -6,7 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.decision.checks.tighten import tightens
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import Checked, Compiled
 from rtshcua.wire.binding import bind
@@ -72,8 +73,8 @@ def test_the_step_has_what_it_says_and_the_policy_does_not_know(compile_text: Co
     assert plain.policy.zones == own.policy.zones
     assert list(tightens(after, own.policy.contracts[own.mission.invocations[1].skill])) == []
     prepared = prepare(own.policy)
-    assert not isinstance(prepared, Malformed)
-    assert not isinstance(prepare_mission(bind(own.mission, b"x" * 32), prepared), Malformed)
+    assert not isinstance(prepared, Refusal)
+    assert not isinstance(prepare_mission(bind(own.mission, b"x" * 32), prepared), Refusal)
 
 
 def test_the_policys_bytes_do_not_depend_on_the_mission(compile_text: Compile) -> None:

@@ -3,8 +3,9 @@
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.testing.coverage.coverage import coverage, enough, per_mille, share
 from rtshcua.ground.testing.coverage.reached import reached
 from rtshcua.ground.testing.coverage.universe import Goal, Item, Universe, universe
@@ -24,9 +25,9 @@ TAKEOFF, GOTO, INSPECT, RETURN = range(4)  # the steps of the mission
 
 def prepared(policy: Policy = POLICY) -> tuple[PreparedPolicy, tuple[PreparedInvocation, ...]]:
     ready = prepare(policy)
-    assert not isinstance(ready, Malformed), ready
+    assert not isinstance(ready, Refusal), ready
     invocations = prepare_mission(flat.MISSION, ready)
-    assert not isinstance(invocations, Malformed), invocations
+    assert not isinstance(invocations, Refusal), invocations
     return ready, invocations
 
 

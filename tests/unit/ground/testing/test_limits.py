@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.decision.prepare import Malformed, prepare, prepare_mission
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.testing.boundaries.finding import limits
 from rtshcua.ground.testing.boundaries.limits import Limit
@@ -28,9 +29,9 @@ TAKEOFF, GOTO, INSPECT, RETURN = range(4)
 
 def scene(policy: Policy = flat.POLICY, step: int = TAKEOFF, values: dict[int, int | None] | None = None) -> Scene:
     ready = prepare(policy)
-    assert not isinstance(ready, Malformed), ready
+    assert not isinstance(ready, Refusal), ready
     invocations = prepare_mission(flat.MISSION, ready)
-    assert not isinstance(invocations, Malformed), invocations
+    assert not isinstance(invocations, Refusal), invocations
     one = invocations[step]
     return Scene(one, flat.state(HOME | (values or {})), flat.context(one.invocation), NOW)
 
@@ -157,9 +158,9 @@ def test_every_place_where_a_condition_turns_is_found(code: flat.Code, wind: int
     contracts = (contract, *flat.CONTRACTS[1:])
     step = replace(flat.INVOCATIONS[0], contract=contract)
     ready = prepare(replace(flat.POLICY, contracts=contracts))
-    assert not isinstance(ready, Malformed), ready
+    assert not isinstance(ready, Refusal), ready
     invocations = prepare_mission(replace(flat.MISSION, invocations=(step,)), ready)
-    assert not isinstance(invocations, Malformed), invocations
+    assert not isinstance(invocations, Refusal), invocations
     here = Scene(invocations[0], flat.state(HOME | {flat.WIND: wind}), flat.context(step), NOW)
     part = next(each for each in parts(here.invocation) if each.clause == clause)
     ours = list(limits([part], here, Questions(ready).space(flat.TAKEOFF)))

@@ -91,17 +91,20 @@ class PacedClock:
 
     It runs on from the vehicle's boot time as frames bring it, at most `LEAD_US` ahead: when the vehicle's process or
     this one is held up for a moment, which at such a speed is a long time, the age of a signal does not jump. Only when
-    nothing was heard for `PATIENCE_NS` of the machine's time does it run free, so that silence is still noticed. Until
-    the vehicle first tells its time, this is the machine's.
+    nothing was heard for some time of the machine's does it run free, so that silence is still noticed: for at most
+    `PATIENCE_NS`, and the slower it is the sooner, for what it stood still it makes up for in one step when something
+    is heard again. Until the vehicle first tells its time, this is the machine's.
     """
 
     LEAD_US = 200_000
-    PATIENCE_NS = 500_000_000
+    PATIENCE_NS = 500_000_000  # from ten times as fast on
+    _PATIENCE_FROM = 10
 
     def __init__(
         self, speed: float, utc_error_us: int = UTC_ERROR_US, machine_ns: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self._speed = speed
+        self._patience_ns = int(self.PATIENCE_NS * min(1.0, speed / self._PATIENCE_FROM) ** 2)
         self._utc_error_us = utc_error_us
         self._machine_ns = machine_ns
         self._heard_ns = machine_ns()
@@ -115,7 +118,7 @@ class PacedClock:
         if self._boot_us is None:
             run_us = silent_ns // 1_000
         else:
-            free_us = int(max(0, silent_ns - self.PATIENCE_NS) * self._speed) // 1_000
+            free_us = int(max(0, silent_ns - self._patience_ns) * self._speed) // 1_000
             run_us = min(int(silent_ns * self._speed) // 1_000, self.LEAD_US) + free_us
         self._last_us = max(self._last_us, self._base_us + run_us)
         return Now(self._last_us, self._last_us + self._ahead_us, self._utc_error_us)

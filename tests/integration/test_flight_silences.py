@@ -21,8 +21,8 @@ FLAVOURS = ("px4", "ardupilot")
 SECONDS = (0.5, 1.0, 2.5, 3.5, 5.0, 8.0, 20.0, 45.0)
 #: from this long on, the shipped policies give the mission up
 GIVEN_UP_S = 30.0
-#: us that each stage is under way when the silence begins
-UNDER_WAY = 2 * case.S
+#: us that each stage is under way when the silence begins; it waits for little more than a second
+UNDER_WAY, WAITED = 2 * case.S, case.S // 2
 
 
 def running(step: int) -> Callable[[Flight], bool]:
@@ -62,6 +62,7 @@ def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
     flight = Flight(shipped("standard"), case.simulated(flavour, seed=round(seconds * 10)))
     since_us: list[int] = []
     blown: list[bool] = []
+    under_way = WAITED if stage == "waiting" else UNDER_WAY
 
     def each(flight: Flight) -> Sequence[Event]:
         simulation, now_us = flight.vehicle.simulation, flight.clock.elapsed_us
@@ -70,7 +71,7 @@ def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
             blown.append(True)
         if STAGES[stage](flight) and len(since_us) < 2:
             since_us.append(now_us) if not since_us else None
-            if now_us - since_us[0] >= UNDER_WAY and len(since_us) == 1:
+            if now_us - since_us[0] >= under_way and len(since_us) == 1:
                 since_us.append(now_us)
                 for_us = round(seconds * case.S)
                 simulation.inject(LinkSilence(simulation.now_us, for_us, way))

@@ -314,6 +314,7 @@ class Driver:
         """What is made of it: one that is heard and does not hear us may still be sent what stops it."""
         events: list[Event] = []
         if SILENT in (was, down):
+            self._streams.interrupted()
             events.append(LinkBack(now_us) if was == SILENT else LinkLost(now_us, SILENT, self._watch.heard_us or 0))
         if UNANSWERED in (was, down):
             events.append(

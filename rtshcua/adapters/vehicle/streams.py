@@ -100,6 +100,10 @@ class Streams:
         interval_us = self._wanted.get(self._asking) or self._at_times[self._asking]
         return [messages.message_interval(system, self._asking, interval_us)]
 
+    def interrupted(self) -> None:
+        """The link was silent: rates are measured anew."""
+        self._measured_us = None
+
     def settled(self, now_us: int) -> bool:
         """Whether one message of each group was heard, or was waited for long enough."""
         if self._since_us is None:

@@ -62,14 +62,17 @@ class UdpVehicle:
         What waits is taken in together. What has to be waited for is acted on as it comes, one datagram at a time.
         """
         self._keep_all()
-        events, frames = self._driver.tick(now_us)
-        self._send(frames)
-        events, self._pending = [*self._pending, *events], []
-        wait = 0.0 if events else max(0.0, self._clock.real_seconds(timeout_us))
+        events, self._pending = self._pending, []
         links = [self._socket]
-        if select.select(links, [], [], 0)[0]:
+        came = bool(select.select(links, [], [], 0)[0])
+        if came:  # before the driver is told the time: it must not take for silence that nobody looked
             self._drain(now_us + self._slice_us, events)
-        elif wait and select.select(links, [], [], wait)[0]:
+            now_us = self._clock.now().monotonic_us
+        due, frames = self._driver.tick(now_us)
+        self._send(frames)
+        events += due
+        wait = 0.0 if came or events else max(0.0, self._clock.real_seconds(timeout_us))
+        if wait and select.select(links, [], [], wait)[0]:
             self._take(events)
         return events
 

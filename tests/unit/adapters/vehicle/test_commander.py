@@ -134,3 +134,14 @@ def test_a_stream_that_stops_is_asked_for_again_and_again() -> None:
     one.run(10)
     one.every["GPS_RAW_INT"] = 0
     assert one.run(3 * QUIET_US / S).count("GPS_RAW_INT") >= 3
+
+
+def test_a_silent_link_slows_no_stream_down() -> None:
+    one = link()
+    one.run(10)
+    was, one.every = one.every, dict.fromkeys(one.every, 0)
+    one.run(4.9)
+    one.streams.interrupted()
+    one.every = was
+    one.run(4 * MEASURE_US / S)
+    assert one.streams.notes == []

@@ -39,6 +39,20 @@ def test_a_hold_up_of_the_vehicle_ages_nothing_but_silence_does() -> None:
     assert clock.now().monotonic_us - start == clock.LEAD_US + 10_000_000
 
 
+def test_a_slower_one_notices_a_silence_sooner() -> None:
+    machine = Machine()
+    clock = PacedClock(5, machine_ns=machine)
+    clock.heard(0)
+    start = clock.now().monotonic_us
+    machine.ns += 125 * MS
+    assert clock.now().monotonic_us - start == clock.LEAD_US
+    machine.ns += 875 * MS
+    gone_us = clock.now().monotonic_us - start
+    assert gone_us == clock.LEAD_US + 875_000 * 5
+    clock.heard(5_000_000)
+    assert clock.now().monotonic_us - start == 5_000_000, "and makes up for less than half a second in one step"
+
+
 def test_never_goes_back() -> None:
     machine = Machine()
     clock = PacedClock(50, machine_ns=machine)

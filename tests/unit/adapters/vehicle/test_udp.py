@@ -13,6 +13,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event, LinkLost, Readings, Sent
 from virtual.policy import BATTERY, POLICY
@@ -184,7 +185,8 @@ def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: UdpVeh
     vehicle.beat()
     poll(link)
     assert kept == []
-    poll(link)  # says who it is, in answer
+    vehicle.beat()
+    poll(link)
     (came,) = Codec(1, 191).parse(kept[0][1])
     assert (came.name, came.component) == ("HEARTBEAT", 1)
     before = len(kept)
@@ -215,3 +217,39 @@ def test_what_is_waited_for_is_acted_on_as_it_comes(
     for message in both:
         vehicle.send(message)
     assert [taken(), taken()] == [[5_700], [5_600]]
+
+
+class Moment:
+    """A clock that stands where it was set."""
+
+    def __init__(self) -> None:
+        self.us = 10_000_000
+
+    def now(self) -> Now:
+        return Now(self.us, self.us, 0)
+
+    def heard(self, boot_us: int) -> None:
+        pass
+
+    def real_seconds(self, us: int) -> float:
+        return 0.0
+
+    def us_in(self, seconds: float) -> int:
+        return int(seconds * 1e6)
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_what_was_not_looked_at_for_a_while_is_no_silence(waits: bool) -> None:
+    """This process was held up: what the vehicle said meanwhile lies in the socket."""
+    clock = Moment()
+    link = UdpVehicle((HERE, 0), Driver(POLICY, FrameSession()), clock, lambda utc_us, frame: None)
+    peer = Peer(link.port)
+    peer.beat()
+    link.poll(clock.us, 0)
+    clock.us += 3_000_000
+    if waits:
+        peer.beat()
+    lost = [event for event in link.poll(clock.us, 0) if isinstance(event, LinkLost)]
+    assert bool(lost) is not waits
+    peer.socket.close()
+    link.close()

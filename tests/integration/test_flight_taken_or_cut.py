@@ -1,0 +1,54 @@
+"""Silences and takeovers over real UDP, in both flavours; in virtual time there are many more (`test_flight_silences`,
+`test_takeovers`).
+"""
+
+from typing import Any
+
+import pytest
+
+#: so slow that a busy machine's hold-ups stay below what counts as silence
+SPEED = 5
+FLAVOURS = ("px4", "ardupilot")
+
+pytestmark = pytest.mark.parametrize("flavour", FLAVOURS)
+
+
+def moments(run: Any, event: str) -> list[int]:
+    """When an effect was recorded, in us."""
+    return [record["at_us"] for record in run.log() if record["type"] == "effect" and record["event"] == event]
+
+
+@pytest.mark.parametrize(
+    "way", ["both", pytest.param("down", marks=pytest.mark.soak), pytest.param("up", marks=pytest.mark.soak)]
+)
+def test_a_silence_of_some_seconds_ends_no_flight(ground: Any, flavour: str, way: str) -> None:
+    """What is only not heard of us is noted, and what is flown goes on; what is not heard is waited for."""
+    direction = "" if way == "both" else f",way={way}"
+    words = ("--flavour", flavour, "--fault", f"link-silence,at=14s,for=5s{direction}")
+    run = ground.run(ground.bundle(), *words, speed=SPEED).end()
+    assert run.code == 0, run.effects()
+    assert run.dispatched() == ["takeoff", "goto", "return_home"]
+    if way != "up":
+        lost, back = moments(run, "link-lost")[0], moments(run, "link-back")[0]
+        assert moments(run, "fresh"), "it was judged again on fresh state, and not before"
+        assert all(not lost < at_us < back for at_us in moments(run, "dispatched"))
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param("pilot,at=14s,mode=position", marks=pytest.mark.soak),
+        pytest.param("pilot-pause,at=14s", marks=pytest.mark.soak),
+        "pilot-goto,at=14s,north=-30m,east=-30m,up=20m",
+    ],
+)
+def test_nothing_is_sent_after_a_takeover(ground: Any, flavour: str, fault: str) -> None:
+    if flavour == "ardupilot":
+        fault = fault.replace("mode=position", "mode=loiter")
+        if "pause" in fault:
+            pytest.skip("ArduCopter has no pause of its own: a pilot takes LOITER")
+    run = ground.run(ground.bundle(), "--flavour", flavour, "--fault", fault, speed=SPEED).end()
+    assert run.code == 7, run.effects()
+    (taken,) = moments(run, "taken-over")
+    assert all(at_us < taken for at_us in moments(run, "dispatched"))
+    assert run.effects()[-1] == "stood-down"

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.files.anchors import add_anchors, beside, read_notes
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.witness import FileWitness
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.cosign import cosignatures

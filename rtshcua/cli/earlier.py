@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.asked import SOURCE, SPECIFICATION, Unusable, unfolded
 from rtshcua.cli.faults import code_of
 from rtshcua.cli.programs import programs
@@ -40,8 +41,7 @@ def earlier_policies(path: Path) -> Earlier | Unusable:
 
 def _bundled(path: Path) -> Earlier | Unusable:
     try:
-        with path.open("rb") as opened:
-            data = opened.read(MAX_BUNDLE + 1)
+        data = read_regular(path, MAX_BUNDLE)
     except OSError as error:
         why = (error.strerror or "it is unreadable").lower()
         return Unusable(ExitCode.INPUT, "since", f"cannot read `{path}`: {why}")

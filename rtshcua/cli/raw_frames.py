@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from hashlib import file_digest
 from pathlib import Path
 
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.report import Report
 from rtshcua.ground.auditor.frames import Frames

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.reading import LONGEST
 
 #: what the first line of every log begins with

@@ -23,7 +23,7 @@ def entries() -> list[Path]:
 
 def forge(result: object, sign: bool, own: Path) -> int:
     """Write another result into all entries; signed as this user would, or as anybody can."""
-    cache = LintCache(FOLDER, lint_secret.lint_secret(own))
+    cache = LintCache(Path(), str(FOLDER), lint_secret.lint_secret(own))
     for file in entries():
         tree = json.loads(file.read_bytes().partition(b"\n")[2]) | {"result": result}
         data = json.dumps(tree).encode()
@@ -58,7 +58,7 @@ def test_a_cache_of_somebody_else_is_none(here: Path, lint: Lint, own: Path) -> 
 
 
 def test_an_entry_in_the_place_of_another_is_none(here: Path, own: Path) -> None:
-    cache = LintCache(FOLDER, lint_secret.lint_secret(own))
+    cache = LintCache(Path(), str(FOLDER), lint_secret.lint_secret(own))
     cache.put("a", b"entry")
     assert cache.get("a") == b"entry"
     (FOLDER / "2" / "a").rename(FOLDER / "2" / "b")

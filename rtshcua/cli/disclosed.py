@@ -29,7 +29,7 @@ def disclosed(report: Report, log: Path, *, audited: bool) -> Report:
     if folder is None or not (folder / SECRET).exists():
         return _unproven(report, f"`{SECRET}` does not lie beside the log")
     try:
-        secret = read_secret(folder / SECRET)
+        secret = read_secret(folder / SECRET, folder)
     except SecretError as error:
         return _unproven(report, str(error))
     except OSError as error:

@@ -104,11 +104,8 @@ def prove(
             withheld = {field.strip() for field in redact.split(",")} - {""}
             if unknown := sorted(withheld - _FIELDS):
                 return fail(ExitCode.USAGE, f"no record has a field `{unknown[0]}`", f"accepted: {_fields()}")
-            secret = secret or path.parent / SECRET
-            made, name = (
-                prove_disclosure(read, record, read_secret(secret), withheld),
-                f"record-{record}.redacted-proof",
-            )
+            own = read_secret(path.parent / SECRET, path.parent) if secret is None else read_secret(secret)
+            made, name = prove_disclosure(read, record, own, withheld), f"record-{record}.redacted-proof"
         elif cose:
             key = unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
             made, name = _receipt(read, record, at, key), f"record-{record}.cose"

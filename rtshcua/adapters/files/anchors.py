@@ -56,6 +56,6 @@ def read_named(path: Path) -> list[str]:
     return list(notes(data.decode("utf-8", "replace")))
 
 
-def add_anchors(path: Path, found: list[str]) -> None:
-    """Put notes behind those of a file, and on the disk. Raises OSError, also where a link lies there."""
-    append(path, "".join(f"{note}\n" for note in found).encode())
+def add_anchors(path: Path, found: list[str], root: Path | None = None) -> None:
+    """Put notes behind those of a file, and on the disk. Raises OSError, also for a link there, or below `root`."""
+    append(path, "".join(f"{note}\n" for note in found).encode(), root)

@@ -24,9 +24,9 @@ def write_secret(folder: Path, secret: bytes) -> None:
     write_new(folder / SECRET, secret, mode=PRIVATE_FILE)
 
 
-def read_secret(path: Path) -> bytes:
-    """The secret in a file that its owner alone may read. Raises `SecretError` and OSError."""
-    with open_regular(path) as file:
+def read_secret(path: Path, root: Path | None = None) -> bytes:
+    """The secret in a file that its owner alone may read. Raises `SecretError` and OSError, as `open_regular`."""
+    with open_regular(path, root) as file:
         if mode := exposed(file):
             raise SecretError("exposed", f"others may read the secret `{path}`: its mode is {mode}")
         data = file.read(SECRET_BYTES + 1)
@@ -42,7 +42,7 @@ def disclosure_of(log: Path, records: int, before: Iterable[bytes] | None = None
     try:
         with open_regular(log) as file:
             counted = _Counted(lines(file) if before is None else before)
-            root = disclosure_root(counted, read_secret(log.parent / SECRET))
+            root = disclosure_root(counted, read_secret(log.parent / SECRET, log.parent))
     except (OSError, ValueError):  # an `Untrusted` is a ValueError too
         return None
     return root if counted.count == records else None

@@ -171,3 +171,20 @@ def test_a_folder_that_cannot_be_one_is_refused(here: Path, lint: Lint, folder: 
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
     assert "rtshcua.toml:1" in found[0][1]
     assert not Path(".gitignore").exists()
+
+
+def test_a_folder_above_it_that_is_a_link_is_not_written_through(here: Path, lint: Lint) -> None:
+    put({"rtshcua.toml": 'lint.cache = "build/cache"'})
+    (here / "elsewhere/cache").mkdir(parents=True)
+    Path("build").symlink_to(here / "elsewhere")
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert list((here / "elsewhere/cache").iterdir()) == []
+
+
+def test_a_pipe_in_it_is_not_waited_for(here: Path, lint: Lint) -> None:
+    lint(".")
+    first = entries()[0]
+    first.unlink()
+    os.mkfifo(first)
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert first.is_file()

@@ -17,8 +17,8 @@ from pathlib import Path
 from statistics import mean, median, quantiles
 from time import perf_counter_ns
 
-from rtshcua.adapters.files.durable import sync_data
 from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.store.writing import sync_data
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST, WORDS, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State

@@ -15,6 +15,7 @@ from threading import Event, Thread
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.files.anchors import add_anchors, beside
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.witness_link import ANSWER, REQUEST, listen
 from rtshcua.evidence.witnessing.submission import Submission, anchor
 from rtshcua.evidence.witnessing.witness import CONFLICT, OK, Answer, Request, decode_answer
@@ -77,7 +78,7 @@ class WitnessClient:
     ) -> None:
         """`addresses` are numbers, not names. Raises OSError where there is no socket to be had, or no log."""
         self._log = log
-        self._file = log.open("rb")
+        self._file = open_regular(log)
         try:
             self._socket = listen(("", 0))
         except OSError:

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.files.anchors import add_anchors, beside, read_notes
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.witness import FileWitness
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.cosign import cosignatures
@@ -44,13 +44,15 @@ def logs_in(path: Path) -> list[Path]:
     return sorted(log for log in path.rglob(_LOGS) if not log.is_dir()) if path.is_dir() else [path]
 
 
-def drop(log: Path, witness: FileWitness) -> Cosigned | NotCosigned:
-    """Cosign the end of a log, and put the anchor beside it. Raises WitnessError and OSError."""
-    found = survey(_lines(log))
+def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned | NotCosigned:
+    """Cosign the end of a log, and put the anchor beside it; below `root`, the folder that logs are put into, no link
+    is followed. Raises WitnessError and OSError.
+    """
+    found = survey(_lines(log, root))
     if isinstance(found, Finding):
         return NotCosigned(log, found.slug, f"record {found.record}: {found.text}", contradiction=False)
     known = witness.known(found.origin)
-    request = request_of(found, known, lambda: _lines(log))
+    request = request_of(found, known, lambda: _lines(log, root))
     if isinstance(request, Flaw):
         return NotCosigned(log, request.slug, request.text, contradiction=True)
     answer = witness.consider(request)
@@ -64,7 +66,7 @@ def drop(log: Path, witness: FileWitness) -> Cosigned | NotCosigned:
     assert note is not None, "a witness knows its own cosignature"
     fresh = known is None or known < found.size
     if fresh or not _beside(log, split(note)[0], witness.public):
-        add_anchors(beside(log), [note])
+        add_anchors(beside(log), [note], root)
     return Cosigned(log, found.records, found.size + 1, fresh)
 
 
@@ -74,6 +76,6 @@ def _beside(log: Path, text: str, public: bytes) -> bool:
     return any(not isinstance(found, Flaw) and found[1] for found in mine)
 
 
-def _lines(log: Path) -> Iterator[bytes]:
-    with open_regular(log) as file:
+def _lines(log: Path, root: Path | None) -> Iterator[bytes]:
+    with open_regular(log, root) as file:
         yield from lines(file)

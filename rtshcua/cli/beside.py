@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from rtshcua.adapters.files.anchors import read_anchors, read_named, unreadable
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import BUNDLE, LOG, SUMMARY, TELEMETRY
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.raw_frames import RawFrames
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.report import Report
@@ -22,8 +22,7 @@ def bundle_beside(log: Path) -> bytes | None:
     folder = run_folder(log)
     if folder is None or not (folder / BUNDLE).exists():
         return None
-    with open_regular(folder / BUNDLE) as file:
-        return file.read(MAX_BUNDLE + 1)
+    return read_regular(folder / BUNDLE, MAX_BUNDLE, folder)
 
 
 def anchors_beside(log: Path, more: Iterable[Path]) -> tuple[str, ...]:

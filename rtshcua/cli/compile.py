@@ -8,11 +8,12 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.faults import untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
-from rtshcua.cli.replacing import Replacing, replace_with, write_whole
+from rtshcua.cli.replacing import Replacing, replace_with
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -88,7 +89,7 @@ def compile(
         data = sign(compiled.policy, compiled.mission, policy_key=signers[0], mission_key=signers[1])
     except Untrusted as error:
         return findings.end(untrusted(error))
-    write_whole(target, data)
+    replace(target, data)
     if not as_json:
         print(_told(compiled.policy, compiled.mission, target))
         if compiled.bounds is not None:

@@ -4,8 +4,8 @@ from itertools import islice
 from pathlib import Path
 
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.secret import SECRET, SecretError, read_secret
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.beside import run_folder
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.proofs.disclosure import disclosure_root
@@ -29,7 +29,7 @@ def disclosed(report: Report, log: Path, *, audited: bool) -> Report:
     if folder is None or not (folder / SECRET).exists():
         return _unproven(report, f"`{SECRET}` does not lie beside the log")
     try:
-        secret = read_secret(folder / SECRET)
+        secret = read_secret(folder / SECRET, folder)
     except SecretError as error:
         return _unproven(report, str(error))
     except OSError as error:

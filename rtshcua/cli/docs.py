@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from rtshcua import __version__
+from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.asked import unfolded
 from rtshcua.cli.earlier import Earlier, earlier_policies
 from rtshcua.cli.faults import say
@@ -17,7 +18,6 @@ from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import Asked, programs
-from rtshcua.cli.replacing import write_whole
 from rtshcua.cli.sources import examine, read_sources
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
@@ -124,7 +124,7 @@ def docs(
     if target is None:
         sys.stdout.write(text)
         return ExitCode.OK
-    write_whole(target, text.encode("utf-8"))
+    replace(target, text.encode("utf-8"))
     for chapter in book.chapters:
         print(f"{chapter.name}: version {chapter.version}, digest {chapter.digest}")
     print(f"{len(book.chapters)} {'policies' if len(book.chapters) > 1 else 'policy'}, written to {target}")

@@ -18,6 +18,7 @@ from rtshcua.adapters.doctor.finding import Finding, Verdict
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.signing import LinkKeyError
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
@@ -114,8 +115,7 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None]:
         compiled, _ = compile_sources([library.root() / _EXAMPLE], mission=None, issued_at_us=utc_us)
         assert compiled.policy is not None
         return compiled.policy, None
-    with bundle.open("rb") as file:
-        data = file.read(MAX_BUNDLE + 1)
+    data = read_regular(bundle, MAX_BUNDLE)
     signed = KeyStore(data_folder()).root()
     root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
     opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)

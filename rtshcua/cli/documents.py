@@ -1,13 +1,13 @@
 """What the commands that sign or hand in a document for a flight share: what it is about, and where it goes."""
 
 import json
-import os
 from pathlib import Path
 
 from rtshcua.adapters.agent_client import hand_in
-from rtshcua.adapters.files.durable import PRIVATE_FILE, naming
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.cli.faults import fail
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
@@ -27,10 +27,10 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
     Whoever signs must know what it is about. Raises `Untrusted` and OSError.
     """
     trusted = _root(root, now_us)
-    found = open_bundle(_read(bundle, MAX_BUNDLE), root=trusted, vehicle=None, now_us=now_us)
+    found = open_bundle(read_regular(bundle, MAX_BUNDLE), root=trusted, vehicle=None, now_us=now_us)
     vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
     for path in replacements:
-        document = _read(path, MAX_DOCUMENT)
+        document = read_regular(path, MAX_DOCUMENT)
         newer = open_replacement(document, root=trusted, vehicle=vehicle, bundle=found, now=now)
         found = fit_replacement(newer, found, released=0)
     return found
@@ -39,10 +39,7 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
 def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:
     """Write a document, or hand it to the flight, and say what became of it. Raises OSError."""
     if output is not None:
-        with naming(output):
-            handle = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, PRIVATE_FILE)
-            with os.fdopen(handle, "wb") as file:
-                file.write(document)
+        write_out(output, document, mode=PRIVATE_FILE)
     if to is None:
         return _say(ExitCode.OK, "written", f"{what}, written to {output}", as_json=as_json)
     said = hand_in(to, document)
@@ -65,8 +62,3 @@ def _root(path: Path | None, now_us: int) -> TrustRoot:
     """The key store's root, or the one that was named, which is trusted for being named."""
     signed = KeyStore(data_folder()).root() if path is None else read_root(path)
     return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
-
-
-def _read(path: Path, most: int) -> bytes:
-    with path.open("rb") as file:
-        return file.read(most + 1)

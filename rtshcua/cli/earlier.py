@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.asked import SOURCE, SPECIFICATION, unfolded
 from rtshcua.cli.programs import programs
 from rtshcua.cli.sources import examine
@@ -39,8 +40,7 @@ def earlier_policies(path: Path) -> Earlier | Refusal:
 
 def _bundled(path: Path) -> Earlier | Refusal:
     try:
-        with path.open("rb") as opened:
-            data = opened.read(MAX_BUNDLE + 1)
+        data = read_regular(path, MAX_BUNDLE)
     except OSError as error:
         why = (error.strerror or "it is unreadable").lower()
         return Refusal("since", f"cannot read `{path}`: {why}")

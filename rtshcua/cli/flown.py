@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.report import Report

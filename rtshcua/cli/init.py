@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.files.laying import lay
+from rtshcua.adapters.store.laying import lay
 from rtshcua.cli.faults import fail, words_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal

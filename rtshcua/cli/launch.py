@@ -14,6 +14,7 @@ from rtshcua.adapters.files.secret import write_secret
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
@@ -138,8 +139,7 @@ def launch(order: Launch) -> ExitCode:
 
 
 def _read(path: Path) -> bytes:
-    with path.open("rb") as file:
-        data = file.read(MAX_BUNDLE + 1)
+    data = read_regular(path, MAX_BUNDLE)
     if len(data) > MAX_BUNDLE:
         raise Refused(ExitCode.INPUT, "too-large", f"`{path}` is larger than a bundle may be")
     kind = kind_of_document(data)

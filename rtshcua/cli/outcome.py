@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from rtshcua.adapters.files.logs import START
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG, logs_of
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import Report, Verdict
 

@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.anchors import read_anchors
-from rtshcua.adapters.files.durable import replace
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.logs import begins_as_log, lines
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.adapters.files.secret import SECRET, read_secret
+from rtshcua.adapters.store.faults import NotRegular
+from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.unlock import unlock
@@ -103,11 +104,8 @@ def prove(
             withheld = {field.strip() for field in redact.split(",")} - {""}
             if unknown := sorted(withheld - _FIELDS):
                 return fail(ExitCode.USAGE, f"no record has a field `{unknown[0]}`", f"accepted: {_fields()}")
-            secret = secret or path.parent / SECRET
-            made, name = (
-                prove_disclosure(read, record, read_secret(secret), withheld),
-                f"record-{record}.redacted-proof",
-            )
+            own = read_secret(path.parent / SECRET, path.parent) if secret is None else read_secret(secret)
+            made, name = prove_disclosure(read, record, own, withheld), f"record-{record}.redacted-proof"
         elif cose:
             key = unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
             made, name = _receipt(read, record, at, key), f"record-{record}.cose"
@@ -145,10 +143,11 @@ def _refused(path: Path, flaw: Flaw) -> ExitCode:
 def _replaceable(path: Path) -> bool:
     """Whether nothing stands there, or a proof: least of all the log is to be written over."""
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_PROOF)
+        data = read_regular(path, MAX_PROOF)
     except FileNotFoundError:
         return True
+    except NotRegular:
+        return False
     return data.startswith(_BEGINNINGS) or (data.startswith(TAG_18) and _IN_RECEIPT in data)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from hashlib import file_digest
 from pathlib import Path
 
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.report import Report
 from rtshcua.ground.auditor.frames import Frames
@@ -22,7 +22,7 @@ class RawFrames:
     def _entries(self) -> Iterator[tuple[int, bytes]]:
         if not self._path.exists():
             return
-        with open_regular(self._path) as file:
+        with open_regular(self._path, self._path.parent) as file:
             try:
                 for entry in tlog.stream(file):
                     yield entry.at_us, entry.frame
@@ -46,7 +46,7 @@ class RawFrames:
             return report if not there else _unproven(report, text)
         if not there:
             return _unproven(report, f"the raw frames: `{name}` does not lie beside the log")
-        with open_regular(self._path) as file:
+        with open_regular(self._path, self._path.parent) as file:
             digest = file_digest(file, "sha256").hexdigest()
         if digest != close.tlog:
             text = f"`{name}` was changed: it is not the telemetry whose digest the close signs"

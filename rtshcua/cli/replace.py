@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.documents import deliver
 from rtshcua.cli.faults import fail
 from rtshcua.diagnostics.exits import ExitCode
@@ -25,8 +26,7 @@ def replace(
 
     It is verified on board like the mission itself, under the same policy. `rtshcua compile --replaces` makes one.
     """
-    with replacement.open("rb") as file:
-        document = file.read(MAX_DOCUMENT + 1)
+    document = read_regular(replacement, MAX_DOCUMENT)
     try:
         kind = kind_of(document)
     except Untrusted as error:

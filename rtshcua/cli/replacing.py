@@ -1,12 +1,10 @@
 """`rtshcua compile --replaces`: a mission signed for a flight that is under way."""
 
-import os
-import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.adapters.files.durable import naming
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.documents import subject
 from rtshcua.cli.faults import code_of
 from rtshcua.cli.findings import Findings
@@ -58,7 +56,7 @@ def replace_with(
     if len(document) > MAX_DOCUMENT:
         text = f"the replacement has {len(document)} bytes, and a flight reads {MAX_DOCUMENT} at most"
         return findings.refuse(ExitCode.REFUSED, "too-large", text)
-    write_whole(order.target, document)
+    replace(order.target, document)
     steps = len(mission.invocations)
     if not quiet:
         print(f"{mission.name}: {steps} steps, new from {order.first}, signed into {order.target}")
@@ -74,17 +72,3 @@ def replace_with(
             "mission_key": key.kid.hex(),
         },
     )
-
-
-def write_whole(target: Path, data: bytes) -> None:
-    """Write the whole file or nothing: a full disk leaves no half of one under its name."""
-    with naming(target):
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            Path(name).chmod(0o644)
-            Path(name).replace(target)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.showing.bundle import show_bundle

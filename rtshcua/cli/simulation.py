@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect
@@ -36,7 +37,7 @@ def with_simulated(report: Report, log: Path) -> Report:
 
 def simulated(log: Path) -> str | None:
     """What the log says of it."""
-    with log.open("rb") as file:
+    with open_regular(log) as file:
         second = next(islice(lines(file), 1, None), b"")
     record = read(second)
     return record.detail if isinstance(record, Effect) and record.event == SIMULATED else None

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua import library
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
@@ -67,8 +68,7 @@ def examine(reading: Reading) -> Checked:
 
 def _read(path: str) -> bytes:
     """At most one byte more than the parser takes, so that it is the parser who says that a file is too large."""
-    with Path(path).open("rb") as file:
-        return file.read(MAX_SIZE + 1)
+    return read_regular(path, MAX_SIZE)
 
 
 def _listing(path: str) -> Iterable[str]:

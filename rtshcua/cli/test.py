@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.files.durable import naming
 from rtshcua.adapters.files.project import Projects
+from rtshcua.adapters.store.writing import write_out
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import SPECIFICATION, unfolded
@@ -124,8 +124,7 @@ def _finish(
     failed = tuple(each.finding for each in ran if each.finding is not None)
     findings.report((*results.diagnostics, *failed), results.sources)
     if junit_file is not None:
-        with naming(junit_file):
-            junit_file.write_text(junit(suites(ran, results.sources, covered)), encoding="utf-8")
+        write_out(junit_file, junit(suites(ran, results.sources, covered)).encode())
     code = exit_code(results.diagnostics) if has_errors(results.diagnostics) else ExitCode.OK
     short = covered is not None and least is not None and not enough([one.coverage for one in covered], least)
     if code is ExitCode.OK and (failed or not ran or short):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import distrust, of_each
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.proof_told import Told, as_object, as_text
@@ -46,14 +46,12 @@ def verify_proof(
         return distrust(error, help, where="no root to trust: ")
     kept = None
     if checkpoint is not None:
-        with open_regular(checkpoint) as file:
-            kept = file.read(_MAX_NOTE).decode("utf-8", "replace")
+        kept = read_regular(checkpoint, _MAX_NOTE).decode("utf-8", "replace")
     return of_each(proofs, lambda path, first: _verify(path, pinned, kept, as_json=as_json, first=first))
 
 
 def _verify(path: Path, pinned: Pin, kept: str | None, *, as_json: bool, first: bool) -> ExitCode:
-    with open_regular(path) as file:
-        data = file.read(MAX_PROOF + 1)
+    data = read_regular(path, MAX_PROOF)
     result: Told = check_receipt(data, pinned.key) if data[:1] == TAG_18 else check_proof(data, pinned.key)
     if kept is not None and not isinstance(result, Flaw):
         result = _same(result, kept) or result

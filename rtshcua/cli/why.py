@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.files.logs import begins_as_log
 from rtshcua.adapters.files.runs import LOG
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import fail, refuse
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
@@ -30,7 +31,6 @@ from rtshcua.wire.bundle import MAX_BUNDLE, policy_digest, policy_payload
 
 app = typer.Typer(add_completion=False)
 
-_LOG = b'{"_prev":"'
 _SOURCES = (".rts", ".json")
 
 
@@ -59,9 +59,7 @@ def why(
     """
     page = for_terminal()
     file = path / LOG if path.is_dir() else path
-    with open_regular(file) as opened:
-        logged = opened.read(len(_LOG)) == _LOG
-    if logged:
+    if begins_as_log(file):
         if step is not None or state or at is not None or waited or mission is not None:
             return fail(ExitCode.USAGE, "a log says itself what was decided on", "only --record goes with a log")
         shown = from_log(page, file, record)
@@ -91,9 +89,7 @@ def _subject(path: Path, mission: str | None, at_us: int | None, as_json: bool) 
             return findings.finish(exit_code(compiled.diagnostics))
         bound = bind(compiled.mission, policy_digest(policy_payload(compiled.policy)))
         return prepared(compiled.policy, bound)
-    with path.open("rb") as opened:
-        data = opened.read(MAX_BUNDLE + 1)
-    return unpacked(data, f"`{path}`")
+    return unpacked(read_regular(path, MAX_BUNDLE), f"`{path}`")
 
 
 def _by_hand(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.faults import fail
 from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.showing.link import show_link

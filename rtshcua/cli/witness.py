@@ -142,7 +142,7 @@ class _Desk:
         for path in self._paths:
             for log in logs_in(path):
                 try:
-                    found = self._looked_at(log)
+                    found = self._looked_at(log, path)
                 except FileNotFoundError:
                     continue  # taken away again since the folder was listed
                 except OSError as error:  # one log that cannot be read, or its anchors written, keeps no other waiting
@@ -161,12 +161,12 @@ class _Desk:
             self._say(said, f"{log}: not looked at: {reason}")
         return exit_code_of(error)
 
-    def _looked_at(self, log: Path) -> Cosigned | NotCosigned | None:
+    def _looked_at(self, log: Path, given: Path) -> Cosigned | NotCosigned | None:
         """What became of a log; None where it is as it was. Raises OSError."""
         state = log.stat()
         if self._looked.get(log) == (state.st_size, state.st_mtime_ns):
             return None
-        found = drop(log, self._witness)
+        found = drop(log, self._witness, None if log == given else given)
         self._looked[log] = (state.st_size, state.st_mtime_ns)
         return found
 

@@ -138,7 +138,7 @@ def test_without_a_secret_that_serves_it_is_not_shown(run: Path, capsys: pytest.
 def test_a_secret_that_the_disk_does_not_give(
     run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def refuse(_: Path) -> bytes:
+    def refuse(*_: Path) -> bytes:
         raise PermissionError(errno.EACCES, "permission denied")
 
     monkeypatch.setattr("rtshcua.cli.disclosed.read_secret", refuse)

@@ -17,11 +17,11 @@ from tempfile import TemporaryDirectory
 from typing import NoReturn
 
 from reference.crashed import LOG_KEY, signer, unverified, writes
-from rtshcua.adapters.files.durable import PUBLIC_FILE, open_new
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.port import SYSTEM, LogFile, SystemDisk, SystemFile
 from rtshcua.adapters.files.recovery import examine, recover
 from rtshcua.adapters.files.writer import EvidenceWriter
+from rtshcua.adapters.store.writing import open_new
 from rtshcua.evidence.recovery import State
 
 _ACKNOWLEDGED = struct.Struct("<II")
@@ -44,7 +44,7 @@ class PiecemealDisk(SystemDisk):
     """A disk of such files."""
 
     def create(self, path: Path) -> LogFile:
-        return Piecemeal(open_new(path, mode=PUBLIC_FILE, append=True))
+        return Piecemeal(open_new(path))
 
 
 def campaign(count: int, seed: int) -> tuple[list[str], dict[str, int]]:

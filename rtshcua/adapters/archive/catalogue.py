@@ -1,7 +1,8 @@
 """The catalogue: a row a log, in one Parquet file that each change replaces as a whole."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, get_args
 
@@ -10,7 +11,7 @@ import msgspec
 
 from rtshcua.adapters.archive.entry import Entry
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
-from rtshcua.adapters.files.durable import sync_folder
+from rtshcua.adapters.store.writing import publish, replacing
 
 #: names and SQL types of the columns, in their order
 COLUMNS: Final = {
@@ -31,27 +32,23 @@ def read(folder: Folder) -> dict[str, Entry]:
 
 def write(folder: Folder, entries: Iterable[Entry]) -> None:
     """Puts these rows in the place of all that were there, in one step."""
-    rows = folder.scratch / "logs.jsonl"
-    with rows.open("wb") as file:
-        file.writelines(msgspec.json.encode(entry) + b"\n" for entry in entries)
     fresh = folder.scratch / "logs.parquet"
-    with duckdb.connect() as engine:
+    with as_lines(entries, folder.scratch / "logs.jsonl") as rows, duckdb.connect() as engine:
         read = f"read_ndjson(?, columns={_SPECIFIED})" if rows.stat().st_size else _empty()
         copy = f"COPY (SELECT * FROM {read} ORDER BY begun_us, log) TO {quoted(fresh)} (FORMAT parquet)"
         engine.execute(copy, [str(rows)] if rows.stat().st_size else [])
     publish(fresh, folder.catalogue)
-    rows.unlink()
 
 
-def publish(fresh: Path, place: Path) -> None:
-    """Gives a finished file its name, so that a crash leaves either what was there or this."""
-    handle = os.open(fresh, os.O_RDONLY)
+@contextmanager
+def as_lines(rows: Iterable[msgspec.Struct], place: Path) -> Iterator[Path]:
+    """A file with rows for the engine to read, a line each; gone afterwards."""
     try:
-        os.fsync(handle)
+        with replacing(place, synced=False) as handle, os.fdopen(handle, "wb", closefd=False) as file:
+            file.writelines(msgspec.json.encode(row) + b"\n" for row in rows)
+        yield place
     finally:
-        os.close(handle)
-    fresh.replace(place)
-    sync_folder(place.parent)
+        place.unlink(missing_ok=True)
 
 
 def forget_unfinished(folder: Folder, entries: dict[str, Entry]) -> None:

@@ -11,6 +11,7 @@ from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined
 from rtshcua.adapters.archive.steps import Steps
 from rtshcua.adapters.files.anchors import read_anchors
 from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.ground.auditor.audit import Audit, Auditor
@@ -29,7 +30,7 @@ class Task(NamedTuple):
 def examine(task: Task) -> Examined:
     """Verifies a log. Whatever it holds, the answer is a row; OSError where it cannot be read."""
     entry = task.entry
-    with task.path.open("rb") as file:
+    with open_regular(task.path) as file:
         found = file_digest(file, "sha256").hexdigest()
         if found != entry.log:
             text = "the file in the archive is not the one that was taken in: it was changed where it lies"

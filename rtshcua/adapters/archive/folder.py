@@ -18,9 +18,12 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from rtshcua.adapters.files.anchors import SUFFIX, beside
-from rtshcua.adapters.files.durable import make_folder, naming, replace, sync_folder, write_new
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.runs import LOG
+from rtshcua.adapters.store.faults import NotRegular, naming
+from rtshcua.adapters.store.folders import make_folder
+from rtshcua.adapters.store.locking import lock
+from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.adapters.store.writing import PUBLIC_FILE, UNFINISHED, open_new, publish, replace, write_new
 from rtshcua.wire.untrusted import Untrusted
 
 FORMAT, VERSION = "rtshcua/archive", 1
@@ -52,14 +55,14 @@ class Folder:
                 make_folder(folder)
 
     def _make(self) -> None:
-        if self.path.exists() and {path.name for path in self.path.iterdir()} - {f"{_MARK}.new"}:
+        if self.path.exists() and not all(path.name.startswith(UNFINISHED) for path in self.path.iterdir()):
             raise Untrusted("no-archive", f"`{self.path}` is a folder with other things in it, not an archive")
         make_folder(self.path)
         replace(self.path / _MARK, json.dumps({"format": FORMAT, "version": VERSION}).encode() + b"\n")
 
     def _check(self, given: Path) -> None:
         try:
-            said = json.loads((self.path / _MARK).read_bytes()[:_BLOCK])
+            said = json.loads(read_regular(self.path / _MARK, _BLOCK, self.path))
         except (OSError, ValueError):
             raise Untrusted("no-archive", f"`{given}` is not an archive") from None
         if said != {"format": FORMAT, "version": VERSION}:
@@ -94,10 +97,7 @@ class Folder:
     @contextmanager
     def writing(self) -> Iterator[None]:
         """Holds off everyone else who wants to change the archive. Raises BlockingIOError if somebody does."""
-        import fcntl  # noqa: PLC0415  not everywhere, and nobody who only asks needs it
-
-        with (self.path / "lock").open("ab") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with os.fdopen(lock(self.path / "lock", mode=PUBLIC_FILE), "rb"):
             for left in self.scratch.iterdir():
                 remove(left)
             yield
@@ -107,18 +107,20 @@ class Folder:
         anything is new.
         """
         scratch = self.scratch / f"{os.getpid()}.taken"
-        with open_regular(source) as reader, naming(self.path), scratch.open("wb") as writer:
-            digest, size = _copy(reader, writer)
-            os.fsync(writer.fileno())
-        place = self.log(digest)
-        new = not _holds(place, digest, size)  # a copy that was damaged since is replaced
-        if new:
-            make_folder(place.parent)
-            scratch.chmod(0o444)
-            scratch.replace(place)
-            sync_folder(place.parent)
-        else:
-            scratch.unlink()
+        try:
+            with (
+                open_regular(source) as reader,
+                naming(self.path),
+                os.fdopen(open_new(scratch, mode=0o444), "wb") as writer,
+            ):
+                digest, size = _copy(reader, writer)
+            place = self.log(digest)
+            new = not _holds(place, digest, size)  # a copy that was damaged since is replaced
+            if new:
+                make_folder(place.parent)
+                publish(scratch, place)
+        finally:
+            scratch.unlink(missing_ok=True)
         return digest, size, self._take_anchors(source, digest) or new
 
     def _take_anchors(self, source: Path, digest: str) -> bool:
@@ -126,9 +128,12 @@ class Folder:
         found = source.parent.glob(f"*{SUFFIX}") if source.name == LOG else [beside(source)]
         new = False
         for path in found:
-            if not path.is_file() or path.stat().st_size > _MOST_ANCHORS:
+            try:
+                data = read_regular(path, _MOST_ANCHORS, path.parent)
+            except (FileNotFoundError, NotRegular):
                 continue
-            data = path.read_bytes()
+            if len(data) > _MOST_ANCHORS:
+                continue
             with suppress(FileExistsError):
                 write_new(self.log(digest).with_name(sha256(data).hexdigest() + SUFFIX), data)
                 new = True

@@ -4,20 +4,23 @@ Every line was read by the verifier before, in its one canonical form; what is r
 the same meaning. How many records there are is counted again.
 """
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from shutil import copyfile
 from typing import Final
 
 import duckdb
 import msgspec
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive.catalogue import publish, quoted
+from rtshcua.adapters.archive.catalogue import as_lines, quoted
 from rtshcua.adapters.archive.entry import Entry, Examined
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
+from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.writing import publish, replacing
 from rtshcua.evidence.reading import LONGEST
 
 #: what is read of a line, by its SQL type
@@ -42,7 +45,6 @@ _OURS: Final = {
     },
 }  # fmt: skip
 _LOG: Final = "string_split(filename, '/')[-2]"
-_BLOCK: Final = 1 << 16
 _LONGEST_DETAIL: Final = 1_000  # characters; the log has the rest
 
 _DAY: Final = "strftime(make_timestamp(r.utc_us), '%Y-%m-%d') AS utc_day"
@@ -129,26 +131,19 @@ def _count(engine: duckdb.DuckDBPyConnection) -> None:
 def _load(engine: duckdb.DuckDBPyConnection, name: str, rows: Sequence[msgspec.Struct], scratch: Path) -> None:
     """A table of ours in the engine."""
     columns = ", ".join(f"{column}: '{kind}'" for column, kind in _OURS[name].items())
-    path = scratch / f"{name}.jsonl"
-    with path.open("wb") as file:
-        file.writelines(msgspec.json.encode(row) + b"\n" for row in rows)
     read = f"CREATE TEMP TABLE {name} AS SELECT * FROM read_ndjson(?, columns={{{columns}}})"
-    engine.execute(read, [str(path)])
-    path.unlink()
+    with as_lines(rows, scratch / f"{name}.jsonl") as path:
+        engine.execute(read, [str(path)])
 
 
-def _cut(path: Path) -> None:
-    """Cuts off what stands after the last newline; there is one."""
-    with path.open("r+b") as file:
-        end = file.seek(0, 2)
-        while end:
-            start = max(0, end - _BLOCK)
-            file.seek(start)
-            found = file.read(end - start).rfind(b"\n")
-            if found >= 0:
-                file.truncate(start + found + 1)
-                return
-            end = start
+def _copy_whole_lines(log: Path, copy: Path) -> None:
+    """Copies a log but for what stands after its last newline."""
+    with (
+        open_regular(log) as whole,
+        replacing(copy, synced=False) as handle,
+        os.fdopen(handle, "wb", closefd=False) as file,
+    ):
+        file.writelines(line for line in lines(whole) if line.endswith(b"\n"))
 
 
 @contextmanager
@@ -161,8 +156,7 @@ def _files(folder: Folder, sound: Sequence[Examined]) -> Iterator[list[str]]:
         if each.entry.finding == "tail/torn":
             copy = folder.scratch / each.entry.log / path.name
             copy.parent.mkdir()
-            copyfile(path, copy)
-            _cut(copy)
+            _copy_whole_lines(path, copy)
             copies.append(copy)
             path = copy
         files.append(str(path))

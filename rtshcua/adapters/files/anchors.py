@@ -1,13 +1,12 @@
 """Files of anchors beside a log: `*.anchors`, notes one after another, each ended by an empty line."""
 
 import errno
-import os
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from rtshcua.adapters.files.durable import PUBLIC_FILE, naming, sync_data, sync_folder, write_all
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import append
 from rtshcua.evidence.witnessing.anchors import notes
 
 SUFFIX: Final = ".anchors"
@@ -42,10 +41,8 @@ def _files(log: Path) -> list[Path]:
 
 def read_notes(path: Path) -> list[str]:
     """The notes in a file of anchors; none of a file that cannot be read."""
-    if not path.is_file():  # a pipe would be waited for
-        return []
-    with suppress(OSError), path.open("rb") as file:
-        return list(notes(file.read(_LARGEST).decode("utf-8", "replace")))
+    with suppress(OSError):
+        return list(notes(read_regular(path, _LARGEST, path.parent)[:_LARGEST].decode("utf-8", "replace")))
     return []
 
 
@@ -53,21 +50,12 @@ def read_named(path: Path) -> list[str]:
     """The notes in a file that somebody named, all of them. Raises OSError for one that cannot be read or is too large,
     and for what is no regular file, which might be waited for.
     """
-    with open_regular(path) as file:
-        data = file.read(_LARGEST + 1)
+    data = read_regular(path, _LARGEST)
     if len(data) > _LARGEST:
         raise OSError(errno.E2BIG, f"more than {_LARGEST >> 20} MiB of anchors", str(path))
     return list(notes(data.decode("utf-8", "replace")))
 
 
-def add_anchors(path: Path, found: list[str]) -> None:
-    """Put notes behind those of a file, and on the disk. Raises OSError."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_CLOEXEC", 0)
-    with naming(path):
-        handle = os.open(path, flags, PUBLIC_FILE)
-        try:
-            write_all(handle, "".join(f"{note}\n" for note in found).encode())
-            sync_data(handle)
-        finally:
-            os.close(handle)
-        sync_folder(path.parent)
+def add_anchors(path: Path, found: list[str], root: Path | None = None) -> None:
+    """Put notes behind those of a file, and on the disk. Raises OSError, also for a link there, or below `root`."""
+    append(path, "".join(f"{note}\n" for note in found).encode(), root)

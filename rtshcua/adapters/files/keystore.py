@@ -4,18 +4,16 @@ A key file is readable by its owner alone and encrypted, unless its key is for d
 with every key and the root that names them, or not at all.
 """
 
-import os
-import shutil
-import stat
-import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 from msgspec import UNSET
 
-from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, sync_folder, write_new
+from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
+from rtshcua.adapters.store.laying import appearing
+from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, write_new
 from rtshcua.wire import cose
 from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import ANY, Duty, SigningKey
@@ -101,23 +99,11 @@ class KeyStore:
             thresholds=Thresholds(witness=UNSET if witness_threshold == 1 else witness_threshold),
         )
         make_folder(self.folder.parent, mode=PRIVATE_FOLDER)
-        with self._appearing() as folder:
+        with appearing(self.folder) as folder:
             for name, key in keys.items():
                 write_new(folder / name, dump_signing_key(key, passphrase=passphrase), mode=PRIVATE_FILE)
             write_new(folder / ROOT, root.sign(keys[self.key_path(Duty.ROOT).name]), mode=PRIVATE_FILE)
         return root
-
-    @contextmanager
-    def _appearing(self) -> Iterator[Path]:
-        """A folder that takes its place once it is filled, and is gone if that fails."""
-        folder = Path(tempfile.mkdtemp(prefix="keys.", dir=self.folder.parent))  # mode 0700
-        try:
-            yield folder
-            sync_folder(folder)
-            folder.rename(self.folder)
-            sync_folder(self.folder.parent)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
 
     def signing_key(self, duty: Duty, *, passphrase: bytes | None = None) -> SigningKey:
         """The key of a duty. Raises `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`."""
@@ -140,18 +126,16 @@ class KeyStore:
 
 def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:
     """The signing key in a file. Raises `KeyStoreError` (`exposed`), `KeyFileError`, `WrongDuty` and OSError."""
-    with path.open("rb") as file:
-        mode = os.fstat(file.fileno()).st_mode
-        if os.name == "posix" and stat.S_IMODE(mode) & 0o077:
-            raise KeyStoreError("exposed", f"others may read the key `{path}`: its mode is {stat.S_IMODE(mode):04o}")
+    with open_regular(path) as file:
+        if mode := exposed(file):
+            raise KeyStoreError("exposed", f"others may read the key `{path}`: its mode is {mode}")
         data = file.read(MAX_KEY_FILE + 1)
     return load_signing_key(data, duty=duty, passphrase=passphrase)
 
 
 def read_root(path: Path) -> bytes:
     """The signed trust root in a file, not verified. Raises `KeyStoreError` (`too-large`) and OSError."""
-    with path.open("rb") as file:
-        data = file.read(MAX_ROOT + 1)
+    data = read_regular(path, MAX_ROOT)
     if len(data) > MAX_ROOT:
         raise KeyStoreError("too-large", f"`{path}` is larger than a trust root may be")
     return data

@@ -14,11 +14,14 @@ from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
-from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace
 from rtshcua.adapters.files.recovery import InUse, Recovered
+from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, replace
 from rtshcua.evidence.recovery import State
 
 _HASH = re.compile(r"[0-9a-f]{64}")
+_LARGEST = 1 << 16  # octets of the file
 
 
 class Earlier(NamedTuple):
@@ -80,7 +83,7 @@ def known_end(state: Path, log: Path) -> str | None:
 def _remembered(path: Path) -> tuple[Path, str | None, str | None] | None:
     """The last log, what it names, and how it ends. Raises OSError, and ValueError for what was not written by this."""
     try:
-        told = json.loads(path.read_bytes())
+        told = json.loads(read_regular(path, _LARGEST))
     except FileNotFoundError:
         return None
     if not isinstance(told, dict) or not isinstance(told.get("log"), str):

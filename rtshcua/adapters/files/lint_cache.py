@@ -9,11 +9,13 @@ fail. Nothing is followed or written through a link, and a folder that is there 
 
 import hmac
 import os
-import stat
 from contextlib import suppress
 from pathlib import Path
-from tempfile import mkstemp
 from typing import Final
+
+from rtshcua.adapters.store.folders import make_folder, opened_folder
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, replace, write_new
 
 FOLDER: Final = ".rtshcua_cache"
 #: of the form of entries; what has another is not looked at
@@ -26,22 +28,20 @@ _TAG: Final = (
 _SAID: Final = {".gitignore": "*\n", "CACHEDIR.TAG": _TAG}
 #: all that stands in the folder: entries of earlier forms too
 _OURS: Final = frozenset({*_SAID, "1", _FORM})
-_PLAIN: Final = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-_READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _PLAIN
-_NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN
 
 
 class LintCache:
-    """Entries by name, in a folder that is made when the first one is kept; none without a `secret`.
+    """Entries by name, in a folder below `root` that is made when the first one is kept; none without a `secret`.
 
     A `fresh` one gives nothing but what was kept in it during this run.
     """
 
-    def __init__(self, folder: Path, secret: bytes | None, *, fresh: bool = False) -> None:
-        self._folder = folder
-        self._place = folder / _FORM
+    def __init__(self, root: Path, folder: str, secret: bytes | None, *, fresh: bool = False) -> None:
+        self._root = root
+        self._folder = root / folder
+        self._place = self._folder / _FORM
         self._secret = secret
-        self._works = secret is not None and not _is_link(folder) and not _is_link(self._place)
+        self._works = secret is not None
         self._reads = self._works and not fresh
         self._kept: dict[str, bytes] = {}
         self._prepared = False
@@ -50,8 +50,11 @@ class LintCache:
         """An entry as it was kept, or None."""
         if name in self._kept:
             return self._kept[name]
-        data = _read(self._place / name) if self._reads else None
-        if data is None:
+        if not self._reads:
+            return None
+        try:
+            data = read_regular(self._place / name, _LARGEST, self._root)
+        except OSError:
             return None
         code, _, entry = data.partition(b"\n")
         return entry if hmac.compare_digest(code, self._code(name, entry)) else None
@@ -63,18 +66,10 @@ class LintCache:
             return
         try:
             self._prepare()
-            handle, made = mkstemp(dir=self._place, prefix=".")
+            data = self._code(name, entry) + b"\n" + entry
+            replace(self._place / name, data, mode=PRIVATE_FILE, synced=False, root=self._root)
         except OSError:
             self._works = False
-            return
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(self._code(name, entry) + b"\n" + entry)
-            Path(made).replace(self._place / name)
-        except OSError:
-            self._works = False
-            with suppress(OSError):
-                Path(made).unlink()
 
     def _code(self, name: str, entry: bytes) -> bytes:
         assert self._secret is not None
@@ -86,41 +81,11 @@ class LintCache:
         """
         if self._prepared:
             return
-        with suppress(FileNotFoundError):
-            if not _OURS.issuperset(each.name for each in self._folder.iterdir()):
+        with suppress(FileNotFoundError), opened_folder(self._folder, self._root) as folder:
+            if not _OURS.issuperset(os.listdir(folder)):  # noqa: PTH208  a descriptor, not a path
                 raise OSError("no cache")
-        self._place.mkdir(parents=True, exist_ok=True)
+        make_folder(self._place, root=self._root)
         for name, text in _SAID.items():
             with suppress(FileExistsError):
-                handle = os.open(self._folder / name, _NEW, 0o644)
-                with os.fdopen(handle, "w", encoding="utf-8") as file:
-                    file.write(text)
+                write_new(self._folder / name, text.encode(), root=self._root)
         self._prepared = True
-
-
-def _is_link(path: Path) -> bool:
-    """Whether a path is a link; also where nobody can tell."""
-    try:
-        return stat.S_ISLNK(os.lstat(path).st_mode)
-    except FileNotFoundError:
-        return False
-    except (OSError, ValueError):
-        return True
-
-
-def _read(path: Path) -> bytes | None:
-    """What a regular file holds, that is no link; None where it is none, or cannot be read."""
-    try:
-        handle = os.open(path, _READ)
-    except (OSError, ValueError):
-        return None
-    try:
-        known = os.fstat(handle)
-        if not stat.S_ISREG(known.st_mode) or known.st_size > _LARGEST:
-            return None
-        with open(handle, "rb", buffering=0, closefd=False) as file:
-            return file.read(_LARGEST)
-    except OSError:
-        return None
-    finally:
-        os.close(handle)

@@ -6,17 +6,15 @@ is cold for one run.
 """
 
 import os
-import stat
-from contextlib import suppress
 from pathlib import Path
-from tempfile import mkstemp
 from typing import Final
 
-from rtshcua.adapters.files.durable import PRIVATE_FOLDER, make_folder, write_all
+from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
+from rtshcua.adapters.store.reading import exposed, open_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, replace
 
 NAME: Final = "lint.secret"
 _BYTES: Final = 32
-_FLAGS: Final = os.O_RDONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 def lint_secret(folder: Path) -> bytes | None:
@@ -27,7 +25,8 @@ def lint_secret(folder: Path) -> bytes | None:
     try:
         found = _read(place)
         if found is None:
-            _make(place)
+            make_folder(folder, mode=PRIVATE_FOLDER)
+            replace(place, os.urandom(_BYTES), mode=PRIVATE_FILE, synced=False)
             found = _read(place)  # of two that make one at the same time the later
     except OSError:
         return None
@@ -37,31 +36,9 @@ def lint_secret(folder: Path) -> bytes | None:
 def _read(place: Path) -> bytes | None:
     """The secret; None where it is not there, is no file of ours, may be read by others, or has another length."""
     try:
-        handle = os.open(place, _FLAGS)
+        with open_regular(place, place.parent) as file:
+            foreign = exposed(file) or os.fstat(file.fileno()).st_uid != os.geteuid()
+            data = file.read(_BYTES + 1)
     except OSError:
         return None
-    try:
-        known = os.fstat(handle)
-        if not stat.S_ISREG(known.st_mode):
-            return None
-        if os.name == "posix" and (known.st_mode & 0o077 or known.st_uid != os.geteuid()):
-            return None
-        data = os.read(handle, _BYTES + 1)
-    finally:
-        os.close(handle)
-    return data if len(data) == _BYTES else None
-
-
-def _make(place: Path) -> None:
-    make_folder(place.parent, mode=PRIVATE_FOLDER)
-    handle, made = mkstemp(dir=place.parent, prefix=f".{NAME}.")  # which its owner alone may read
-    try:
-        try:
-            write_all(handle, os.urandom(_BYTES))
-        finally:
-            os.close(handle)
-        Path(made).replace(place)
-    except BaseException:
-        with suppress(OSError):
-            Path(made).unlink()
-        raise
+    return data if len(data) == _BYTES and not foreign else None

@@ -4,17 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.evidence.reading import LONGEST
 
 #: what the first line of every log begins with
 START: Final = b'{"_prev":"'
 
 
-def begins_as_log(path: Path) -> bool:
-    """Whether a file begins as every log does. Raises OSError, also where it is no regular one."""
-    with open_regular(path) as file:
-        return file.read(len(START)) == START
+def begins_as_log(path: Path, root: Path | None = None) -> bool:
+    """Whether a file begins as every log does. Raises OSError, also as `open_regular`."""
+    return read_regular(path, len(START), root).startswith(START)
 
 
 def lines(file: BinaryIO) -> Iterator[bytes]:

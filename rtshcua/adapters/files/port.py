@@ -8,7 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from rtshcua.adapters.files.durable import PUBLIC_FILE, open_new, sync_data, sync_folder
+from rtshcua.adapters.store.folders import sync_folder
+from rtshcua.adapters.store.writing import open_new, sync_data
 
 _ON = os.O_RDWR | os.O_APPEND | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
@@ -70,7 +71,7 @@ class SystemDisk:
 
     def create(self, path: Path) -> LogFile:
         """See `Disk`."""
-        return SystemFile(open_new(path, mode=PUBLIC_FILE, append=True))
+        return SystemFile(open_new(path))
 
     def reopen(self, path: Path) -> LogFile:
         """See `Disk`."""

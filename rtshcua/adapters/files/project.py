@@ -4,12 +4,13 @@ from dataclasses import dataclass
 from os.path import normpath, relpath
 from pathlib import Path
 
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.patterns import matches
 from rtshcua.ground.project.settings import NAMES, SHARED, Settings, misconfigured, parse_settings
 
 #: a configuration is a page or two; more than this of it is not read
-_LARGEST = 1 << 20
+LARGEST = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +77,14 @@ def _standing_in(folder: Path) -> Project | Refusal | None:
 def _read(file: Path) -> Project | Refusal | None:
     name = _shown(file)
     try:
-        with file.open("rb") as opened:
-            data = opened.read(_LARGEST + 1)
+        data = read_regular(file, LARGEST)
         text = data.decode("utf-8")
     except OSError as error:
         return misconfigured(name, f"it cannot be read: {(error.strerror or 'it is unreadable').lower()}")
     except UnicodeDecodeError as error:
         return misconfigured(name, f"byte {error.start} is not UTF-8, so it is not text")
-    if len(data) > _LARGEST:
-        return misconfigured(name, f"it is larger than {_LARGEST >> 20} MiB, which no configuration is")
+    if len(data) > LARGEST:
+        return misconfigured(name, f"it is larger than {LARGEST >> 20} MiB, which no configuration is")
     found = parse_settings(text, name, shared=file.name == SHARED)
     return found if found is None or isinstance(found, Refusal) else Project(found, _absolute(file).parent, file)
 

@@ -10,6 +10,7 @@ from itertools import count
 from pathlib import Path
 
 from rtshcua.adapters.files.port import Disk, LogFile
+from rtshcua.adapters.store.reading import open_regular
 
 _CHUNK = 1 << 20
 
@@ -111,7 +112,7 @@ def _write_all(file: LogFile, data: bytes) -> None:
 
 
 def _chunks(path: Path, start: int, size: int) -> Iterator[bytes]:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         file.seek(start)
         while size > 0 and (chunk := file.read(min(size, _CHUNK))):
             size -= len(chunk)

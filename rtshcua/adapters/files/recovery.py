@@ -19,8 +19,8 @@ from typing import NamedTuple
 from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.files.port import SYSTEM, Disk
 from rtshcua.adapters.files.recovering import digest, end, forget, keep, places, plan_of, write
-from rtshcua.adapters.files.regular import open_regular
 from rtshcua.adapters.files.secret import disclosure_of
+from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Recover
@@ -103,7 +103,7 @@ def recover(path: Path, signer: Signer, *, disk: Disk = SYSTEM) -> Recovered:
 def _disclosed(path: Path, found: Examined, signer: Signer, recover: bytes) -> bytes | None:
     if found.records > signer.most_disclosed:
         return None
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return disclosure_of(path, found.records + 1, chain(islice(lines(file), found.records), [recover]))
 
 
@@ -120,14 +120,13 @@ class _Begun(NamedTuple):
 def _begun(path: Path, public: bytes) -> _Begun | None:
     if not plan_of(path).is_file():
         return None
-    with open_regular(plan_of(path)) as file:
-        tail = file.read(_LONGEST_PLAN)
+    tail = read_regular(plan_of(path), _LONGEST_PLAN, path.parent)
     first, newline, second = tail.partition(b"\n")
     recover, close = read(first + newline), read(second)
     if not isinstance(recover, Recover) or not isinstance(close, Close):
         return None  # torn itself: then nothing was cut yet
     examination = Examination(public)
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         for line in islice(lines(file), recover.seq):
             if not examination.take(line):
                 return None
@@ -143,7 +142,7 @@ def _begun(path: Path, public: bytes) -> _Begun | None:
 def _finish(path: Path, begun: _Begun, disk: Disk) -> Recovered:
     found, tail = begun
     discarded = _kept_before(path, found) if found.discarded else None
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         file.seek(found.kept)
         behind = file.read(len(tail) + 1)
     if behind == tail:

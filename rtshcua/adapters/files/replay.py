@@ -10,17 +10,19 @@ that was pruned is refused, so setting the clock back opens nothing again. Polic
 
 import fcntl
 import json
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, sync_folder, write_new
+from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder, opened_folder, sync_folder
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, UNFINISHED, replace, write_new
 from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
 _POLICIES = "floor-policies"
+_LARGEST = 16 << 20  # octets of a file here
 
 
 class FileReplayStore:
@@ -84,14 +86,14 @@ def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version:
 
 def _floor(folder: Path) -> int:
     try:
-        return int((folder / _FLOOR).read_bytes())
+        return int(read_regular(folder / _FLOOR, _LARGEST))
     except FileNotFoundError:
         return -1
 
 
 def _versions(folder: Path) -> dict[str, int]:
     try:
-        return dict(json.loads((folder / _POLICIES).read_bytes()))
+        return dict(json.loads(read_regular(folder / _POLICIES, _LARGEST)))
     except FileNotFoundError:
         return {}
 
@@ -99,19 +101,16 @@ def _versions(folder: Path) -> dict[str, int]:
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Holds the folder's lock, which the system drops when its holder dies."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
+    with opened_folder(folder) as handle:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield
-    finally:
-        os.close(handle)
 
 
 def _expiry(marker: Path) -> int | None:
     """When a marker's bundle expires; None for one that a crash left without it: it is kept for ever."""
-    if marker.name.startswith(_FLOOR):
+    if marker.name.startswith((_FLOOR, UNFINISHED)):
         return None
     try:
-        return int(marker.read_bytes())
+        return int(read_regular(marker, _LARGEST))
     except ValueError:
         return None

@@ -3,14 +3,12 @@
 Its owner alone may read it: with it the fields that were withheld can be guessed (docs/log-format.md, section 6).
 """
 
-import os
-import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from rtshcua.adapters.files.durable import PRIVATE_FILE, write_new
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import exposed, open_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, write_new
 from rtshcua.evidence.proofs.disclosure import SECRET_BYTES, disclosure_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -26,12 +24,11 @@ def write_secret(folder: Path, secret: bytes) -> None:
     write_new(folder / SECRET, secret, mode=PRIVATE_FILE)
 
 
-def read_secret(path: Path) -> bytes:
-    """The secret in a file that its owner alone may read. Raises `SecretError` and OSError."""
-    with open_regular(path) as file:
-        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-        if os.name == "posix" and mode & 0o077:
-            raise SecretError("exposed", f"others may read the secret `{path}`: its mode is {mode:04o}")
+def read_secret(path: Path, root: Path | None = None) -> bytes:
+    """The secret in a file that its owner alone may read. Raises `SecretError` and OSError, as `open_regular`."""
+    with open_regular(path, root) as file:
+        if mode := exposed(file):
+            raise SecretError("exposed", f"others may read the secret `{path}`: its mode is {mode}")
         data = file.read(SECRET_BYTES + 1)
     if len(data) != SECRET_BYTES:
         raise SecretError("malformed", f"`{path}` is no secret of a log: it has not {SECRET_BYTES} bytes")
@@ -43,9 +40,9 @@ def disclosure_of(log: Path, records: int, before: Iterable[bytes] | None = None
     given otherwise; None where it does not, or its folder has no usable secret.
     """
     try:
-        with log.open("rb") as file:
+        with open_regular(log) as file:
             counted = _Counted(lines(file) if before is None else before)
-            root = disclosure_root(counted, read_secret(log.parent / SECRET))
+            root = disclosure_root(counted, read_secret(log.parent / SECRET, log.parent))
     except (OSError, ValueError):  # an `Untrusted` is a ValueError too
         return None
     return root if counted.count == records else None

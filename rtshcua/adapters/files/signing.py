@@ -9,23 +9,25 @@ leap, by a thread of its own: nothing that flies may wait for a disk. So after a
 that were sent, and what was heard before is not heard again. An orderly end stores the exact figures.
 """
 
-import fcntl
 import hashlib
 import json
 import os
-import stat
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
-from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, write_new
+from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
+from rtshcua.adapters.store.locking import lock
+from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, replace, write_new
 from rtshcua.mavlink.signing import KEY_OCTETS, UNIT_US, SignedLink, State
 
 EVERY_S: Final = 1.0
 RESERVE_S: Final = 3.0
 _LONGEST: Final = 1_024
+_LARGEST: Final = 1 << 20  # octets of a state
 
 
 class LinkKeyError(Exception):
@@ -39,10 +41,9 @@ class LinkKeyError(Exception):
 
 def read_link_key(path: Path) -> bytes:
     """The key in a file that its owner alone may read. Raises LinkKeyError and OSError."""
-    with path.open("rb") as file:
-        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-        if os.name == "posix" and mode & 0o077:
-            raise LinkKeyError("exposed", f"others may read the key `{path}`: its mode is {mode:04o}", "`chmod 600`")
+    with open_regular(path) as file:
+        if mode := exposed(file):
+            raise LinkKeyError("exposed", f"others may read the key `{path}`: its mode is {mode}", "`chmod 600`")
         data = file.read(_LONGEST)
     if len(data) != KEY_OCTETS:
         try:
@@ -73,17 +74,15 @@ class LinkStore:
         place = folder / "link" / f"vehicle-{quote(vehicle, safe='')}"
         make_folder(place, mode=PRIVATE_FOLDER)
         self.path = place / fingerprint(key)
-        self._lock = os.open(self.path.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._lock = lock(self.path.with_suffix(".lock"))
         except BlockingIOError:
-            os.close(self._lock)
             raise LinkKeyError("in-use", f"another run signs for `{vehicle}` with this key") from None
 
     def load(self) -> State:
         """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""
         try:
-            data = self.path.read_bytes()
+            data = read_regular(self.path, _LARGEST)
         except FileNotFoundError:
             return State(0, {})
         try:

@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 from rtshcua.adapters.files.port import SYSTEM, Disk
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.mavlink import tlog
 
 #: frames kept for a disk that does not keep up
@@ -66,15 +67,16 @@ class TelemetryFile:
             self._file.close()
         except OSError as error:
             self.error = self.error or error
-        with self.path.open("rb") as file:
+        with open_regular(self.path) as file:
             return file_digest(file, "sha256").digest()
 
     def _whole(self) -> int:
         """How many whole frames the file holds; what a full disk took of one more is cut off."""
         count = 0
         try:
-            for _ in tlog.read(self.path.read_bytes()):
-                count += 1
+            with open_regular(self.path) as file:
+                for _ in tlog.stream(file):
+                    count += 1
         except tlog.DamagedTlog as damaged:
             with suppress(OSError):
                 self._file.truncate(damaged.offset)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.regular import open_regular
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.quick import Outline, outline, quick
 from rtshcua.evidence.records import AnyRecord

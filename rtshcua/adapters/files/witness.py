@@ -4,7 +4,6 @@ A checkpoint is on the disk before its cosignature leaves. So after a crash the 
 answered, never what. Whoever deletes the folder makes the witness forget: that nobody else can is why it is not aboard.
 """
 
-import fcntl
 import os
 from collections.abc import Callable
 from hashlib import sha256
@@ -13,7 +12,10 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.adapters.files.durable import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, write_new
+from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
+from rtshcua.adapters.store.locking import lock
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, replace, write_new
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import parse
 from rtshcua.evidence.witnessing.cosign import cosign
@@ -24,6 +26,7 @@ from rtshcua.wire.untrusted import Untrusted
 #: notes that contradict what was cosigned are kept, as proof, up to so many
 MOST_CONTRADICTIONS: Final = 100
 _FOLDER: Final = "contradictions"
+_LARGEST: Final = 1 << 20  # octets of a checkpoint that is kept
 
 
 class WitnessError(Untrusted):
@@ -45,18 +48,16 @@ class WitnessStore:
         """Raises WitnessError (`in-use`), and OSError."""
         self.folder = state / "witness" / key.kid.hex()
         make_folder(self.folder, mode=PRIVATE_FOLDER)
-        self._lock = os.open(self.folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._lock = lock(self.folder / "lock")
         except BlockingIOError:
-            os.close(self._lock)
             raise WitnessError("in-use", f"another process cosigns with key {key.kid.hex()}") from None
 
     def seen(self, origin: str) -> tuple[Seen, int] | None:
         """What was cosigned last of a log, and when. Raises WitnessError (`damaged`), and OSError."""
         path = self._path(origin)
         try:
-            data = path.read_bytes()
+            data = read_regular(path, _LARGEST)
         except FileNotFoundError:
             return None
         try:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from rtshcua.adapters.packs import folder
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.language.faults import MAX_SIZE
 
@@ -20,8 +21,7 @@ def desk(library: str) -> Desk:
 
 def read(path: str) -> bytes:
     """At most one byte more than the parser takes, so that it is the parser who says that a file is too large."""
-    with Path(path).open("rb") as file:
-        return file.read(MAX_SIZE + 1)
+    return read_regular(path, MAX_SIZE)
 
 
 def listing(path: str) -> Iterable[str]:

@@ -43,7 +43,7 @@ def logs_in(given: Iterable[Path]) -> Given | ExitCode:
             return fail(ExitCode.INPUT, f"there is no `{LOG}` in `{path}` or below it")
         for log in below:
             try:
-                wrong = None if begins_as_log(log) else "it is not a log of this program"
+                wrong = None if begins_as_log(log, None if named else path) else "it is not a log of this program"
             except OSError as error:
                 if named:
                     raise

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rtshcua.adapters.files.rewriting import rewrite
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import rewrite
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.attempt import attempt
@@ -38,8 +39,7 @@ class Laid:
 def of_file(path: Path, width: int, *, write: bool) -> Laid:
     """Lays a file out, and replaces it if that is asked for and it changes."""
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_SIZE + 1)
+        data = read_regular(path, MAX_SIZE)
     except OSError as error:
         from rtshcua.ground.language.faults import unreadable  # with the model, for which the usual case has no need
 

@@ -4,7 +4,8 @@ import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from rtshcua.adapters.files.project import Project
+from rtshcua.adapters.files.project import LARGEST, Project
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
@@ -26,7 +27,7 @@ def idle(
         ignored = [each for each in settings.ignored if each not in used]
         ignored = [each for each in ignored if each.code is not codes.NOT_FORMATTED or settings.format]
         if ignored:
-            source = Source(shown(str(project.file)), project.file.read_text(encoding="utf-8"))
+            source = Source(shown(str(project.file)), read_regular(project.file, LARGEST).decode("utf-8"))
             for each in ignored:
                 yield _found(each, source), source
 

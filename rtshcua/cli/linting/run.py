@@ -1,6 +1,5 @@
 """A run of `rtshcua lint`, from its options to its exit code."""
 
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -135,27 +134,15 @@ def _diffed(mended: Fixed) -> ExitCode:
 
 def _write(mended: Fixed) -> dict[str, OSError]:
     """Put the new texts in place; those that could not be, and why."""
-    from rtshcua.adapters.files import rewriting
+    from rtshcua.adapters.store import writing
 
     unwritten: dict[str, OSError] = {}
     for name, data in mended.files.items():
         try:
-            rewriting.rewrite(Path(name), mended.before[name], data)
+            writing.rewrite(Path(name), mended.before[name], data)
         except OSError as error:
             unwritten[name] = error
     return unwritten
-
-
-def _put(path: Path, data: bytes) -> None:
-    """Writes a report in one step, where a link leads too; but for what is no file to be replaced: `/dev/stdout`, even
-    where that leads to a file.
-    """
-    from rtshcua.adapters.files.durable import replace
-
-    if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
-        path.write_bytes(data)
-    else:
-        replace(Path(os.path.realpath(path)), data)
 
 
 def _report(
@@ -175,7 +162,9 @@ def _report(
         if options.output is None:
             sys.stdout.write(text)
             return code
-        _put(options.output, text.encode("utf-8"))
+        from rtshcua.adapters.store.writing import write_out
+
+        write_out(options.output, text.encode("utf-8"))
     for name in () if mended is None else mended.refused:
         say(f"note: the fixes of `{name}` would bring an error, so they were not made")
     Findings(json=False).report(told.found, told.sources)

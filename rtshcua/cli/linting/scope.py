@@ -101,6 +101,6 @@ def _caches(files: Sequence[tuple[Path, Project]], *, fresh: bool) -> dict[Path,
         if folder != "":
             place = project.root / (FOLDER if folder is None else folder)
             if place not in opened:
-                opened[place] = LintCache(place, secret, fresh=fresh)
+                opened[place] = LintCache(project.root, folder or FOLDER, secret, fresh=fresh)
             found[path] = opened[place]
     return found

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rtshcua import library
 from rtshcua.adapters.files.lint_cache import LintCache
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.asked import SPECIFICATION, roots
 from rtshcua.cli.linting.examined import Examined, decoded, encoded
 from rtshcua.cli.linting.mark import mark
@@ -38,8 +39,7 @@ class Session:
         found = self._data.get(name)
         if found is None:
             try:
-                with open(name, "rb") as file:  # noqa: PTH123  a Path costs as much as a small file
-                    found = file.read(MAX_SIZE + 1)
+                found = read_regular(name, MAX_SIZE)
             except (OSError, ValueError) as error:
                 found = error
             self._data[name] = found

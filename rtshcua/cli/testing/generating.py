@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.adapters.files.durable import naming
+from rtshcua.adapters.store.writing import write_out
 from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
@@ -147,8 +147,7 @@ def _write(one: _Found, wanted: Wanted, findings: Findings, *, quiet: bool) -> E
         return findings.refuse(ExitCode.DIAGNOSTICS, "not-generated", message, fewer)
     text = formatted(Source(name, made.text)).text or made.text
     if wanted.output is not None:
-        with naming(wanted.output):
-            wanted.output.write_text(text, encoding="utf-8")
+        write_out(wanted.output, text.encode())
     elif not quiet:
         print(text, end="")
     _tell(made, policy.name, wanted.output, quiet=quiet)

@@ -331,3 +331,14 @@ def test_two_stories_of_one_boot_are_named(tmp_path: Path, capsys: pytest.Captur
     assert "conflict: 1 pair of logs" in out
     assert archive("verify", *ROOT, "--jobs", 1, "--json") == ExitCode.EVIDENCE
     assert len(as_json(capsys)["conflicts"]) == 1
+
+
+def test_a_link_in_a_folder_is_not_taken_in(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whoever sends a folder must not have another file of ours copied; one that is named may be a link."""
+    for name in ("a", "b"):
+        Path("flown", name).mkdir(parents=True)
+    Path("flown/a/log.jsonl").symlink_to(runs / "quad-07-0" / "log.jsonl")
+    Path("flown/b/log.jsonl").write_bytes((runs / "quad-07-1" / "log.jsonl").read_bytes())
+    assert archive("add", "flown", *ROOT) == ExitCode.INPUT
+    assert "flown/a/log.jsonl: symbolic links are not followed here" in capsys.readouterr().out
+    assert archive("add", "flown/a/log.jsonl", *ROOT) == ExitCode.OK

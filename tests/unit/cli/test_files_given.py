@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from reference.forgery import ROOT_KEY, flight
-from rtshcua.adapters.files import durable
+from rtshcua.adapters.store.faults import NotWritten
+from rtshcua.adapters.store.writing import replace
 from rtshcua.cli import app
-from rtshcua.cli.replacing import write_whole
 from rtshcua.diagnostics.exits import ExitCode
 
 ROOT = ("--root", ROOT_KEY.hex())
@@ -82,11 +82,11 @@ def test_where_nothing_may_be_written(
             raise PermissionError(13, "Permission denied", str(path))
         return opened(path, flags, *rest, **more)
 
-    monkeypatch.setattr(durable.os, "open", denied)
+    monkeypatch.setattr(os, "open", denied)
     assert app.main(["prove", str(log), "3", "-o", "there.tlog-proof"]) == ExitCode.FULL
     assert capsys.readouterr().err == "error: permission denied: `there.tlog-proof`\n"
-    with pytest.raises(durable.NotWritten, match=r"'there\.bundle'"):
-        write_whole(Path("there.bundle"), b"")
+    with pytest.raises(NotWritten, match=r"'there\.bundle'"):
+        replace(Path("there.bundle"), b"")
 
 
 @pytest.mark.parametrize("words", [("verify-log", *ROOT, "--json"), ("recover", "--dry-run", "--json")])

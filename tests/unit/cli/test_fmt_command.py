@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.files import rewriting
+from rtshcua.adapters.store import writing
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.format import attempt
@@ -215,7 +215,7 @@ def test_ctrl_c_leaves_whole_files(
     def interrupted(*_: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(rewriting, "write_all", interrupted)
+    monkeypatch.setattr(writing, "write_all", interrupted)
     assert main(["fmt", "a.rts"]) == ExitCode.INTERRUPTED
     assert Path("a.rts").read_text() == BAD
     assert sorted(each.name for each in here.iterdir()) == [".hidden", "a.rts", "b"]

@@ -7,9 +7,9 @@ import pytest
 
 from reference.proof_mutations import cosigned
 from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log
-from rtshcua.adapters.files.durable import write_new
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.store.writing import write_new
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.key_file import dump_signing_key

@@ -349,3 +349,19 @@ def test_what_follows_the_close_is_not_cosigned(flown: Flown, capsys: pytest.Cap
     assert "not cosigned: record 9:" in capsys.readouterr().out
     flown.path.write_bytes(data)
     assert app.main(["witness", str(flown.path)]) == ExitCode.OK
+
+
+def test_links_that_others_put_into_the_folder_are_not_followed(
+    flown: Flown, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They must not have the anchors of a log put behind a file of ours, nor have us read one."""
+    (tmp_path / "victim").write_text("mine")
+    flown.path.with_suffix(".anchors").symlink_to(tmp_path / "victim")
+    assert app.main(["witness", str(flown.path.parent)]) != ExitCode.OK
+    assert (tmp_path / "victim").read_text() == "mine"
+    (tmp_path / "dropped").mkdir()
+    (tmp_path / "dropped" / "log.jsonl").symlink_to(flown.path)
+    capsys.readouterr()
+    assert app.main(["witness", str(tmp_path / "dropped")]) == ExitCode.INPUT
+    assert "log.jsonl: not looked at: symbolic links are not followed here" in capsys.readouterr().out
+    assert app.main(["witness", str(tmp_path / "dropped" / "log.jsonl")]) == ExitCode.OK

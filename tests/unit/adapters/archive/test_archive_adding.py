@@ -15,6 +15,7 @@ from rtshcua.adapters.archive.adding import Done, reindex, verify
 from rtshcua.adapters.archive.asking import Asker, canned
 from rtshcua.adapters.archive.entry import AUDIT, Entry
 from rtshcua.adapters.archive.folder import TABLES, Folder
+from rtshcua.adapters.store.writing import UNFINISHED
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.cosign import cosign
@@ -356,7 +357,7 @@ def test_what_the_world_said_is_kept_as_it_is(detail: str, take: Add, tmp_path: 
 
 def test_an_archive_that_was_only_begun_is_made_whole(tmp_path: Path) -> None:
     (tmp_path / "begun").mkdir()
-    (tmp_path / "begun" / "archive.json.new").write_bytes(b"{")
+    (tmp_path / "begun" / f"{UNFINISHED}1.new").write_bytes(b"{")
     Folder(tmp_path / "begun", make=True)
     (tmp_path / "begun" / "tmp").rmdir()
     assert Folder(tmp_path / "begun", make=True).scratch.is_dir()

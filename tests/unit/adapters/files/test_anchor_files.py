@@ -51,5 +51,5 @@ def test_what_cannot_be_read_says_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     add_anchors(tmp_path / "log.anchors", MARKS)
     monkeypatch.setattr(anchors, "_LARGEST", len(MARKS[0].encode()) + 1)
     assert read_notes(tmp_path / "log.anchors") == MARKS[:1]
-    monkeypatch.setattr(Path, "open", lambda *a: (_ for _ in ()).throw(OSError(5, "broken")))
+    monkeypatch.setattr(os, "open", lambda *_, **__: (_ for _ in ()).throw(OSError(5, "broken")))
     assert read_notes(tmp_path / "log.anchors") == []

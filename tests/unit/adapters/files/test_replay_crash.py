@@ -23,10 +23,8 @@ class Disk:
 
     def __init__(self, patch: pytest.MonkeyPatch, changes: int, *, half: bool) -> None:
         self._left, self._half = changes, half
-        for name in ("open", "write", "fsync", "fdatasync"):
+        for name in ("open", "write", "fsync", "fdatasync", "replace", "unlink", "mkdir"):
             patch.setattr(os, name, self._counted(getattr(os, name), name))
-        for name in ("replace", "unlink", "mkdir"):
-            patch.setattr(Path, name, self._counted(getattr(Path, name), name))
 
     def _counted(self, real: Callable[..., Any], name: str) -> Callable[..., Any]:
         def change(*given: Any, **more: Any) -> Any:

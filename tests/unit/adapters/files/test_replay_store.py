@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.files import durable, replay
+from rtshcua.adapters.files import replay
 from rtshcua.adapters.files.replay import FileReplayStore
 from rtshcua.onboard.ports import Opening
 
@@ -76,7 +76,7 @@ def test_a_disk_that_does_not_take_it_opens_nothing(tmp_path: Path, monkeypatch:
         raise OSError("no sync")
 
     with monkeypatch.context() as patch:
-        patch.setattr(durable.os, "fsync", fails)
+        patch.setattr(os, "fsync", fails)
         with pytest.raises(OSError, match="no sync"):
             store.open_once(ONE, 1000, 10, *POLICY)
 
@@ -90,7 +90,7 @@ def test_marker_and_folder_are_on_disk_before_it_opens(tmp_path: Path, monkeypat
         synced.append(str(Path(f"/proc/self/fd/{handle}").readlink()))
         real(handle)
 
-    monkeypatch.setattr(durable.os, "fsync", record)
+    monkeypatch.setattr(os, "fsync", record)
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
     assert {str(store.folder), str(store.folder / ONE.hex())} <= set(synced)
 

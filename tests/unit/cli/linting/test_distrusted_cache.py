@@ -23,7 +23,7 @@ def entries() -> list[Path]:
 
 def forge(result: object, sign: bool, own: Path) -> int:
     """Write another result into all entries; signed as this user would, or as anybody can."""
-    cache = LintCache(FOLDER, lint_secret.lint_secret(own))
+    cache = LintCache(Path(), str(FOLDER), lint_secret.lint_secret(own))
     for file in entries():
         tree = json.loads(file.read_bytes().partition(b"\n")[2]) | {"result": result}
         data = json.dumps(tree).encode()
@@ -58,7 +58,7 @@ def test_a_cache_of_somebody_else_is_none(here: Path, lint: Lint, own: Path) -> 
 
 
 def test_an_entry_in_the_place_of_another_is_none(here: Path, own: Path) -> None:
-    cache = LintCache(FOLDER, lint_secret.lint_secret(own))
+    cache = LintCache(Path(), str(FOLDER), lint_secret.lint_secret(own))
     cache.put("a", b"entry")
     assert cache.get("a") == b"entry"
     (FOLDER / "2" / "a").rename(FOLDER / "2" / "b")
@@ -171,3 +171,20 @@ def test_a_folder_that_cannot_be_one_is_refused(here: Path, lint: Lint, folder: 
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
     assert "rtshcua.toml:1" in found[0][1]
     assert not Path(".gitignore").exists()
+
+
+def test_a_folder_above_it_that_is_a_link_is_not_written_through(here: Path, lint: Lint) -> None:
+    put({"rtshcua.toml": 'lint.cache = "build/cache"'})
+    (here / "elsewhere/cache").mkdir(parents=True)
+    Path("build").symlink_to(here / "elsewhere")
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert list((here / "elsewhere/cache").iterdir()) == []
+
+
+def test_a_pipe_in_it_is_not_waited_for(here: Path, lint: Lint) -> None:
+    lint(".")
+    first = entries()[0]
+    first.unlink()
+    os.mkfifo(first)
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert first.is_file()

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from reference.lint_project import HABITS, MISSION, POLICY, UNUSED, Lint, put
-from rtshcua.adapters.files.rewriting import rewrite
+from rtshcua.adapters.store.writing import rewrite
 from rtshcua.cli.app import main
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
@@ -156,7 +156,7 @@ def test_what_somebody_else_changed_meanwhile_is_left(
         rewrite(path, before, data)
 
     put({"policy.rts": POLICY + IDLE})
-    monkeypatch.setattr("rtshcua.adapters.files.rewriting.rewrite", meanwhile)
+    monkeypatch.setattr("rtshcua.adapters.store.writing.rewrite", meanwhile)
     assert main(["lint", ".", "--fix"]) == ExitCode.FULL
     assert Path("policy.rts").read_text() == "// mine\n"
     assert "cannot write `policy.rts`: it was changed meanwhile" in capsys.readouterr().err

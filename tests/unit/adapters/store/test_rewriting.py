@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.files import rewriting
-from rtshcua.adapters.files.durable import NotWritten
-from rtshcua.adapters.files.rewriting import Changed, rewrite
+from rtshcua.adapters.store.faults import Changed, NotWritten
+from rtshcua.adapters.store.writing import rewrite
 
 
 @pytest.fixture
@@ -65,13 +64,12 @@ def test_what_somebody_else_wrote_meanwhile_is_kept(file: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
-@pytest.mark.parametrize("at", ["write_all", "fsync", "replace"])
+@pytest.mark.parametrize("at", ["write", "fsync", "replace"])
 def test_nothing_is_lost(file: Path, error: BaseException, at: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
+    def fails(*_: object, **__: object) -> None:
         raise error
 
-    where = {"write_all": rewriting, "fsync": os, "replace": Path}[at]
-    monkeypatch.setattr(where, at, fails)
+    monkeypatch.setattr(os, at, fails)
     with pytest.raises(type(error)):
         rewrite(file, b"old", b"new")
     assert file.read_bytes() == b"old"

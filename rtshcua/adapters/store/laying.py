@@ -1,0 +1,87 @@
+"""Sets of files that are laid whole or not at all."""
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import NamedTuple
+
+from rtshcua.adapters.store.folders import sync_folder
+from rtshcua.adapters.store.writing import COMMON_FILE, UNFINISHED
+from rtshcua.adapters.store.writing import replace as put
+
+
+class Taken(NamedTuple):
+    """Why nothing was laid: these names are taken, by files (`replaceable`), or by what no file can replace."""
+
+    paths: tuple[Path, ...]
+    replaceable: bool
+
+
+@contextmanager
+def appearing(folder: Path) -> Iterator[Path]:
+    """A folder that its owner alone may look into; it takes its place once it is filled, and is gone if that fails."""
+    fresh = Path(mkdtemp(prefix=UNFINISHED, dir=folder.parent))  # mode 0700
+    try:
+        yield fresh
+        sync_folder(fresh)
+        fresh.rename(folder)
+        sync_folder(folder.parent)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def lay(files: Mapping[str, bytes], folder: Path, *, replace: bool = False) -> Taken | None:
+    """Write `files`, by their paths below `folder`, which is made where it is missing. None: all of them are there.
+
+    Nothing that is there already is touched, unless `replace`, and then only files of the same names. When anything
+    fails, a full disk say, what was laid is taken away again, what was replaced is put back, and OSError rises.
+    """
+    targets = {folder / name: data for name, data in files.items()}
+    blocked = _blocked(targets, folder)
+    if blocked:
+        return Taken(blocked, replaceable=False)
+    taken = tuple(target for target in targets if os.path.lexists(target))
+    if taken and not replace:
+        return Taken(taken, replaceable=True)
+    with ExitStack() as undo:  # Ctrl-C too
+        for target in targets:
+            _make_folders(target.parent, undo)
+        aside = Path(mkdtemp(prefix=UNFINISHED, dir=folder))
+        undo.callback(shutil.rmtree, aside, ignore_errors=True)
+        for number, (target, data) in enumerate(targets.items()):
+            if target in taken:
+                undo.callback(_put_back, aside / str(number), target)
+                target.rename(aside / str(number))
+            else:
+                undo.callback(target.unlink, missing_ok=True)
+            put(target, data, mode=COMMON_FILE, synced=False)
+        undo.pop_all()
+    shutil.rmtree(aside, ignore_errors=True)
+    return None
+
+
+def _blocked(targets: Mapping[Path, bytes], folder: Path) -> tuple[Path, ...]:
+    """What stands where a folder must be, or is a folder where a file must be."""
+    above = {parent for target in targets for parent in target.parents}
+    places = [place for place in above if os.path.lexists(place) and not place.is_dir()]
+    return (*sorted(places), *(target for target in targets if target.is_dir() and not target.is_symlink()))
+
+
+def _make_folders(folder: Path, undo: ExitStack) -> None:
+    for each in (*reversed(folder.parents), folder):
+        if not each.is_dir():
+            each.mkdir()
+            undo.callback(_remove, each)
+
+
+def _remove(folder: Path) -> None:
+    with suppress(OSError):  # somebody put something there
+        folder.rmdir()
+
+
+def _put_back(old: Path, target: Path) -> None:
+    with suppress(FileNotFoundError):  # it never was away
+        old.rename(target)

@@ -1,0 +1,155 @@
+"""Writing so that a crash, Ctrl-C or a full disk leaves either the old file or the new one, and nothing beside it.
+
+Nothing is written through a link: one that stands where a file is to go is replaced by the file.
+"""
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+from rtshcua.adapters.store.faults import Changed, naming
+from rtshcua.adapters.store.folders import opened_folder, sync_folder
+from rtshcua.adapters.store.reading import UNAWAITED, expect_regular, open_regular, read_regular
+
+#: modes, from which the umask takes away
+PRIVATE_FILE: Final = 0o600
+PUBLIC_FILE: Final = 0o644
+COMMON_FILE: Final = 0o666
+#: what the names of files begin with that are not finished; a loss of power may leave one
+UNFINISHED: Final = ".rtshcua-"
+
+_NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+_MORE: Final = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | UNAWAITED
+
+#: syncs a file's bytes, and of its metadata only what reading them back needs
+sync_data = getattr(os, "fdatasync", os.fsync)
+
+
+def write_all(handle: int, data: bytes) -> None:
+    """Writes every byte, however often the system takes only some of them."""
+    view = memoryview(data)
+    while view:
+        view = view[os.write(handle, view) :]
+
+
+@contextmanager
+def replacing(path: Path, *, mode: int = PUBLIC_FILE, synced: bool = True, root: Path | None = None) -> Iterator[int]:
+    """A descriptor of a new file that takes the place of `path`, in one step, when the block ends; if it is to be
+    `synced`, it is on the disk then. When the block raises, all is as it was.
+
+    The `mode` is subject to the umask. Below `root`, where one is given, no link is followed. Raises OSError.
+    """
+    fresh = f"{UNFINISHED}{os.urandom(8).hex()}.new"
+    with naming(path), opened_folder(path.parent, root) as folder:
+        try:
+            handle = os.open(fresh, _NEW, mode, dir_fd=folder)
+            try:
+                yield handle
+                if synced:
+                    os.fsync(handle)
+            finally:
+                os.close(handle)
+            os.replace(fresh, path.name, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(fresh, dir_fd=folder)
+            raise
+        if synced:
+            os.fsync(folder)
+
+
+def replace(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, synced: bool = True, root: Path | None = None) -> None:
+    """Puts a file with this content in place of whatever was there: see `replacing`."""
+    with replacing(path, mode=mode, synced=synced, root=root) as handle:
+        write_all(handle, data)
+
+
+def rewrite(path: Path, before: bytes, data: bytes) -> None:
+    """Puts `data` where `before` was. A symbolic link stays one, a hard link is parted from the others. Permissions
+    stay, and owner and group where we may.
+
+    Raises NotWritten where nobody may write to the file or its folder, Changed where it no longer says `before`, and
+    OSError for what else the system refuses.
+    """
+    real = Path(os.path.realpath(path))
+    with naming(path):
+        known = real.stat()
+        if not known.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH) or not os.access(real, os.W_OK):
+            raise PermissionError(errno.EACCES, "the file is read-only")
+        with replacing(real, mode=PRIVATE_FILE) as handle:
+            write_all(handle, data)
+            with suppress(OSError):  # not ours to give away
+                os.fchown(handle, known.st_uid, known.st_gid)
+            os.fchmod(handle, stat.S_IMODE(known.st_mode))  # after that: giving it away takes set-id bits
+            if read_regular(real, len(before)) != before:
+                raise Changed(errno.EBUSY, "it was changed meanwhile")
+
+
+def write_out(path: Path, data: bytes, *, mode: int = COMMON_FILE) -> None:
+    """Puts what somebody asked for into the file that they named, in one step, where a link leads too; but for what is
+    no file to be replaced, it is written to: `/dev/stdout`, even where that leads to a file.
+    """
+    with naming(path):
+        if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
+            path.write_bytes(data)
+        else:
+            replace(Path(os.path.realpath(path)), data, mode=mode)
+
+
+def publish(fresh: Path, place: Path) -> None:
+    """Gives a finished file its name, synced, in place of whatever was there. Raises OSError."""
+    with naming(place):
+        with open_regular(fresh) as file:
+            os.fsync(file.fileno())
+        fresh.replace(place)
+        sync_folder(place.parent)
+
+
+def open_new(path: Path, *, mode: int = PUBLIC_FILE) -> int:
+    """A descriptor of a file that did not exist before, to be appended to; its name is synced.
+
+    Raises FileExistsError and OSError.
+    """
+    with opened_folder(path.parent) as folder:
+        handle = os.open(path.name, _NEW | os.O_APPEND, mode, dir_fd=folder)
+        try:
+            os.fsync(folder)
+        except OSError:
+            os.close(handle)
+            raise
+    return handle
+
+
+def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, root: Path | None = None) -> None:
+    """Creates a file with its content, synced. Raises FileExistsError; leaves nothing behind when it fails."""
+    with naming(path), opened_folder(path.parent, root) as folder:
+        handle = os.open(path.name, _NEW, mode, dir_fd=folder)
+        try:
+            try:
+                write_all(handle, data)
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+            os.fsync(folder)
+        except BaseException:
+            os.unlink(path.name, dir_fd=folder)
+            raise
+
+
+def append(path: Path, data: bytes, root: Path | None = None) -> None:
+    """Puts data behind that of a regular file, which is made where there is none, and on the disk; no link is followed
+    to it, nor below `root`. Raises OSError.
+    """
+    with naming(path), opened_folder(path.parent, root) as folder:
+        handle = os.open(path.name, _MORE, PUBLIC_FILE, dir_fd=folder)
+        expect_regular(handle, path)
+        try:
+            write_all(handle, data)
+            sync_data(handle)
+        finally:
+            os.close(handle)
+        os.fsync(folder)

@@ -1,0 +1,96 @@
+"""Files are opened, replaced and made by `rtshcua/adapters/store`; who does it otherwise stands here, and why."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
+
+#: who opens or writes files by other means, besides the store itself
+ALLOWED = {
+    "adapters/archive/asking.py": "reads the SQL that ships",
+    "adapters/files/port.py": "goes on with a log: the door that tests put faults in",
+    "cli/init.py": "reads the example that ships",
+    "cli/linting/mark.py": "reads this program's own modules",
+    "cli/pages.py": "reads the pages that ship",
+    "cli/unlock.py": "a passphrase may well come from a pipe",
+    "ground/handbook/page.py": "reads the templates that ship",
+    "ground/language/generate.py": "a developer's tool: from the grammar to its table",
+    "ground/language/table.py": "reads the table that ships",
+    "mavlink/build_dialect.py": "a developer's tool: from pymavlink to the table",
+    "mavlink/dialect.py": "reads the table that ships",
+    "simulation/options.py": "the simulated vehicle's own key, and no sibling is imported from there",
+}
+#: of modules, and of paths
+MODULES = {
+    "os": {"open", "replace", "rename", "renames", "link", "symlink", "truncate", "creat"},
+    "io": {"open", "open_code", "FileIO"},
+    "shutil": {"copy", "copy2", "copyfile", "copytree", "move"},
+    "tempfile": {"mkstemp", "mkdtemp", "mktemp", "NamedTemporaryFile", "SpooledTemporaryFile", "TemporaryFile"},
+}
+METHODS = {"read_bytes", "read_text", "write_bytes", "write_text", "rename", "hardlink_to", "symlink_to"}
+WORDS = re.compile("|".join(METHODS.union(*MODULES.values())))
+
+
+def opened(source: str) -> Iterator[str]:
+    """Every way in which a module opens, makes or renames files: what it imports for that, and what it calls."""
+    if not WORDS.search(source):
+        return
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call | ast.ImportFrom):
+            continue
+        match node:
+            case ast.ImportFrom(module=str(module), names=names):
+                yield from (f"{module}.{each.name}" for each in names if each.name in MODULES.get(module, ()))
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="os"), attr="open"), args=[place, *_]):
+                if ast.unparse(place) != "os.devnull":
+                    yield "os.open"
+            case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name)) if name in MODULES.get(module, ()):
+                yield f"{module}.{name}"
+            case ast.Call(func=ast.Name(id="open")):
+                yield "open"
+            case ast.Call(func=ast.Attribute(attr="open"), args=args) if not args or _is_mode(args[0]):
+                yield ".open"
+            case ast.Call(func=ast.Attribute(attr="replace"), args=[what], keywords=[]):
+                if not ast.unparse(what).endswith("mission"):  # of a flight; text is replaced with two arguments
+                    yield ".replace"
+            case ast.Call(func=ast.Attribute(attr=name)) if name in METHODS:
+                yield f".{name}"
+
+
+def _is_mode(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str) and set(node.value) <= set("rwxabt+")
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        "from tempfile import mkstemp", "from os import replace", "from shutil import move",
+        "os.open(path, 0)", "os.replace(a, b)", "shutil.copyfile(a, b)", "open(path)", "path.open()", "path.open('rb')",
+        "Path(name).read_bytes()", "path.write_text(text)", "path.rename(other)", "fresh.replace(path)",
+        "def f():\n    with path.open('wb') as file:\n        pass",
+    ],
+)  # fmt: skip
+def test_every_way_is_found(way: str) -> None:
+    assert list(opened(way))
+
+
+@pytest.mark.parametrize(
+    "other", ["os.open(os.devnull, 0)", "text.replace('a', 'b')", "session.open(uri, 1)", "replace(path, data)"]
+)
+def test_what_opens_no_file_is_not(other: str) -> None:
+    assert not list(opened(other))
+
+
+def test_files_are_opened_and_written_by_the_store_alone() -> None:
+    found = {
+        str(file.relative_to(PACKAGE)): sorted(set(opened(file.read_text(encoding="utf-8"))))
+        for file in sorted(PACKAGE.rglob("*.py"))
+        if not file.is_relative_to(PACKAGE / "adapters" / "store")
+    }
+    ways = {name: each for name, each in found.items() if each}
+    assert {name: each for name, each in ways.items() if name not in ALLOWED} == {}
+    assert sorted(ALLOWED.keys() - ways.keys()) == [], "these may go from the list"

@@ -1,6 +1,6 @@
 """What the MAVLink dialect says of each message and enumeration, as a plain value.
 
-The value is read from `dialect.json`, a table that `rtshcua.mavlink.build_dialect` derives from pymavlink's generated
+The value is read from `dialect.json`, a table that `rtshcua.codec.build_dialect` derives from pymavlink's generated
 module `ardupilotmega` (which includes `common`). Reading it takes about two milliseconds; importing pymavlink takes
 tens, which the checker would pay on every start.
 """

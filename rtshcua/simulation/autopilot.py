@@ -8,7 +8,7 @@ from random import Random
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.activity import Event
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.boot import BootPlan

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import isfinite
 
-from rtshcua.mavlink.frames import Message, Received
+from rtshcua.codec.frames import Message, Received
 
 UNSET_INT = 2**31 - 1
 """In COMMAND_INT, an x or y that means nothing."""

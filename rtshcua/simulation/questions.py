@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message, Received
+from rtshcua.codec.frames import Message, Received
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.modes import Mode
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import HOME_MOVES, OURS, FrameRefusal, FrameSession
 from rtshcua.onboard.ports import Command

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from rtshcua.mavlink.frames import Received
+from rtshcua.codec.frames import Received
 
 _AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
 _MOST_TEXTS: Final = 20

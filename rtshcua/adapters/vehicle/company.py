@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from rtshcua.mavlink.frames import Codec, Verifier
+from rtshcua.codec.frames import Codec, Verifier
 
 _AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
 _NONE: Final = 8  # MAV_AUTOPILOT_INVALID: a component that is none

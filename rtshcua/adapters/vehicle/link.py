@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.company import Company
 from rtshcua.adapters.vehicle.flavour import Message
-from rtshcua.mavlink.frames import Codec, Received, Verifier
+from rtshcua.codec.frames import Codec, Received, Verifier
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.onboard.enforcement.frames import OURS, FrameRefusal, Gate

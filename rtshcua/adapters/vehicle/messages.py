@@ -5,7 +5,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.adapters.vehicle.fence import FenceItem
-from rtshcua.mavlink.decode import kind_of
+from rtshcua.codec.decode import kind_of
 
 NAN = float("nan")
 

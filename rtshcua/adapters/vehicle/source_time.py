@@ -19,8 +19,8 @@ not advance is the same measurement again, and keeps the time that it was given 
 from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.vehicle.vehicle_clock import APART_US, VehicleClock
+from rtshcua.codec.frames import Received
 from rtshcua.mavlink import dialect
-from rtshcua.mavlink.frames import Received
 
 #: After a silence of this length the next frame counts as sent after all before, whatever its number.
 GAP_US: Final = 500_000

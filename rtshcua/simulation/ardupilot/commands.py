@@ -5,7 +5,7 @@ from math import isfinite, radians
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.ardupilot.modes import MODES
 from rtshcua.simulation.ardupilot.streams import GROUPS
 from rtshcua.simulation.autopilot import Autopilot, Handler

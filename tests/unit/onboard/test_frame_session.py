@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frame_shape import LAYOUTS
 from rtshcua.onboard.enforcement.frames import FrameRefusal, FrameSession

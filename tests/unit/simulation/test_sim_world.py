@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation import faults
 from rtshcua.simulation.config import HOME, Kind, SimulationConfig
 from rtshcua.simulation.modes import Mode

@@ -9,7 +9,7 @@ from rtshcua.adapters.ardupilot import modes as ardupilot_modes
 from rtshcua.adapters.px4 import modes as px4_modes
 from rtshcua.adapters.vehicle.datum import NoDatum, amsl_m, home_amsl_mm, relative_m
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Ready, Said, TakenOver

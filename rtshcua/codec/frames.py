@@ -6,8 +6,8 @@ from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.mavlink.decode import Message as Message
-from rtshcua.mavlink.decode import decode, kind_of
+from rtshcua.codec.decode import Message as Message
+from rtshcua.codec.decode import decode, kind_of
 from rtshcua.mavlink.framing import CHECKSUM, FLAG_SIGNED, FLAGS, HEADER, MARKER, MIRROR, SIGNATURE, message_id
 
 # pymavlink lets an environment variable switch the checksum off in its own decoder. Nobody here may use it so.

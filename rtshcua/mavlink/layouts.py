@@ -28,6 +28,8 @@ SET_POSITION_TARGET_GLOBAL_INT: Final = 86
 TIMESYNC: Final = 111
 STATUSTEXT: Final = 253
 
+TEXT_OCTETS: Final = 50  # in one STATUSTEXT
+
 
 class Layout(NamedTuple):
     """A message's fields, in the order of the wire.
@@ -84,5 +86,12 @@ LAYOUTS: Final = {
         f"time_boot_ms lat_int lon_int alt vx vy vz afx afy afz yaw yaw_rate type_mask {_TARGET} coordinate_frame",
     ),
     TIMESYNC: _layout(34, "<qq", "tc1 ts1"),
-    STATUSTEXT: _layout(83, "<B50sHB", "severity text id chunk_seq"),
+    STATUSTEXT: _layout(83, f"<B{TEXT_OCTETS}sHB", "severity text id chunk_seq"),
 }  # fmt: skip
+
+#: what is read of the commands: the numbers that an autopilot acts on
+of_command_long: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
+of_command_int: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
+of_position_target: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter(
+    "lat_int lon_int alt type_mask coordinate_frame"
+)

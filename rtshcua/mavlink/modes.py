@@ -1,8 +1,14 @@
-"""The flight modes of the autopilots that are known: `custom_mode` of HEARTBEAT, and how DO_SET_MODE says it."""
+"""The autopilots that are known, and their flight modes: `custom_mode` of HEARTBEAT, and how DO_SET_MODE says it."""
 
 from collections.abc import Mapping
 from enum import IntEnum
 from typing import Final
+
+from rtshcua.mavlink import enums
+
+PX4: Final = enums.MAV_AUTOPILOT_PX4
+ARDUPILOT: Final = enums.MAV_AUTOPILOT_ARDUPILOTMEGA
+KNOWN: Final = (PX4, ARDUPILOT)
 
 
 class Px4Mode(IntEnum):

@@ -14,13 +14,7 @@ from rtshcua.model.quantity import Dimension
 #: denominator of the canonical units in one of it
 UNITS: Mapping[Dimension, Mapping[str, tuple[int, int]]] = MappingProxyType(
     {
-        Dimension.LENGTH: {
-            "mm": (1, 1),
-            "cm": (10, 1),
-            "dm": (100, 1),
-            "m": (1000, 1),
-            "dam": (10_000, 1),
-        },
+        Dimension.LENGTH: {"mm": (1, 1), "cm": (10, 1), "dm": (100, 1), "m": (1000, 1), "dam": (10_000, 1)},
         Dimension.SPEED: {
             "mm/s": (1, 1),
             "cm/s": (10, 1),

@@ -1,8 +1,9 @@
 """Other vehicles on the link: two autopilots that send to one port, of which one is flown, must not go unnoticed."""
 
-from rtshcua.codec.frames import Codec, Verifier
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
+from rtshcua.mavlink.signing import Verifier
 
 
 class _AllBut:

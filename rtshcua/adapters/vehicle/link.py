@@ -5,9 +5,10 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.company import Company
 from rtshcua.adapters.vehicle.flavour import Message
-from rtshcua.codec.frames import Codec, Received, Verifier
+from rtshcua.codec.frames import Codec, Received
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
+from rtshcua.mavlink.signing import Verifier
 from rtshcua.onboard.enforcement.frames import OURS, FrameRefusal, Gate
 from rtshcua.onboard.ports import Event
 

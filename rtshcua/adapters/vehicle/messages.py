@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from rtshcua.adapters.vehicle.fence import FenceItem
 from rtshcua.codec.decode import kind_of
 from rtshcua.mavlink import enums
-from rtshcua.mavlink.layouts import COMMAND_LONG
+from rtshcua.mavlink.layouts import COMMAND_LONG, TEXT_OCTETS
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 
 NAN = float("nan")
@@ -18,10 +18,8 @@ TAKEOFF = enums.MAV_CMD_NAV_TAKEOFF
 REPOSITION = enums.MAV_CMD_DO_REPOSITION
 CHANGE_SPEED = enums.MAV_CMD_DO_CHANGE_SPEED
 SET_INTERVAL = enums.MAV_CMD_SET_MESSAGE_INTERVAL
-REQUEST = enums.MAV_CMD_REQUEST_MESSAGE
 RUN_PREARM_CHECKS = enums.MAV_CMD_RUN_PREARM_CHECKS
 FENCE = enums.MAV_MISSION_TYPE_FENCE
-TEXT_OCTETS = 50
 
 _ZEROS = (0.0,) * 7
 _COMMAND_LONG = kind_of(COMMAND_LONG)
@@ -97,7 +95,7 @@ def message_interval(system: int, message: str, interval_us: int) -> Any:
 
 def request(system: int, message: str) -> Any:
     """REQUEST_MESSAGE: once, by the name of a message that the dialect has."""
-    return command(system, REQUEST, number_of(message) or 0)
+    return command(system, enums.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
 
 
 def time_sync(now_ns: int) -> Any:

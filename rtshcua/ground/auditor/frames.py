@@ -22,9 +22,8 @@ from rtshcua.ground.auditor.obeyed import Home, Target, obeyed, of_link, of_step
 from rtshcua.ground.auditor.sent import Frame, Nature, name, nature, read
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.mavlink import enums
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_ARDUPILOTMEGA as ARDUPILOT
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_PX4 as PX4
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
+from rtshcua.mavlink.modes import KNOWN
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
 
 #: who we are
@@ -173,11 +172,9 @@ class Frames:
     def _heard(self, frame: Frame) -> None:
         """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies."""
         fields, system = frame.fields, frame.system
-        if not fields:
-            return
-        if frame.message == HEARTBEAT and _autopilot(fields) in (PX4, ARDUPILOT):
+        if frame.message == HEARTBEAT and fields and _autopilot(fields) in KNOWN:
             self._autopilots.setdefault(system, _autopilot(fields))
-        elif frame.message == GLOBAL_POSITION_INT and system in self._autopilots:
+        elif frame.message == GLOBAL_POSITION_INT and system in self._autopilots and fields:
             above_sea, above_home = _heights(fields)
             height = above_sea - above_home  # mm
             home = self._homes.get(system, Home(height, height))

@@ -15,11 +15,9 @@ from math import isfinite, isnan
 from typing import Any, Final, NamedTuple
 
 from rtshcua.ground.auditor.sent import Frame
-from rtshcua.mavlink import enums
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_ARDUPILOTMEGA as ARDUPILOT
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_PX4 as PX4
-from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
-from rtshcua.mavlink.modes import CopterMode, Px4Mode
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -39,13 +37,7 @@ _MODES: Final = {
 _ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
 _DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
 #: a DO_REPOSITION: its number, heights above the sea, and in Hold
-_REPOSITION: Final = (
-    enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-)  # fmt: skip
-
-_of_command: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
-_of_place: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
-_of_target: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter("lat_int lon_int alt type_mask coordinate_frame")
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
 
 
 class Target(NamedTuple):
@@ -90,26 +82,26 @@ def obeyed(frame: Frame, target: Target, autopilot: int, home: Home | None) -> b
     if frame.message == COMMAND_LONG:
         return _command(fields, target, autopilot, home)
     if frame.message == COMMAND_INT and autopilot == PX4 and target.kind == MotionKind.HOLD:
-        speed, flags, radius, yaw, x, y, z, number, reference = _of_place(fields)
+        speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
         nowhere = x == y == enums.NO_PLACE and isnan(z) and isnan(yaw)
         return nowhere and (number, reference, flags, radius, speed) == (*_REPOSITION, 0, -1)
     if target.kind not in _TRAVELS:
         return False
     if frame.message == COMMAND_INT and autopilot == PX4:
-        speed, flags, radius, yaw, x, y, z, number, reference = _of_place(fields)
+        speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
         asked = _near(speed, target.speed) if target.speed else speed == -1
         plain = radius == 0 and isnan(yaw)  # without a circle or a heading of its own
         there = (number, reference, flags) == _REPOSITION and (x, y) in target.points
         return there and asked and plain and _above_sea(z, target, home)
     if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT:
-        x, y, z, mask, reference = _of_target(fields)
+        x, y, z, mask, reference = layouts.of_position_target(fields)
         alone = mask == enums.POSITION_ONLY and reference == enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         return alone and (x, y) in target.points and _near(z, target.altitude)
     return False
 
 
 def _command(fields: tuple[Any, ...], target: Target, autopilot: int, home: Home | None) -> bool:
-    *parameters, number = _of_command(fields)
+    *parameters, number = layouts.of_command_long(fields)
     one, two, three, four, five, six, seven = parameters
     if number == enums.MAV_CMD_DO_SET_MODE:
         custom = one == enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED

@@ -11,12 +11,10 @@ from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.framing import HEAD, HEADER, MARKER
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, MISSION_ITEM_INT, PARAM_SET
 
-_QUESTIONS: Final = frozenset(
-    {
-        layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
-        layouts.MISSION_REQUEST_INT, layouts.MISSION_ACK, layouts.TIMESYNC, layouts.STATUSTEXT,
-    }
-)  # fmt: skip
+_QUESTIONS: Final = frozenset((
+    layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
+    layouts.MISSION_REQUEST_INT, layouts.MISSION_ACK, layouts.TIMESYNC, layouts.STATUSTEXT,
+))  # fmt: skip
 #: commands that only ask
 _ASKS: Final = frozenset(
     {enums.MAV_CMD_RUN_PREARM_CHECKS, enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE}
@@ -25,7 +23,6 @@ _FENCE_PARAMETERS: Final = frozenset({b"FENCE_ENABLE", b"FENCE_TYPE"})
 
 _head, _layout = HEAD.unpack_from, LAYOUTS.get  # bound once: every frame that was kept comes by here
 _number: Final = LAYOUTS[COMMAND_LONG].getter("command")
-_number_of_int: Final = LAYOUTS[COMMAND_INT].getter("command")
 _parameter: Final = LAYOUTS[PARAM_SET].getter("param_id")
 _current: Final = LAYOUTS[MISSION_ITEM_INT].getter("current")
 _mission_types: Final = {
@@ -85,7 +82,6 @@ def nature(frame: Frame) -> Nature:
 
 def name(frame: Frame) -> str:
     """A frame in words, for a finding."""
-    number = {COMMAND_LONG: _number, COMMAND_INT: _number_of_int}.get(frame.message)
-    if number is not None and frame.fields:
-        return f"command {number(frame.fields)}"
+    if frame.fields and frame.message in (COMMAND_LONG, COMMAND_INT):
+        return f"command {frame.fields[LAYOUTS[frame.message].at('command')]}"
     return f"message {frame.message}"

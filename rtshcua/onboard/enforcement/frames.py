@@ -14,10 +14,11 @@ from typing import Final, NamedTuple, Protocol
 
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
+from rtshcua.mavlink.modes import KNOWN
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frame_shape import Frame, read_frame
 from rtshcua.onboard.enforcement.housekeeping_frames import Housekeeping, housekeeping
-from rtshcua.onboard.enforcement.motion_frames import KNOWN, carries_out, is_forced_arming, is_near, point_of
+from rtshcua.onboard.enforcement.motion_frames import carries_out, is_forced_arming, is_near, point_of
 from rtshcua.onboard.ports import Command
 
 #: who we are, in the vehicle's own system, and whom we speak to

@@ -11,17 +11,12 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from rtshcua.mavlink import enums, layouts
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_ARDUPILOTMEGA as ARDUPILOT
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_PX4 as PX4
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
-from rtshcua.mavlink.modes import CopterMode, Px4Mode
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import meridian
 from rtshcua.onboard.enforcement.frame_shape import Frame
 from rtshcua.onboard.ports import Command
-
-#: the autopilots that there are rules for
-KNOWN: Final = (PX4, ARDUPILOT)
 
 #: mm: how far home's height above sea may have moved between the frame that told it and the one that uses it; in the
 #: recorded flight of PX4 it moves by 0.7 m
@@ -33,14 +28,9 @@ NEAR: Final = 5.0
 _METRES: Final = 0.011_131_9  # one 1e-7 degree of latitude
 
 #: command, frame of reference (heights above mean sea level) and flags of a DO_REPOSITION
-_REPOSITION: Final = (
-    enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-)  # fmt: skip
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
 _NOWHERE: Final = (enums.NO_PLACE, enums.NO_PLACE)
 
-_long_fields: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
-_int_fields: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
-_target_fields: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter("lat_int lon_int alt type_mask coordinate_frame")
 _places: Final = {
     COMMAND_INT: LAYOUTS[COMMAND_INT].getter("x y"),
     SET_POSITION_TARGET_GLOBAL_INT: LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter("lat_int lon_int"),
@@ -73,10 +63,7 @@ def is_forced_arming(frame: Frame) -> bool:
 
     Any value but 0 counts, for what an autopilot makes of another one is its own affair.
     """
-    arming = _armings.get(frame.message)
-    if arming is None:
-        return False
-    number, force = arming(frame.fields)
+    number, force = _armings[frame.message](frame.fields) if frame.message in _armings else (0, 0)
     return bool(number == enums.MAV_CMD_COMPONENT_ARM_DISARM and force != 0)
 
 
@@ -114,7 +101,7 @@ def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
 
 
 def _long(fields: tuple[Any, ...], command: Command, autopilot: int, home_amsl: int | None) -> bool:
-    one, two, three, four, five, six, seven, number = _long_fields(fields)
+    one, two, three, four, five, six, seven, number = layouts.of_command_long(fields)
     match number:
         case enums.MAV_CMD_DO_SET_MODE:
             mode = _MODES[autopilot].get(command.kind)
@@ -139,7 +126,7 @@ def _long(fields: tuple[Any, ...], command: Command, autopilot: int, home_amsl: 
 
 def _reposition(fields: tuple[Any, ...], command: Command, home_amsl: int | None) -> bool:
     """DO_REPOSITION: a circle's radius, or a heading of its own, would be another manoeuvre."""
-    speed, flags, radius, yaw, x, y, z, number, reference = _int_fields(fields)
+    speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     return (
         (number, reference, flags) == _REPOSITION
         and command.kind in _TRAVELS
@@ -156,7 +143,7 @@ def _stop(fields: tuple[Any, ...]) -> bool:
 
     A finite one of them would make PX4 keep the target that it flies to.
     """
-    speed, flags, radius, yaw, x, y, z, number, reference = _int_fields(fields)
+    speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     return (
         (number, reference, flags) == _REPOSITION
         and (speed, radius) == (-1, 0)
@@ -168,7 +155,7 @@ def _stop(fields: tuple[Any, ...]) -> bool:
 
 def _position_target(fields: tuple[Any, ...], command: Command) -> bool:
     """SET_POSITION_TARGET_GLOBAL_INT; what the mask tells the autopilot to ignore may be anything."""
-    x, y, z, mask, reference = _target_fields(fields)
+    x, y, z, mask, reference = layouts.of_position_target(fields)
     return (
         (mask, reference) == (enums.POSITION_ONLY, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
         and command.kind in _TRAVELS

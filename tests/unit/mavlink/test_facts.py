@@ -16,7 +16,7 @@ def numbers(of: ModuleType) -> dict[str, int]:
     return {name: value for name, value in vars(of).items() if name.isupper() and isinstance(value, int)}
 
 
-MESSAGES = {name: value for name, value in numbers(layouts).items() if name != "HEADER"}
+MESSAGES = {name: value for name, value in numbers(layouts).items() if name not in {"HEADER", "TEXT_OCTETS"}}
 OWN_WORDS = {"POSITION_ONLY", "NO_PLACE"}
 IGNORED = ("VX", "VY", "VZ", "AX", "AY", "AZ", "YAW", "YAW_RATE")
 

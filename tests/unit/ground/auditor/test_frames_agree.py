@@ -10,9 +10,8 @@ from hypothesis import strategies as some
 from reference.kept_frames import kept
 from rtshcua.ground.auditor.obeyed import Home, Target, obeyed
 from rtshcua.ground.auditor.sent import Frame, Nature, nature, read
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_ARDUPILOTMEGA as ARDUPILOT
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_PX4 as PX4
 from rtshcua.mavlink.layouts import LAYOUTS
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frame_shape import Frame as Shape
 from rtshcua.onboard.enforcement.frame_shape import read_frame

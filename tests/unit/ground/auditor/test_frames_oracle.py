@@ -16,9 +16,8 @@ from rtshcua.ground.auditor.frames import OURS, Frames
 from rtshcua.ground.auditor.sent import Nature, nature
 from rtshcua.ground.auditor.sent import read as read_frame
 from rtshcua.ground.auditor.trust import Basis, establish
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_ARDUPILOTMEGA as ARDUPILOT
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_PX4 as PX4
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.onboard.enforcement.commands import Commands
 from rtshcua.onboard.enforcement.frame_shape import read_frame as read_shape
 from rtshcua.onboard.enforcement.motion_frames import carries_out

@@ -38,7 +38,7 @@ from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.live.telling import Teller
 from rtshcua.cli.live.watching import Watching
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.runtime.flight import Stage
 from virtual import case

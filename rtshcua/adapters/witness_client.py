@@ -17,10 +17,10 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.files.anchors import add_anchors, beside
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.witness_link import ANSWER, REQUEST, listen
+from rtshcua.codec.frames import Codec
+from rtshcua.codec.tunnel import Assembler, answer_name, messages, name_of
 from rtshcua.evidence.witnessing.submission import Submission, anchor
 from rtshcua.evidence.witnessing.witness import CONFLICT, OK, Answer, Request, decode_answer
-from rtshcua.mavlink.frames import Codec
-from rtshcua.mavlink.tunnel import Assembler, answer_name, messages, name_of
 from rtshcua.onboard.enforcement.frames import OURS
 
 #: how often the log is looked at, in seconds

@@ -8,9 +8,9 @@ import socket
 from collections.abc import Callable
 from typing import Final
 
+from rtshcua.codec.frames import Codec
+from rtshcua.codec.tunnel import Assembler, answer_name, messages, name_of
 from rtshcua.evidence.witnessing.witness import MALFORMED, Answer, Declined, Request, decode
-from rtshcua.mavlink.frames import Codec
-from rtshcua.mavlink.tunnel import Assembler, answer_name, messages, name_of
 
 #: kinds of messages in the tunnel
 REQUEST: Final = 1

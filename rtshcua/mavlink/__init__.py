@@ -1,4 +1,6 @@
-"""MAVLink 2: the dialect as a value, frames, quantisation of what arrives, and the tlog format.
+"""Facts of MAVLink 2, for whoever reads or makes frames: no judgement, no pymavlink, no clock and no socket.
 
-Shared by the adapters and the simulated vehicle. Importing this package imports nothing else.
+Framing, layouts, numbers and flight modes, signing, quantisation, the dialect as a value and the tlog format. The gate,
+the auditor, the adapters and the simulated vehicle read the same facts; what they conclude is written by each apart.
+Tests compare the facts with pymavlink's dialect.
 """

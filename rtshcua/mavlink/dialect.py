@@ -1,6 +1,6 @@
 """What the MAVLink dialect says of each message and enumeration, as a plain value.
 
-The value is read from `dialect.json`, a table that `rtshcua.mavlink.build_dialect` derives from pymavlink's generated
+The value is read from `dialect.json`, a table that `rtshcua.codec.build_dialect` derives from pymavlink's generated
 module `ardupilotmega` (which includes `common`). Reading it takes about two milliseconds; importing pymavlink takes
 tens, which the checker would pay on every start.
 """
@@ -13,7 +13,26 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
+from rtshcua.model.quantity import Datum
+
 TABLE = Path(__file__).with_name("dialect.json")
+
+#: what an altitude in a field is measured from, by message and field (common.xml, in its descriptions)
+DATUM: Mapping[tuple[str, str], Datum] = MappingProxyType(
+    {
+        ("GLOBAL_POSITION_INT", "relative_alt"): Datum.HOME,
+        ("GLOBAL_POSITION_INT", "alt"): Datum.SEA,
+        ("GLOBAL_POSITION_INT_COV", "relative_alt"): Datum.HOME,
+        ("GLOBAL_POSITION_INT_COV", "alt"): Datum.SEA,
+        ("GPS_RAW_INT", "alt"): Datum.SEA,
+        ("GPS2_RAW", "alt"): Datum.SEA,
+        ("VFR_HUD", "alt"): Datum.SEA,
+        ("HOME_POSITION", "altitude"): Datum.SEA,
+        ("ALTITUDE", "altitude_amsl"): Datum.SEA,
+        ("ALTITUDE", "altitude_relative"): Datum.HOME,
+        ("HIGH_LATENCY2", "altitude"): Datum.SEA,
+    }
+)
 
 V = TypeVar("V")
 

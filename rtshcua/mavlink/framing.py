@@ -1,9 +1,12 @@
 """The shape of a MAVLink 2 frame on the wire, see https://mavlink.io/en/guide/serialization.html."""
 
 from binascii import crc_hqx
+from struct import Struct
 from typing import Final
 
 MARKER = 0xFD
+HEAD: Final = Struct("<BBBBBBBHB")
+"""Marker, length, incompatibility and compatibility flags, sequence, system, component, message (16 bits, and 8)."""
 HEADER = 10
 CHECKSUM = 2
 SIGNATURE = 13

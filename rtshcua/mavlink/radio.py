@@ -4,9 +4,10 @@ Of all that was told in the last seconds the worst counts, field by field, so th
 can make the link look worse, never better. It is let in only where the operator says that there is a radio.
 """
 
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
+from rtshcua.mavlink.signing import Verifier
 
 RADIO_STATUS: Final = 109
 #: us; radios report each second
@@ -17,18 +18,10 @@ _BETTER_LOW: Final = ("noise", "remnoise", "rxerrors", "fixed")
 _NOT_KNOWN: Final = 255
 
 
-class Link(Protocol):
-    """A link that verifies what comes."""
-
-    def accept(self, frame: bytes, now_us: int) -> bool:
-        """Whether a frame may come in."""
-        ...
-
-
 class UnsignedRadio:
     """Accepts what `link` accepts, and RADIO_STATUS without a signature, tempered."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Verifier) -> None:
         self._link = link
         self._now: dict[str, int] = {}  # the worst since `_since_us`,
         self._before: dict[str, int] = {}  # and in the span before it

@@ -12,7 +12,7 @@ import hashlib
 import hmac
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, SIGNATURE, with_flags
 
@@ -55,6 +55,14 @@ class Counts:
     strayed: int = 0  # our own, or sent by its sender on another link than the one that we hear it by
     stale: int = 0
     crowded: int = 0  # rightly signed, of a stream for which there is no room
+
+
+class Verifier(Protocol):
+    """Says whether a frame proves where it comes from."""
+
+    def accept(self, frame: bytes, now_us: int) -> bool:
+        """Whether a frame with a right checksum may be taken in at a monotonic time."""
+        ...
 
 
 class SignedLink:

@@ -2,14 +2,16 @@
 
 from enum import Enum, IntEnum, auto
 
+from rtshcua.mavlink import enums
+
 
 class Landed(IntEnum):
     """EXTENDED_SYS_STATE.landed_state (MAV_LANDED_STATE)."""
 
-    ON_GROUND = 1
-    IN_AIR = 2
-    TAKEOFF = 3
-    LANDING = 4
+    ON_GROUND = enums.MAV_LANDED_STATE_ON_GROUND
+    IN_AIR = enums.MAV_LANDED_STATE_IN_AIR
+    TAKEOFF = enums.MAV_LANDED_STATE_TAKEOFF
+    LANDING = enums.MAV_LANDED_STATE_LANDING
 
 
 class Event(Enum):

@@ -8,7 +8,8 @@ from random import Random
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
+from rtshcua.mavlink.layouts import TEXT_OCTETS
 from rtshcua.simulation.activity import Event
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.boot import BootPlan
@@ -36,7 +37,6 @@ TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
 LOW_TO_ARM = 0.08
 """The battery level at which it does not arm any more."""
-_TEXT_LENGTH = 50
 _REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
 SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
 """The parameters that hold the vehicle's own system id."""
@@ -289,7 +289,7 @@ class Autopilot:
         """Queues STATUSTEXT, in chunks if the text is long (MAVLink 2, `id` and `chunk_seq`)."""
         if self.flavour.texts_need_ground_station and not self.ground_station_seen:
             return
-        chunks = [text[at : at + _TEXT_LENGTH] for at in range(0, len(text), _TEXT_LENGTH)]
+        chunks = [text[at : at + TEXT_OCTETS] for at in range(0, len(text), TEXT_OCTETS)]
         if len(chunks) > 1:
             self._text_id = self._text_id % 65_535 + 1
         for number, chunk in enumerate(chunks):

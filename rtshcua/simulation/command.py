@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 from math import isfinite
 
-from rtshcua.mavlink.frames import Message, Received
-
-UNSET_INT = 2**31 - 1
-"""In COMMAND_INT, an x or y that means nothing."""
+from rtshcua.codec.frames import Message, Received
+from rtshcua.mavlink.enums import NO_PLACE
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +29,8 @@ def from_message(received: Received) -> Command:
     m: Message = received.message
     sender = (received.system, received.component)
     if received.name == "COMMAND_INT":
-        x = None if m.x == UNSET_INT else float(m.x)
-        y = None if m.y == UNSET_INT else float(m.y)
+        x = None if m.x == NO_PLACE else float(m.x)
+        y = None if m.y == NO_PLACE else float(m.y)
         return Command(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.frame, sender)
     x = m.param5 * 1e7 if isfinite(m.param5) else None
     y = m.param6 * 1e7 if isfinite(m.param6) else None

@@ -88,7 +88,7 @@ def enter(mode: Mode, refused: int) -> Handler:
 
     def handle(a: Autopilot, _: Command) -> tuple[int, ...]:
         if not a.can_enter(mode):
-            a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {a.flavour.modes.names[mode]} failed: no position")
+            a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {a.flavour.modes.name(mode)} failed: no position")
             return (refused,)
         a.vehicle.set_mode(mode)
         return (ACCEPTED,)

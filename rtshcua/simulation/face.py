@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec, Message, Received
+from rtshcua.codec.frames import Codec, Message, Received
 from rtshcua.simulation import plan_face, questions
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message

@@ -54,8 +54,12 @@ class ModeTable:
     """What `base_mode` loses while the vehicle lands without a position."""
     stands_by: bool
     """Whether HEARTBEAT tells that it stands by until it lifts off, armed or not."""
-    names: Mapping[Mode, str]
-    """What the flavour calls them in its texts."""
+    names: Mapping[int, str]
+    """What the flavour calls them in its texts, by number."""
+
+    def name(self, mode: Mode) -> str:
+        """What the flavour calls a mode that it has."""
+        return self.names[self.numbers[mode]]
 
     def mode(self, number: int) -> Mode | None:
         """The mode with this `custom_mode`, if the flavour has one."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.handling import Handling
 
 INT8 = mavlink.MAV_PARAM_TYPE_INT8

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Received
+from rtshcua.codec.frames import Received
 from rtshcua.simulation.autopilot import Autopilot
 
 

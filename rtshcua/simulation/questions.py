@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message, Received
+from rtshcua.codec.frames import Message, Received
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.modes import Mode
 
@@ -62,7 +62,7 @@ def available_modes(a: Autopilot, number: int) -> bool:
         return False
     for index, (mode, custom) in enumerate(listed, start=1):
         if number in (0, index):
-            name = modes.names[mode].encode()
+            name = modes.name(mode).encode()
             payload = _LAYOUT.pack(custom, 0, len(listed), index, _STANDARD.get(mode, 0), name)
             a.send(_AvailableModes(payload))
     return True

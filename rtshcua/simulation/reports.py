@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 
 ALWAYS = frozenset({"HEARTBEAT", "SYSTEM_TIME", "TIMESYNC"})
 """What does not hold a measurement, and goes on when the others are frozen."""

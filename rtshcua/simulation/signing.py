@@ -7,7 +7,7 @@ the same: RADIO_STATUS, which radios do not sign, and everything on a link that 
 
 from typing import Final
 
-from rtshcua.mavlink.frames import Message, Received
+from rtshcua.codec.frames import Message, Received
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
 
 _UNSIGNED: Final = frozenset({"RADIO_STATUS", "RADIO"})

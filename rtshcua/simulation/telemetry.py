@@ -4,7 +4,7 @@ from math import atan2, degrees, hypot
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.failsafe import LOW_TO_LAND
 from rtshcua.simulation.modes import Mode

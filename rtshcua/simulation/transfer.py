@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.plan import ALL, KINDS, Item, Plans, from_message, to_message
 
 ACCEPTED: int = mavlink.MAV_MISSION_ACCEPTED

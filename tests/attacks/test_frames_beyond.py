@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import HOME_MOVES, NOT_COVERED, OURS, OUT_OF_ORDER, FrameSession
 from rtshcua.onboard.ports import Command

@@ -12,12 +12,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from reference.flat_case import S
 from reference.forgery import ROOT_KEY, read, signed
 from reference.kept_frames import Entries, kept
+from rtshcua.codec.frames import Codec
 from rtshcua.evidence.finding import Finding
 from rtshcua.ground.auditor.audit import Auditor
 from rtshcua.ground.auditor.frames import OURS, Frames
 from rtshcua.ground.auditor.sent import Nature, nature
 from rtshcua.ground.auditor.sent import read as read_frame
-from rtshcua.mavlink.frames import Codec
 from virtual import case
 from virtual.flight import Flight
 

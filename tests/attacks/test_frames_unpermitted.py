@@ -5,7 +5,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference.flat_case import S
 from reference.world import SESSION_KEY, START, allowed, loaded
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.onboard.enforcement.frames import FORCED_ARMING, OURS
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Dispatch

@@ -6,12 +6,12 @@ from random import Random
 import pytest
 
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Judge, Log
+from rtshcua.codec.frames import Codec
+from rtshcua.codec.tunnel import MOST_OF_ONE, Assembler, Whole, messages
 from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
 from rtshcua.evidence.witnessing.submission import anchor
 from rtshcua.evidence.witnessing.witness import Declined, Request, Seen, decode, decode_answer
-from rtshcua.mavlink.frames import Codec
-from rtshcua.mavlink.tunnel import MOST_OF_ONE, Assembler, Whole, messages
 
 
 def logs() -> tuple[Log, Log]:

@@ -6,7 +6,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession

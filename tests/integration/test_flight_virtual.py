@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
+from rtshcua.codec.frames import Codec
 from rtshcua.evidence.report import Verdict
-from rtshcua.mavlink.frames import Codec
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.simulation.fault_text import parse_fault

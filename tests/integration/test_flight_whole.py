@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.frames import Codec
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

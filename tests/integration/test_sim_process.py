@@ -16,7 +16,7 @@ from typing import Any, Self
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec, Received
+from rtshcua.codec.frames import Codec, Received
 from rtshcua.simulation.process import EXIT_OK, EXIT_PORT, EXIT_USAGE
 
 PATIENCE_S = 60.0

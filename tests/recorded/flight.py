@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from recorded.trace import CLIENT, SECOND, Heard, Trace
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.world import Simulation

@@ -14,10 +14,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua import library
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.cli.sources import compile_sources
+from rtshcua.codec.frames import Codec, Received
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.frames import Codec, Received
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import SHIFT, Projection

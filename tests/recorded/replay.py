@@ -3,7 +3,7 @@
 from heapq import merge
 
 from recorded.trace import Heard, Question, Trace
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.world import Simulation
 

@@ -11,8 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from rtshcua.codec.frames import Codec, Received
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.frames import Codec, Received
 
 TRACES = Path(__file__).resolve().parents[1] / "traces"
 SECOND = 1_000_000

@@ -8,7 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Received
+from rtshcua.codec.frames import Received
 
 SECOND = 1_000_000
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.mavlink.frames import Verifier
+from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession

@@ -1,1 +1,1 @@
-"""ArduCopter: modes and commands (facts: ArduCopter's `mode.h` and `GCS_Mavlink.cpp`, recorded answers of 4.7)."""
+"""ArduCopter: how it is commanded (facts: ArduCopter's `mode.h` and `GCS_Mavlink.cpp`, recorded answers of 4.7)."""

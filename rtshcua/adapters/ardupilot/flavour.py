@@ -5,7 +5,6 @@ It obeys position targets in GUIDED only, and ignores them silently elsewhere; t
 
 from collections.abc import Callable
 
-from rtshcua.adapters.ardupilot import modes
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.datum import relative_m
 from rtshcua.adapters.vehicle.effects import (
@@ -27,6 +26,8 @@ from rtshcua.adapters.vehicle.flavour import Flavour, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.progress import Expected
 from rtshcua.adapters.vehicle.targets import Target
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
@@ -36,7 +37,7 @@ _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
 #: link time within which a climb, a leg, a return (it hovers over home for 5 s) and a landing get a metre further
 _CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 45_000_000, 15_000_000
-_GUIDED = frozenset({modes.GUIDED})
+_GUIDED = frozenset({CopterMode.GUIDED})
 _POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
 
 
@@ -71,14 +72,15 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                 *others,
             ]  # fmt: skip
         case MotionKind.HOME:
-            return _down(system, modes.RETURN, Expected(homeward, _RETURNS_US, either_way=True))
+            return _down(system, CopterMode.RTL, Expected(homeward, _RETURNS_US, either_way=True))
         case MotionKind.LAND:
-            return _down(system, modes.LAND, Expected(to_the_ground, _LANDS_US))
+            return _down(system, CopterMode.LAND, Expected(to_the_ground, _LANDS_US))
         case _:
-            hold = frozenset({modes.HOLD})
-            mode = messages.set_mode(system, modes.HOLD)
+            # not LOITER, which obeys the throttle stick: an onboard computer has none
+            hold = frozenset({CopterMode.BRAKE})
+            mode = messages.set_mode(system, CopterMode.BRAKE)
             return [
-                Stage(mode, messages.DO_SET_MODE, in_mode(modes.HOLD), hold, _MODE_US, powered=True, stops=True),
+                Stage(mode, messages.DO_SET_MODE, in_mode(CopterMode.BRAKE), hold, _MODE_US, powered=True, stops=True),
                 Stage(None, None, still, hold, powered=True, stops=True),
             ]
 
@@ -109,11 +111,11 @@ def _sets_off(leg: Stage) -> Callable[[Observed], bool]:
 
 def _guided(system: int) -> Stage:
     """GUIDED first. Where it is the mode already nothing is sent, for that would undo a takeover under way."""
-    message = messages.set_mode(system, modes.GUIDED)
-    return Stage(message, messages.DO_SET_MODE, in_mode(modes.GUIDED), _GUIDED, _MODE_US, spare=True)
+    message = messages.set_mode(system, CopterMode.GUIDED)
+    return Stage(message, messages.DO_SET_MODE, in_mode(CopterMode.GUIDED), _GUIDED, _MODE_US, spare=True)
 
 
-def _down(system: int, mode: int, progress: Expected) -> list[Stage]:
+def _down(system: int, mode: CopterMode, progress: Expected) -> list[Stage]:
     own = frozenset({mode})
     message = messages.set_mode(system, mode)
     return [
@@ -124,14 +126,16 @@ def _down(system: int, mode: int, progress: Expected) -> list[Stage]:
 
 ARDUPILOT = Flavour(
     name="ardupilot",
-    autopilot=3,
-    mode_names=modes.NAMES,
+    autopilot=enums.MAV_AUTOPILOT_ARDUPILOTMEGA,
+    mode_names=COPTER_NAMES,
     stages=stages,
     estimator="EKF_STATUS_REPORT",
     natural=frozenset(),
-    ours=frozenset({modes.GUIDED, modes.HOLD, modes.RETURN}),
+    ours=frozenset({CopterMode.GUIDED, CopterMode.BRAKE, CopterMode.RTL}),
     mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
     bytewise=False,
-    fence=FenceHabits(frame=0, all_inclusions=True, switches=(("FENCE_TYPE", _POLYGONS), ("FENCE_ENABLE", 1))),
+    fence=FenceHabits(
+        frame=enums.MAV_FRAME_GLOBAL, all_inclusions=True, switches=(("FENCE_TYPE", _POLYGONS), ("FENCE_ENABLE", 1))
+    ),
 )

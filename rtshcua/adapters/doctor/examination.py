@@ -13,7 +13,8 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.link import Heard
 from rtshcua.adapters.vehicle.parameters import Parameters
 from rtshcua.adapters.vehicle.preflight import Preflight
-from rtshcua.mavlink.frames import Codec, Verifier
+from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Clock, Event, Readings, Said

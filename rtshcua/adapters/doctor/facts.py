@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from rtshcua.mavlink.frames import Received
+from rtshcua.codec.frames import Received
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 
-_AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
 _MOST_TEXTS: Final = 20
 _MOST_TALKERS: Final = 64
 _LONG_AGO: Final = 64  # a sequence that goes back by less than this came out of order, and nothing is missing
@@ -79,7 +79,7 @@ class Facts:
             self.streams[frame.name] = Stream(1, now_us, now_us, frame.message)
         else:
             stream.count, stream.last_us, stream.latest = stream.count + 1, now_us, frame.message
-        if frame.component != _AUTOPILOT:
+        if frame.component != AUTOPILOT:
             return
         match frame.name:
             case "COMMAND_ACK" | "PARAM_VALUE" | "AUTOPILOT_VERSION":
@@ -99,4 +99,4 @@ class Facts:
 
     def others(self) -> Iterator[tuple[tuple[int, int], Talker]]:
         """Whoever else was heard but the autopilot."""
-        return ((key, talker) for key, talker in self.talkers.items() if key != (self.system, _AUTOPILOT))
+        return ((key, talker) for key, talker in self.talkers.items() if key != (self.system, AUTOPILOT))

@@ -5,11 +5,11 @@ from typing import Final
 
 from rtshcua.adapters.doctor.facts import Facts
 from rtshcua.adapters.doctor.finding import Finding, Verdict
+from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
+from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
 from rtshcua.onboard.enforcement.frames import OURS
 
-_AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
-_GROUND_STATION: Final = 6  # MAV_TYPE_GCS
-_NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT_INVALID
 _SLOW_HEARTBEAT_US: Final = 1_500_000
 _SLOW_US, _TOO_SLOW_US = 200_000, 1_000_000
 #: parts of the frames that are missing, in 1/1000
@@ -49,7 +49,7 @@ def _heartbeat(facts: Facts, flavour: str) -> Finding:
 
 
 def _loss(facts: Facts) -> Finding:
-    talker = facts.talkers[facts.system, _AUTOPILOT]
+    talker = facts.talkers[facts.system, AUTOPILOT]
     sent = talker.frames + talker.missing
     lost = 1_000 * talker.missing // sent
     found = f"{talker.missing} of {sent} frames are missing ({lost // 10}.{lost % 10} %)"
@@ -60,7 +60,7 @@ def _loss(facts: Facts) -> Finding:
 
 
 def _signing(facts: Facts, *, keyed: bool) -> Finding:
-    talker = facts.talkers[facts.system, _AUTOPILOT]
+    talker = facts.talkers[facts.system, AUTOPILOT]
     signed = f"{talker.signed} of {talker.frames} frames are signed"
     if keyed:
         return Finding("link/signing", Verdict.OK if talker.signed else Verdict.STOP, signed)
@@ -83,9 +83,9 @@ def _others(facts: Facts, *, named: bool) -> Iterator[Finding]:
         if (system, component) == (facts.system, OURS):
             advice = "stop the other one: two that mediate do not see what the other commands"
             yield Finding("link/component", Verdict.STOP, f"another component {OURS} speaks here", "", advice)
-        elif talker.kind == _GROUND_STATION:
+        elif talker.kind == GROUND_STATION:
             stations += 1
-        elif system != facts.system and component == _AUTOPILOT and talker.autopilot not in (None, _NO_AUTOPILOT):
+        elif system != facts.system and component == AUTOPILOT and talker.autopilot not in (None, NO_AUTOPILOT):
             found = f"another vehicle speaks here too, system {system}"
             verdict = Verdict.WARN if named else Verdict.STOP
             yield Finding("link/other-vehicle", verdict, found, "one vehicle", "`--system` says which one is meant")

@@ -14,12 +14,12 @@ from rtshcua.adapters.language_server.uris import name_of, uri_of
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.positions import Encoding, Lines
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import FormatSettings
+from rtshcua.mavlink.dialect import Dialect
 
 
 @dataclass(slots=True)

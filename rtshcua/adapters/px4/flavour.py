@@ -4,7 +4,6 @@ Altitudes in commands are above mean sea level here, whatever the frame says. An
 DO_SET_MODE says nothing: only the heartbeat tells, and of a stop only the speed.
 """
 
-from rtshcua.adapters.px4 import modes
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.datum import amsl_m
 from rtshcua.adapters.vehicle.effects import (
@@ -25,6 +24,8 @@ from rtshcua.adapters.vehicle.flavour import Flavour, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.progress import Expected
 from rtshcua.adapters.vehicle.targets import Target
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
@@ -35,7 +36,7 @@ _CLIMBS_US, _FLIES_US, _RETURNS_US, _LANDS_US = 10_000_000, 8_000_000, 45_000_00
 #: mm: how far from where it is it may say that it takes off, or that it will come to stand;
 _TAKES_OFF, _STOPS = 20_000, 10_000
 _STOPS_S = 3  # and how many seconds' way further, and what braking at 1 m/s^2 takes, if it moves
-_HOLD = frozenset({modes.HOLD})
+_HOLD = frozenset({Px4Mode.HOLD})
 
 
 def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
@@ -58,9 +59,9 @@ def stages(command: Command, seen: Observed, system: int) -> list[Stage]:
                 for latitude, longitude in zip(command.geo[::2], command.geo[1::2], strict=True)
             ]
         case MotionKind.HOME:
-            return _down(system, modes.RETURN, modes.SUB_RETURN, Expected(homeward, _RETURNS_US, either_way=True))
+            return _down(system, Px4Mode.RETURN, Expected(homeward, _RETURNS_US, either_way=True))
         case MotionKind.LAND:
-            return _down(system, modes.LAND, modes.SUB_LAND, Expected(to_the_ground, _LANDS_US))
+            return _down(system, Px4Mode.LAND, Expected(to_the_ground, _LANDS_US))
         case _:
             return [_stop(seen, system), Stage(None, None, still, _HOLD, powered=True, stops=True)]
 
@@ -70,16 +71,16 @@ def _climb(command: Command, seen: Observed, system: int) -> list[Stage]:
     its arming would take off whenever somebody armed it.
     """
     amsl = amsl_m(command.altitude, seen.home_amsl)
-    own = frozenset({modes.TAKEOFF, modes.HOLD})
+    own = frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD})
     takeoff = messages.command(
         system, messages.TAKEOFF, messages.NAN, 0, 0, messages.NAN, messages.NAN, messages.NAN, amsl
     )
-    hold = messages.set_mode(system, modes.AUTO, modes.SUB_LOITER)
+    hold = messages.set_mode(system, Px4Mode.HOLD)
     above = Target(seen.latitude, seen.longitude, round(amsl * 1_000), _TAKES_OFF)
     return [
-        Stage(hold, messages.DO_SET_MODE, in_mode(modes.HOLD), _HOLD, _MODE_US, spare=True),
+        Stage(hold, messages.DO_SET_MODE, in_mode(Px4Mode.HOLD), _HOLD, _MODE_US, spare=True),
         Stage(messages.arm(system), messages.ARM_DISARM, armed, _HOLD, _ARM_US),
-        Stage(takeoff, messages.TAKEOFF, in_mode(modes.TAKEOFF), own, _MODE_US, powered=True, target=above),
+        Stage(takeoff, messages.TAKEOFF, in_mode(Px4Mode.TAKEOFF), own, _MODE_US, powered=True, target=above),
         Stage(
             None, None, climbed(command.altitude), own, powered=True, target=above,
             progress=Expected(up_to(command.altitude), _CLIMBS_US),
@@ -96,9 +97,9 @@ def _stop(seen: Observed, system: int) -> Stage:
     return Stage(stop, messages.REPOSITION, None, _HOLD, _MODE_US, powered=True, target=here, stops=True)
 
 
-def _down(system: int, mode: int, sub: int, progress: Expected) -> list[Stage]:
+def _down(system: int, mode: Px4Mode, progress: Expected) -> list[Stage]:
     own = frozenset({mode})
-    message = messages.set_mode(system, modes.AUTO, sub)
+    message = messages.set_mode(system, mode)
     return [
         Stage(message, messages.DO_SET_MODE, in_mode_or_down(mode), own, _MODE_US),
         Stage(None, None, down, own, progress=progress),
@@ -107,14 +108,14 @@ def _down(system: int, mode: int, sub: int, progress: Expected) -> list[Stage]:
 
 PX4 = Flavour(
     name="px4",
-    autopilot=12,
-    mode_names=modes.NAMES,
+    autopilot=enums.MAV_AUTOPILOT_PX4,
+    mode_names=PX4_NAMES,
     stages=stages,
     estimator="ESTIMATOR_STATUS",
-    natural=frozenset({(modes.TAKEOFF, modes.HOLD)}),
-    ours=frozenset({modes.TAKEOFF, modes.HOLD, modes.RETURN}),
+    natural=frozenset({(Px4Mode.TAKEOFF, Px4Mode.HOLD)}),
+    ours=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD, Px4Mode.RETURN}),
     mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     bytewise=True,
-    fence=FenceHabits(frame=3, all_inclusions=False, switches=()),
+    fence=FenceHabits(frame=enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, all_inclusions=False, switches=()),
 )

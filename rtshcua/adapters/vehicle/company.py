@@ -1,11 +1,9 @@
 """Other vehicles on the link: two autopilots that send to one port, of which one is flown, must not go unnoticed."""
 
-from typing import Final
-
-from rtshcua.mavlink.frames import Codec, Verifier
-
-_AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
-_NONE: Final = 8  # MAV_AUTOPILOT_INVALID: a component that is none
+from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
+from rtshcua.mavlink.signing import Verifier
 
 
 class _AllBut:
@@ -37,8 +35,8 @@ class Company:
     def hear(self, datagram: bytes, now_us: int, *, elsewhere: bool) -> None:
         """Take in a datagram; `elsewhere`: of another sender than the vehicle."""
         for frame in (self._anybody if elsewhere else self._others).parse(datagram, now_us):
-            is_autopilot = frame.component == _AUTOPILOT and frame.name == "HEARTBEAT"
-            if not is_autopilot or frame.message.autopilot == _NONE:
+            is_autopilot = frame.component == AUTOPILOT and frame.name == "HEARTBEAT"
+            if not is_autopilot or frame.message.autopilot == NO_AUTOPILOT:
                 continue
             if frame.system == self._system:
                 self.found = f"two vehicles speak here as system {self._system}: give each an id of its own"

@@ -22,7 +22,8 @@ from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, Streams
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Texts
-from rtshcua.mavlink.frames import Received, Verifier
+from rtshcua.codec.frames import Received
+from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.ports import (

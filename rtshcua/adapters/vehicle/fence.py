@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 from math import isqrt
 from typing import Final, NamedTuple
 
+from rtshcua.mavlink import enums
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, Projection, Zone, unproject
 
-#: MAV_CMD_NAV_FENCE_...
-INCLUDE_VERTEX: Final = 5001
-EXCLUDE_VERTEX: Final = 5002
-INCLUDE_CIRCLE: Final = 5003
-EXCLUDE_CIRCLE: Final = 5004
+INCLUDE_VERTEX: Final = enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+EXCLUDE_VERTEX: Final = enums.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+INCLUDE_CIRCLE: Final = enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
+EXCLUDE_CIRCLE: Final = enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
 
 Ring = tuple[int, ...]
 

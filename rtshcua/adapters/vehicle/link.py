@@ -5,10 +5,11 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.company import Company
 from rtshcua.adapters.vehicle.flavour import Message
+from rtshcua.codec.frames import Codec, Received
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.frames import Codec, Received, Verifier
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
+from rtshcua.mavlink.signing import Verifier
 from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.ports import Event
 

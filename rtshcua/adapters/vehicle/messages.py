@@ -5,35 +5,34 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.adapters.vehicle.fence import FenceItem
-from rtshcua.mavlink.decode import kind_of
+from rtshcua.codec.decode import kind_of
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.layouts import COMMAND_LONG, TEXT_OCTETS
+from rtshcua.mavlink.modes import CopterMode, Px4Mode
 
 NAN = float("nan")
 
-DO_SET_MODE = dialect.MAV_CMD_DO_SET_MODE
-ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
-TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
-REPOSITION = dialect.MAV_CMD_DO_REPOSITION
-CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
-SET_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
-REQUEST = dialect.MAV_CMD_REQUEST_MESSAGE
-RUN_PREARM_CHECKS = dialect.MAV_CMD_RUN_PREARM_CHECKS
-FENCE = dialect.MAV_MISSION_TYPE_FENCE
-TEXT_OCTETS = 50
+DO_SET_MODE = enums.MAV_CMD_DO_SET_MODE
+ARM_DISARM = enums.MAV_CMD_COMPONENT_ARM_DISARM
+TAKEOFF = enums.MAV_CMD_NAV_TAKEOFF
+REPOSITION = enums.MAV_CMD_DO_REPOSITION
+CHANGE_SPEED = enums.MAV_CMD_DO_CHANGE_SPEED
+SET_INTERVAL = enums.MAV_CMD_SET_MESSAGE_INTERVAL
+RUN_PREARM_CHECKS = enums.MAV_CMD_RUN_PREARM_CHECKS
+FENCE = enums.MAV_MISSION_TYPE_FENCE
 
 _ZEROS = (0.0,) * 7
-_COMMAND_LONG = kind_of(dialect.MAVLINK_MSG_ID_COMMAND_LONG)
+_COMMAND_LONG = kind_of(COMMAND_LONG)
 assert _COMMAND_LONG is not None
 _COMMAND = _COMMAND_LONG
 
-_AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
-_NOWHERE = (1 << 31) - 1  # INT32_MAX
-_POSITION_ONLY = 0x0DF8  # POSITION_TARGET_TYPEMASK: ignore velocity, acceleration, yaw and yaw rate
+_AUTOPILOT = enums.MAV_COMP_ID_AUTOPILOT1
 
 
 def heartbeat() -> Any:
     """Of an onboard controller; never of a ground station, which would hide the loss of the real one."""
     return dialect.MAVLink_heartbeat_message(
-        dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+        enums.MAV_TYPE_ONBOARD_CONTROLLER, enums.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
 
 
@@ -43,9 +42,9 @@ def command(system: int, number: int, *parameters: float) -> Any:
     return _COMMAND.build((*filled, number, system, _AUTOPILOT, 0))  # in the order of the wire
 
 
-def set_mode(system: int, *custom: int) -> Any:
-    """DO_SET_MODE to a custom mode: PX4 takes main and sub mode, ArduCopter the number."""
-    return command(system, DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *custom)
+def set_mode(system: int, mode: Px4Mode | CopterMode) -> Any:
+    """DO_SET_MODE to a custom mode."""
+    return command(system, DO_SET_MODE, enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *mode.parameters)
 
 
 def arm(system: int) -> Any:
@@ -56,9 +55,9 @@ def arm(system: int) -> Any:
 def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int) -> Any:
     """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode."""
     speed = speed_mm_s / 1_000 if speed_mm_s else -1.0
-    flags = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    flags = enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
     return dialect.MAVLink_command_int_message(
-        system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
+        system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
         speed, flags, 0, NAN, latitude, longitude, amsl_m,
     )  # fmt: skip
 
@@ -68,16 +67,17 @@ def stop_here(system: int) -> Any:
 
     As COMMAND_INT, where INT32_MAX is what NaN is in a float (vehicles.md 5; PX4: `Navigator`, DO_REPOSITION).
     """
-    flags = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    flags = enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
     return dialect.MAVLink_command_int_message(
-        system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL, REPOSITION, 0, 0, -1.0, flags, 0, NAN, _NOWHERE, _NOWHERE, NAN
-    )
+        system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
+        -1.0, flags, 0, NAN, enums.NO_PLACE, enums.NO_PLACE, NAN,
+    )  # fmt: skip
 
 
 def position_target(system: int, latitude: int, longitude: int, height_m: float) -> Any:
     """SET_POSITION_TARGET_GLOBAL_INT: a place at a height in metres above home."""
     return dialect.MAVLink_set_position_target_global_int_message(
-        0, system, _AUTOPILOT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, _POSITION_ONLY,
+        0, system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, enums.POSITION_ONLY,
         latitude, longitude, height_m, 0, 0, 0, 0, 0, 0, 0, 0,
     )  # fmt: skip
 
@@ -95,7 +95,7 @@ def message_interval(system: int, message: str, interval_us: int) -> Any:
 
 def request(system: int, message: str) -> Any:
     """REQUEST_MESSAGE: once, by the name of a message that the dialect has."""
-    return command(system, REQUEST, number_of(message) or 0)
+    return command(system, enums.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
 
 
 def time_sync(now_ns: int) -> Any:

@@ -6,15 +6,13 @@ from typing import Any
 
 from rtshcua.adapters.vehicle import datum, health
 from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
+from rtshcua.mavlink import enums
 
-_ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-_ON_GROUND = 1  # MAV_LANDED_STATE
-_IN_AIR = (2, 3, 4)  # IN_AIR, TAKEOFF, LANDING
-_LANDING = 4
+_IN_AIR = (enums.MAV_LANDED_STATE_IN_AIR, enums.MAV_LANDED_STATE_TAKEOFF, enums.MAV_LANDED_STATE_LANDING)
 _FIX_3D = 3
 _CRITICAL = (5, 6)  # MAV_STATE: CRITICAL, EMERGENCY
 _DEBUG = 7  # MAV_SEVERITY
-_ABOVE_SEA = (0, 5)  # MAV_FRAME_GLOBAL, MAV_FRAME_GLOBAL_INT
+_ABOVE_SEA = (enums.MAV_FRAME_GLOBAL, enums.MAV_FRAME_GLOBAL_INT)
 _HEEDED = (
     "HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "POSITION_TARGET_GLOBAL_INT", "GPS_RAW_INT", "SYS_STATUS",
     "ATTITUDE",
@@ -78,7 +76,7 @@ class Observed:
         match name:
             case "HEARTBEAT":
                 self.mode = message.custom_mode
-                self.armed = bool(message.base_mode & _ARMED)
+                self.armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED)
                 self.heartbeat_us = now_us
                 self.beats += 1
                 self._judge(message.system_status)
@@ -129,12 +127,12 @@ class Observed:
     @property
     def landing(self) -> bool:
         """Coming down to land, as it says itself."""
-        return self.landed_state == _LANDING
+        return self.landed_state == enums.MAV_LANDED_STATE_LANDING
 
     @property
     def down(self) -> bool:
         """Seen on the ground with its motors off."""
-        return self.landed_state == _ON_GROUND and not self.armed
+        return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and not self.armed
 
     @property
     def ready(self) -> bool:

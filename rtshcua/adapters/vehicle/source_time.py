@@ -19,15 +19,15 @@ not advance is the same measurement again, and keeps the time that it was given 
 from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.vehicle.vehicle_clock import APART_US, VehicleClock
+from rtshcua.codec.frames import Received
 from rtshcua.mavlink import dialect
-from rtshcua.mavlink.frames import Received
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 
 #: After a silence of this length the next frame counts as sent after all before, whatever its number.
 GAP_US: Final = 500_000
 #: The delay of the link is the largest within this time, and at most twice as long.
 WINDOW_US: Final = 1_000_000
 
-_AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
 _UNIX_US: Final = 10**15  # 2001; as a time since boot it would be 31 years
 _WRAP, _HALF = 1 << 32, 1 << 31
 _NUMBERS, _AHEAD = 256, 128
@@ -91,7 +91,7 @@ class SourceTime:
         message, name, _, component, number, _, _ = frame
         self.stepped = False
         stamp = self._stamps[name] if name in self._stamps else self._find(name)
-        if component != _AUTOPILOT:
+        if component != AUTOPILOT:
             return self._of_another(name, message, component, stamp, now_us)
         if now_us >= self._until_us:
             self._refresh(now_us)
@@ -127,7 +127,7 @@ class SourceTime:
         offset_us = self._offset_us
         if offset_us is None or not raw:
             return None
-        told = self._told.get((_AUTOPILOT, name))
+        told = self._told.get((AUTOPILOT, name))
         if told is not None and told[0] == raw:
             return told[1]
         boot, us = raw, stamp.us
@@ -147,7 +147,7 @@ class SourceTime:
             if not 0 < (raw - told[0]) % _WRAP < _HALF:
                 return at_us  # overtaken
             at_us = told[1]  # measured later, though the clocks were seen to run apart
-        self._told[_AUTOPILOT, name] = (raw, at_us)
+        self._told[AUTOPILOT, name] = (raw, at_us)
         return at_us
 
     def _checked(self, at_us: int, now_us: int) -> int | None:

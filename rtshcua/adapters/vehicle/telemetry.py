@@ -5,6 +5,7 @@ from typing import Any
 
 from rtshcua.decision.reads import where
 from rtshcua.mavlink import dialect
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.policy import Policy
@@ -14,9 +15,6 @@ from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, proje
 #: Each message is asked for several times within the shortest time to stale of what it carries, within these, in us.
 MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
 _WITHIN_STALE = 4
-
-
-_AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 
 
 def _always(_: str) -> bool:
@@ -76,7 +74,7 @@ class Telemetry:
         return self._sources
 
     def read(
-        self, name: str, message: Any, component: int = _AUTOPILOT, vouched: Callable[[str], bool] = _always
+        self, name: str, message: Any, component: int = AUTOPILOT, vouched: Callable[[str], bool] = _always
     ) -> tuple[tuple[int, int | None], ...]:
         """(slot, canonical integer) of every signal that this message carries; None is "reported as not known".
 
@@ -86,7 +84,7 @@ class Telemetry:
         carried = self._by_message.get(name)
         if carried is None or not self._is_first(name, message, component):
             return ()
-        known = vouched if component == _AUTOPILOT else _always
+        known = vouched if component == AUTOPILOT else _always
         if _says_nothing(name, message):
             known = _never
         values: list[tuple[int, int | None]] = []
@@ -98,7 +96,7 @@ class Telemetry:
                 values += [(signal.slot, x), (signal.slot + 1, y)]
             else:
                 values.append((signal.slot, _number(source, message)))
-        if component == _AUTOPILOT:
+        if component == AUTOPILOT:
             self._own.update(slot for slot, _ in values)
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)

@@ -5,6 +5,7 @@ All of it is untrusted: it may hold anything, come in floods, or never end. It e
 
 from typing import Any, Final
 
+from rtshcua.mavlink.layouts import TEXT_OCTETS
 from rtshcua.onboard.ports import Said
 
 LONGEST: Final = 200  # characters
@@ -13,8 +14,6 @@ CHUNK_US: Final = 1_000_000
 #: So many texts at once, and one more each so often; what is more is counted.
 BURST: Final = 20
 EACH_US: Final = 500_000
-
-_FIELD: Final = 50  # octets in one STATUSTEXT
 
 
 def quoted(text: str) -> str:
@@ -43,7 +42,7 @@ class Texts:
             said += self._finish(now_us)
         self._id, self._severity, self._at_us = message.id, message.severity, now_us
         self._parts.append(part)
-        if len(part) < _FIELD or not message.id or len(self._parts) * _FIELD >= LONGEST:
+        if len(part) < TEXT_OCTETS or not message.id or len(self._parts) * TEXT_OCTETS >= LONGEST:
             said += self._finish(now_us)
         return said
 

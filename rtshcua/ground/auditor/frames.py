@@ -18,14 +18,19 @@ from typing import Final, NamedTuple
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.cover import DISPATCHED
-from rtshcua.ground.auditor.obeyed import ARDUPILOT, PX4, Home, Target, obeyed, of_link, of_step
-from rtshcua.ground.auditor.sent import GLOBAL_POSITION_INT, HEARTBEAT, Frame, Nature, name, nature, read
+from rtshcua.ground.auditor.obeyed import Home, Target, obeyed, of_link, of_step
+from rtshcua.ground.auditor.sent import Frame, Nature, name, nature, read
 from rtshcua.ground.auditor.trust import Basis
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
+from rtshcua.mavlink.modes import KNOWN
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
 
-#: MAV_COMP_ID_ONBOARD_COMPUTER: who we are; MAV_COMP_ID_AUTOPILOT1: who the vehicle is
-OURS: Final = 191
-_AUTOPILOT: Final = 1
+#: who we are
+OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
+
+_autopilot: Final = LAYOUTS[HEARTBEAT].getter("autopilot")
+_heights: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("alt relative_alt")
 
 
 class _Entry(NamedTuple):
@@ -145,7 +150,7 @@ class Frames:
         frame = read(entry.octets)
         if frame is None:
             return  # nothing that an autopilot would take for a frame
-        if frame.component == _AUTOPILOT:
+        if frame.component == enums.MAV_COMP_ID_AUTOPILOT1:
             self._heard(frame)
         if frame.component != OURS or (self._autopilots and frame.system not in self._autopilots):
             return
@@ -167,10 +172,11 @@ class Frames:
     def _heard(self, frame: Frame) -> None:
         """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies."""
         fields, system = frame.fields, frame.system
-        if frame.message == HEARTBEAT and fields[2:3] and fields[2] in (PX4, ARDUPILOT):
-            self._autopilots.setdefault(system, fields[2])
+        if frame.message == HEARTBEAT and fields and _autopilot(fields) in KNOWN:
+            self._autopilots.setdefault(system, _autopilot(fields))
         elif frame.message == GLOBAL_POSITION_INT and system in self._autopilots and fields:
-            height = fields[3] - fields[4]  # mm: above sea, less above home
+            above_sea, above_home = _heights(fields)
+            height = above_sea - above_home  # mm
             home = self._homes.get(system, Home(height, height))
             self._homes[system] = Home(min(home.low, height), max(home.high, height))
 

@@ -14,32 +14,30 @@ Heights above sea are judged by what the vehicle reported of its home.
 from math import isfinite, isnan
 from typing import Any, Final, NamedTuple
 
-from rtshcua.ground.auditor.sent import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT, Frame
+from rtshcua.ground.auditor.sent import Frame
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 
-#: MAV_AUTOPILOT
-ARDUPILOT, PX4 = 3, 12
-_SET_MODE, _ARM, _TAKEOFF, _SPEED, _REPOSITION = 176, 400, 22, 178, 192  # MAV_CMD
-
 _TRAVELS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
-#: the modes (custom main mode, sub-mode) that an autopilot is put in, and for which motions
+#: the modes (as parameters 2 and 3 of DO_SET_MODE) that an autopilot is put in, and for which motions
 _MODES: Final = {
-    (PX4, 4, 3): frozenset({MotionKind.CLIMB}),
-    (PX4, 4, 5): frozenset({MotionKind.HOME}),
-    (PX4, 4, 6): frozenset({MotionKind.LAND}),
-    (ARDUPILOT, 4, 0): frozenset({MotionKind.CLIMB}) | _TRAVELS,
-    (ARDUPILOT, 17, 0): frozenset({MotionKind.HOLD}),
-    (ARDUPILOT, 6, 0): frozenset({MotionKind.HOME}),
-    (ARDUPILOT, 9, 0): frozenset({MotionKind.LAND}),
+    (PX4, *Px4Mode.HOLD.parameters): frozenset({MotionKind.CLIMB}),
+    (PX4, *Px4Mode.RETURN.parameters): frozenset({MotionKind.HOME}),
+    (PX4, *Px4Mode.LAND.parameters): frozenset({MotionKind.LAND}),
+    (ARDUPILOT, *CopterMode.GUIDED.parameters): frozenset({MotionKind.CLIMB}) | _TRAVELS,
+    (ARDUPILOT, *CopterMode.BRAKE.parameters): frozenset({MotionKind.HOLD}),
+    (ARDUPILOT, *CopterMode.RTL.parameters): frozenset({MotionKind.HOME}),
+    (ARDUPILOT, *CopterMode.LAND.parameters): frozenset({MotionKind.LAND}),
 }
 _ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
 _DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
-_POSITION_ONLY: Final = 0x0DF8  # POSITION_TARGET_TYPEMASK: all but the position is ignored
-_NOWHERE: Final = 2_147_483_647  # INT32_MAX: no place
-_ABOVE_SEA, _ABOVE_HOME = 0, 6  # MAV_FRAME of the two ways to say a height
+#: a DO_REPOSITION: its number, heights above the sea, and in Hold
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
 
 
 class Target(NamedTuple):
@@ -84,40 +82,42 @@ def obeyed(frame: Frame, target: Target, autopilot: int, home: Home | None) -> b
     if frame.message == COMMAND_LONG:
         return _command(fields, target, autopilot, home)
     if frame.message == COMMAND_INT and autopilot == PX4 and target.kind == MotionKind.HOLD:
-        speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
-        nowhere = (x, y) == (_NOWHERE, _NOWHERE) and isnan(z) and isnan(yaw)
-        return nowhere and (number, reference, flags, radius, speed) == (_REPOSITION, _ABOVE_SEA, 1, 0, -1)
+        speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
+        nowhere = x == y == enums.NO_PLACE and isnan(z) and isnan(yaw)
+        return nowhere and (number, reference, flags, radius, speed) == (*_REPOSITION, 0, -1)
     if target.kind not in _TRAVELS:
         return False
     if frame.message == COMMAND_INT and autopilot == PX4:
-        speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+        speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
         asked = _near(speed, target.speed) if target.speed else speed == -1
-        plain = flags == 1 and radius == 0 and isnan(yaw)  # in Hold, without a circle or a heading of its own
-        there = number == _REPOSITION and reference == _ABOVE_SEA and (x, y) in target.points
+        plain = radius == 0 and isnan(yaw)  # without a circle or a heading of its own
+        there = (number, reference, flags) == _REPOSITION and (x, y) in target.points
         return there and asked and plain and _above_sea(z, target, home)
     if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT:
-        _, x, y, z, *_, mask, _, _, reference = fields
-        alone = mask == _POSITION_ONLY and reference == _ABOVE_HOME
+        x, y, z, mask, reference = layouts.of_position_target(fields)
+        alone = mask == enums.POSITION_ONLY and reference == enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         return alone and (x, y) in target.points and _near(z, target.altitude)
     return False
 
 
 def _command(fields: tuple[Any, ...], target: Target, autopilot: int, home: Home | None) -> bool:
-    one, two, three, four, five, six, seven, number, *_ = fields
-    if number == _SET_MODE:
-        return one == 1 and target.kind in _MODES.get((autopilot, two, three), ()) and not any(fields[3:7])
-    if number == _ARM:  # to arm, and not by force
-        return target.kind == MotionKind.CLIMB and one == 1 and not any(fields[1:7])
-    if number == _TAKEOFF:
+    *parameters, number = layouts.of_command_long(fields)
+    one, two, three, four, five, six, seven = parameters
+    if number == enums.MAV_CMD_DO_SET_MODE:
+        custom = one == enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        return custom and target.kind in _MODES.get((autopilot, two, three), ()) and not any(parameters[3:])
+    if number == enums.MAV_CMD_COMPONENT_ARM_DISARM:  # to arm, and not by force
+        return target.kind == MotionKind.CLIMB and one == 1 and not any(parameters[1:])
+    if number == enums.MAV_CMD_NAV_TAKEOFF:
         if target.kind != MotionKind.CLIMB:
             return False
         if autopilot == PX4:  # where it is, turned as it is
             here = (isnan(one) or not one) and not two and not three and all(map(isnan, (four, five, six)))
             return here and _above_sea(seven, target, home)
-        return not any(fields[:6]) and _near(seven, target.altitude)
-    if number == _SPEED:  # over ground, the throttle as it is
+        return not any(parameters[:6]) and _near(seven, target.altitude)
+    if number == enums.MAV_CMD_DO_CHANGE_SPEED:  # over ground, the throttle as it is
         asked = target.kind in _TRAVELS and target.speed > 0 and _near(two, target.speed)
-        return asked and one == 1 and three == -1 and not any(fields[3:7])
+        return asked and one == enums.SPEED_TYPE_GROUNDSPEED and three == -1 and not any(parameters[3:])
     return False
 
 

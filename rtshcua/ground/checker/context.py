@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.data import DataFiles
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Argument, Scope, parameter_type
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.checker.values import whole_range
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import ZoneDecl

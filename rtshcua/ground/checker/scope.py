@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
-from rtshcua.ground.checker.dialect import DATUM
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import Symbols, correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, ZONE, Enumeration, Kind, Type, number
+from rtshcua.mavlink.dialect import DATUM
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl

@@ -11,7 +11,6 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.check import check_declarations
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.data import DataFiles
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.lookup import find_mission
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect
@@ -27,6 +26,7 @@ from rtshcua.ground.elaborate.settings import Settings
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.testing.case import Case, Tested
 from rtshcua.ground.testing.cases import cases_of
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl

@@ -4,9 +4,9 @@ from math import gcd
 
 from rtshcua.ground.checker.checks.signals import sentinel
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.dialect import UNITS
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Kind, Type
+from rtshcua.mavlink.quantise import UNITS
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.signals import SignalSource as SourceDecl

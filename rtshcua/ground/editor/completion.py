@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 from rtshcua.ground.checker.checks.contracts import CLASSES, RECORDS
 from rtshcua.ground.checker.checks.policies import SOURCES
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, parameter_type, signal_type
 from rtshcua.ground.checker.types import NAMED, Type
 from rtshcua.ground.editor.desk import Desk, View
@@ -15,6 +14,7 @@ from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.places import Asked, Call, Wanted, asked, before, call_of, wanted
 from rtshcua.ground.editor.syntax import Token, inside_comment_or_text
 from rtshcua.ground.editor.targets import Sort
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.skills import Parameter, SkillDecl
 from rtshcua.model.quantity import UNITS, Dimension
 

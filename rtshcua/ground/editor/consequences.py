@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.compiler.program import Compilation
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.moved import parts
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.ground.testing.case import Case
 from rtshcua.ground.testing.run import run_case
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.tests import Quoted

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.dialect import DATUM, Dialect
 from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.meanings import KEYWORDS, REASONS, TYPES
@@ -13,6 +12,7 @@ from rtshcua.ground.editor.quantities import told_number
 from rtshcua.ground.editor.sizes import size_of
 from rtshcua.ground.editor.syntax import note_before, path_to, token_at
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
+from rtshcua.mavlink.dialect import DATUM, Dialect
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl

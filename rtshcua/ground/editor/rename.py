@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.ground.checker.well_known import VELOCITY, WELL_KNOWN
 from rtshcua.ground.editor.consequences import Judged, Renamed, consequence, judged
@@ -17,6 +16,7 @@ from rtshcua.ground.editor.occurrences import at
 from rtshcua.ground.editor.quotations import quoted, unread
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.ground.language.table import table
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.signals import SignalDecl
 
 #: gives programs one after the other; between them a question may be taken back

@@ -1,9 +1,9 @@
 """The cases of a program: its tests, elaborated, lowered and prepared as real requests are."""
 
-from rtshcua.ground.checker.dialect import Dialect
 from rtshcua.ground.compiler.program import Compilation
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.testing.case import Suite
+from rtshcua.mavlink.dialect import Dialect
 
 
 def suite(program: Program, dialect: Dialect) -> Suite:

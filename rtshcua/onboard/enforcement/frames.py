@@ -12,19 +12,25 @@ in (`observe`), never asked of the adapter that wants to send. With a key, those
 from typing import Final, NamedTuple, Protocol
 
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
+from rtshcua.mavlink.modes import KNOWN
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frame_shape import GLOBAL_POSITION_INT, HEARTBEAT, Frame, read_frame
+from rtshcua.onboard.enforcement.frame_shape import Frame, read_frame
 from rtshcua.onboard.enforcement.housekeeping_frames import Housekeeping, housekeeping
-from rtshcua.onboard.enforcement.motion_frames import ARDUPILOT, PX4, carries_out, is_forced_arming, is_near, point_of
+from rtshcua.onboard.enforcement.motion_frames import carries_out, is_forced_arming, is_near, point_of
 from rtshcua.onboard.ports import Command
 
-#: MAV_COMP_ID_ONBOARD_COMPUTER: who we are, in the vehicle's own system; MAV_COMP_ID_AUTOPILOT1: whom we speak to
-OURS: Final = 191
-AUTOPILOT: Final = 1
+#: who we are, in the vehicle's own system, and whom we speak to
+OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
+AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
 #: mm: how far home's height above sea may be reported from where it lay when the takeoff was permitted: arming sets
 #: home anew, and it moves by what GPS heights drift. A report further off counts for nothing, for every height that is
 #: sent above sea would move with it.
 HOME_MOVES: Final = 10_000
+
+_KIND: Final = LAYOUTS[HEARTBEAT].at("autopilot")
+_position: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("lat lon alt relative_alt")
 
 # why a frame does not leave
 NOT_ONE_FRAME: Final = Refusal("frame/not-one-frame", "it is not exactly one whole, unsigned MAVLink 2 frame")
@@ -109,12 +115,13 @@ class FrameSession:
         if heard is None or heard.component != AUTOPILOT:
             return
         if heard.message == HEARTBEAT and not self._system:
-            autopilot = heard.fields[2]
-            if autopilot in (PX4, ARDUPILOT):
+            autopilot = heard.fields[_KIND]
+            if autopilot in KNOWN:
                 self._system, self._autopilot = heard.system, autopilot
         elif heard.message == GLOBAL_POSITION_INT and heard.system == self._system:
-            self._here = heard.fields[1], heard.fields[2]
-            home_amsl, settled = heard.fields[3] - heard.fields[4], self._settled_amsl  # mm: above sea, less above home
+            latitude, longitude, amsl, above_home = _position(heard.fields)
+            self._here = latitude, longitude
+            home_amsl, settled = amsl - above_home, self._settled_amsl  # mm
             if settled is None or abs(home_amsl - settled) <= HOME_MOVES:
                 self._home_amsl = home_amsl
 

@@ -9,17 +9,19 @@ from collections.abc import Callable
 from enum import Enum, auto
 from typing import Any, Final
 
-from rtshcua.onboard.enforcement import frame_shape as shape
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.onboard.enforcement.frame_shape import Frame
 
-_ONBOARD_CONTROLLER: Final = 18  # MAV_TYPE
-_NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT_INVALID
-_SET_MESSAGE_INTERVAL: Final = 511  # MAV_CMD
-_REQUEST_MESSAGE: Final = 512
-_RUN_PREARM_CHECKS: Final = 401  # says why it would not arm, and does nothing else
+_OWN_HEARTBEAT: Final = (enums.MAV_TYPE_ONBOARD_CONTROLLER, enums.MAV_AUTOPILOT_INVALID, 0)
 _POLYGONS_TOO: Final = tuple(bits for bits in range(16) if bits & 4)  # FENCE_TYPE is a set of bits
-_FENCE: Final = 1  # MAV_MISSION_TYPE
-_FENCE_ITEMS: Final = range(5_000, 5_005)  # MAV_CMD_NAV_FENCE_RETURN_POINT to _CIRCLE_EXCLUSION
+_FENCE_ITEMS: Final = range(enums.MAV_CMD_NAV_FENCE_RETURN_POINT, enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION + 1)
+
+_identity: Final = LAYOUTS[layouts.HEARTBEAT].getter("type autopilot base_mode")
+_command_number: Final = LAYOUTS[layouts.COMMAND_LONG].getter("command")
+_parameters: Final = LAYOUTS[layouts.COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7")
+_setting: Final = LAYOUTS[layouts.PARAM_SET].getter("param_id param_value")
+_item: Final = LAYOUTS[layouts.MISSION_ITEM_INT].getter("command current mission_type")
 
 
 class Housekeeping(Enum):
@@ -39,20 +41,20 @@ def _always(fields: _Fields) -> _When:
 
 def _heartbeat(fields: _Fields) -> _When:
     """Ours only: a ground station's would hide that the real one is gone (vehicles.md, 2)."""
-    _, type_, autopilot, base_mode, *_ = fields
-    own = (type_, autopilot, base_mode) == (_ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0)
-    return Housekeeping.ALWAYS if own else None
+    return Housekeeping.ALWAYS if _identity(fields) == _OWN_HEARTBEAT else None
 
 
 def _command(fields: _Fields) -> _When:
-    if fields[7] == _RUN_PREARM_CHECKS:
-        return Housekeeping.ALWAYS if not any(fields[:7]) else None
-    return Housekeeping.ALWAYS if fields[7] in (_SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE) else None
+    number = _command_number(fields)
+    if number == enums.MAV_CMD_RUN_PREARM_CHECKS:
+        return Housekeeping.ALWAYS if not any(_parameters(fields)) else None
+    asks = number in (enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE)
+    return Housekeeping.ALWAYS if asks else None
 
 
 def _parameter(fields: _Fields) -> _When:
     """FENCE_ENABLE on; FENCE_TYPE with polygons among what it heeds. Nothing else of the vehicle is set from here."""
-    value, _, _, name, _ = fields
+    name, value = _setting(fields)
     match name.rstrip(b"\0"):
         case b"FENCE_ENABLE":
             on = value == 1
@@ -63,33 +65,34 @@ def _parameter(fields: _Fields) -> _When:
     return Housekeeping.BEFORE_FLIGHT if on else None
 
 
-def _fence_by(field: int) -> Callable[[_Fields], _When]:
-    """Part of the upload of a fence, by the field that holds the MAV_MISSION_TYPE."""
-    return lambda fields: Housekeeping.BEFORE_FLIGHT if fields[field] == _FENCE else None
+def _of_fence(message: int) -> Callable[[_Fields], _When]:
+    """Part of the upload of a fence."""
+    kind = LAYOUTS[message].getter("mission_type")
+    return lambda fields: Housekeeping.BEFORE_FLIGHT if kind(fields) == enums.MAV_MISSION_TYPE_FENCE else None
 
 
 def _fence_item(fields: _Fields) -> _When:
     """Not `current`: 2 and 3 there are ArduPilot's way to say "go there now" and "climb to there now"."""
-    number, current, mission_type = fields[8], fields[12], fields[14]
-    stored = mission_type == _FENCE and current == 0
+    number, current, mission_type = _item(fields)
+    stored = mission_type == enums.MAV_MISSION_TYPE_FENCE and current == 0
     return Housekeeping.BEFORE_FLIGHT if stored and number in _FENCE_ITEMS else None
 
 
 _RULES: Final[dict[int, Callable[[_Fields], _When]]] = {
-    shape.HEARTBEAT: _heartbeat,
-    shape.PARAM_REQUEST_READ: _always,
-    shape.PARAM_REQUEST_LIST: _always,
-    shape.MISSION_REQUEST: _always,
-    shape.MISSION_REQUEST_LIST: _always,
-    shape.MISSION_REQUEST_INT: _always,
-    shape.MISSION_ACK: _always,
-    shape.TIMESYNC: _always,
-    shape.STATUSTEXT: _always,
-    shape.COMMAND_LONG: _command,
-    shape.PARAM_SET: _parameter,
-    shape.MISSION_COUNT: _fence_by(3),
-    shape.MISSION_CLEAR_ALL: _fence_by(2),
-    shape.MISSION_ITEM_INT: _fence_item,
+    layouts.HEARTBEAT: _heartbeat,
+    layouts.PARAM_REQUEST_READ: _always,
+    layouts.PARAM_REQUEST_LIST: _always,
+    layouts.MISSION_REQUEST: _always,
+    layouts.MISSION_REQUEST_LIST: _always,
+    layouts.MISSION_REQUEST_INT: _always,
+    layouts.MISSION_ACK: _always,
+    layouts.TIMESYNC: _always,
+    layouts.STATUSTEXT: _always,
+    layouts.COMMAND_LONG: _command,
+    layouts.PARAM_SET: _parameter,
+    layouts.MISSION_COUNT: _of_fence(layouts.MISSION_COUNT),
+    layouts.MISSION_CLEAR_ALL: _of_fence(layouts.MISSION_CLEAR_ALL),
+    layouts.MISSION_ITEM_INT: _fence_item,
 }
 
 

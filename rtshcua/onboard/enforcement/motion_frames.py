@@ -6,20 +6,17 @@ for what a 32-bit float rounds off, and for the height of home, which the autopi
 """
 
 from collections.abc import Mapping
-from enum import IntEnum
 from math import cos, hypot, isfinite, isnan, radians
 from types import MappingProxyType
 from typing import Any, Final
 
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import meridian
-from rtshcua.onboard.enforcement import frame_shape as shape
 from rtshcua.onboard.enforcement.frame_shape import Frame
 from rtshcua.onboard.ports import Command
-
-#: MAV_AUTOPILOT of the autopilots that there are rules for
-ARDUPILOT: Final = 3
-PX4: Final = 12
 
 #: mm: how far home's height above sea may have moved between the frame that told it and the one that uses it; in the
 #: recorded flight of PX4 it moves by 0.7 m
@@ -30,39 +27,31 @@ _ROUNDING: Final = 2  # mm, mm/s
 NEAR: Final = 5.0
 _METRES: Final = 0.011_131_9  # one 1e-7 degree of latitude
 
+#: command, frame of reference (heights above mean sea level) and flags of a DO_REPOSITION
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+_NOWHERE: Final = (enums.NO_PLACE, enums.NO_PLACE)
 
-class MavCmd(IntEnum):
-    """The commands that move a vehicle and that some manoeuvre is made of."""
-
-    NAV_TAKEOFF = 22
-    DO_SET_MODE = 176
-    DO_CHANGE_SPEED = 178
-    DO_REPOSITION = 192
-    COMPONENT_ARM_DISARM = 400
-
-
-_CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-_CHANGE_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
-_NOWHERE: Final = (1 << 31) - 1  # INT32_MAX, which PX4 takes for NaN where a place is asked for
-_GLOBAL: Final = 0  # MAV_FRAME: z is above mean sea level
-_GLOBAL_RELATIVE_ALT_INT: Final = 6  # z is above home
-_POSITION_ONLY: Final = 0x0DF8  # POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
+_places: Final = {
+    COMMAND_INT: LAYOUTS[COMMAND_INT].getter("x y"),
+    SET_POSITION_TARGET_GLOBAL_INT: LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter("lat_int lon_int"),
+}
+_armings: Final = {number: LAYOUTS[number].getter("command param2") for number in (COMMAND_LONG, COMMAND_INT)}
 
 #: parameters 2 and 3 of DO_SET_MODE that a kind of motion is made with
 _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = MappingProxyType(
     {
-        PX4: {  # main mode AUTO (4), sub-mode
-            MotionKind.CLIMB: (4, 3),  # it is armed in Hold
-            MotionKind.HOME: (4, 5),
-            MotionKind.LAND: (4, 6),
+        PX4: {
+            MotionKind.CLIMB: Px4Mode.HOLD.parameters,  # it is armed in Hold
+            MotionKind.HOME: Px4Mode.RETURN.parameters,
+            MotionKind.LAND: Px4Mode.LAND.parameters,
         },
         ARDUPILOT: {
-            MotionKind.CLIMB: (4, 0),  # GUIDED
-            MotionKind.FLY: (4, 0),
-            MotionKind.COVER: (4, 0),
-            MotionKind.HOLD: (17, 0),  # BRAKE
-            MotionKind.HOME: (6, 0),  # RTL
-            MotionKind.LAND: (9, 0),
+            MotionKind.CLIMB: CopterMode.GUIDED.parameters,
+            MotionKind.FLY: CopterMode.GUIDED.parameters,
+            MotionKind.COVER: CopterMode.GUIDED.parameters,
+            MotionKind.HOLD: CopterMode.BRAKE.parameters,
+            MotionKind.HOME: CopterMode.RTL.parameters,
+            MotionKind.LAND: CopterMode.LAND.parameters,
         },
     }
 )
@@ -74,9 +63,8 @@ def is_forced_arming(frame: Frame) -> bool:
 
     Any value but 0 counts, for what an autopilot makes of another one is its own affair.
     """
-    if frame.message not in (shape.COMMAND_LONG, shape.COMMAND_INT):
-        return False
-    return bool(frame.fields[7] == MavCmd.COMPONENT_ARM_DISARM and frame.fields[1] != 0)
+    number, force = _armings[frame.message](frame.fields) if frame.message in _armings else (0, 0)
+    return bool(number == enums.MAV_CMD_COMPONENT_ARM_DISARM and force != 0)
 
 
 def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int | None) -> bool:
@@ -85,26 +73,22 @@ def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int |
     `home_amsl` is how high home lies above mean sea level in mm, None where that is not known.
     """
     match frame.message:
-        case shape.COMMAND_LONG:
+        case layouts.COMMAND_LONG:
             return _long(frame.fields, command, autopilot, home_amsl)
-        case shape.COMMAND_INT if autopilot == PX4 and command.kind == MotionKind.HOLD:
+        case layouts.COMMAND_INT if autopilot == PX4 and command.kind == MotionKind.HOLD:
             return _stop(frame.fields)
-        case shape.COMMAND_INT:
+        case layouts.COMMAND_INT:
             return autopilot == PX4 and _reposition(frame.fields, command, home_amsl)
-        case shape.SET_POSITION_TARGET_GLOBAL_INT:
+        case layouts.SET_POSITION_TARGET_GLOBAL_INT:
             return autopilot == ARDUPILOT and _position_target(frame.fields, command)
     return False
 
 
 def point_of(frame: Frame) -> tuple[int, int] | None:
     """Where a frame that carries out a command sends the vehicle, in 1e-7 degree; None if it leaves it where it is."""
-    match frame.message:
-        case shape.COMMAND_INT:
-            point = frame.fields[4], frame.fields[5]
-            return None if point == (_NOWHERE, _NOWHERE) else point
-        case shape.SET_POSITION_TARGET_GLOBAL_INT:
-            return frame.fields[1], frame.fields[2]
-    return None
+    place = _places.get(frame.message)
+    point: tuple[int, int] | None = None if place is None else place(frame.fields)
+    return None if point == _NOWHERE else point
 
 
 def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
@@ -117,30 +101,34 @@ def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
 
 
 def _long(fields: tuple[Any, ...], command: Command, autopilot: int, home_amsl: int | None) -> bool:
-    one, two, three, four, five, six, seven, number = fields[:8]
+    one, two, three, four, five, six, seven, number = layouts.of_command_long(fields)
     match number:
-        case MavCmd.DO_SET_MODE:
+        case enums.MAV_CMD_DO_SET_MODE:
             mode = _MODES[autopilot].get(command.kind)
-            return (two, three) == mode and one == _CUSTOM_MODE and _zero(four, five, six, seven)
-        case MavCmd.COMPONENT_ARM_DISARM:
+            return (
+                (two, three) == mode
+                and one == enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+                and _zero(four, five, six, seven)
+            )
+        case enums.MAV_CMD_COMPONENT_ARM_DISARM:
             return command.kind == MotionKind.CLIMB and one == 1 and _zero(two, three, four, five, six, seven)
-        case MavCmd.NAV_TAKEOFF if command.kind == MotionKind.CLIMB:
+        case enums.MAV_CMD_NAV_TAKEOFF if command.kind == MotionKind.CLIMB:
             if autopilot == PX4:  # it climbs at a finite place, turned to a finite heading, to metres above sea
                 here = isnan(four) and isnan(five) and isnan(six)
                 pitch = isnan(one) or one == 0  # nothing to a multirotor
                 return here and pitch and _zero(two, three) and _is_above_sea(seven, command, home_amsl)
             return _zero(one, two, three, four, five, six) and _is(seven, command.altitude)
-        case MavCmd.DO_CHANGE_SPEED if command.kind in _TRAVELS:
-            ground_speed = one == 1 and three == -1  # SPEED_TYPE_GROUNDSPEED, throttle as it is
+        case enums.MAV_CMD_DO_CHANGE_SPEED if command.kind in _TRAVELS:
+            ground_speed = one == enums.SPEED_TYPE_GROUNDSPEED and three == -1  # throttle as it is
             return ground_speed and _is_speed(two, command) and _zero(four, five, six, seven)
     return False
 
 
 def _reposition(fields: tuple[Any, ...], command: Command, home_amsl: int | None) -> bool:
     """DO_REPOSITION: a circle's radius, or a heading of its own, would be another manoeuvre."""
-    speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+    speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     return (
-        (number, reference, flags) == (MavCmd.DO_REPOSITION, _GLOBAL, _CHANGE_MODE)
+        (number, reference, flags) == _REPOSITION
         and command.kind in _TRAVELS
         and radius == 0
         and isnan(yaw)
@@ -155,11 +143,11 @@ def _stop(fields: tuple[Any, ...]) -> bool:
 
     A finite one of them would make PX4 keep the target that it flies to.
     """
-    speed, flags, radius, yaw, x, y, z, number, _, _, reference, *_ = fields
+    speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     return (
-        (number, reference, flags) == (MavCmd.DO_REPOSITION, _GLOBAL, _CHANGE_MODE)
+        (number, reference, flags) == _REPOSITION
         and (speed, radius) == (-1, 0)
-        and (x, y) == (_NOWHERE, _NOWHERE)
+        and (x, y) == _NOWHERE
         and isnan(yaw)
         and isnan(z)
     )
@@ -167,9 +155,9 @@ def _stop(fields: tuple[Any, ...]) -> bool:
 
 def _position_target(fields: tuple[Any, ...], command: Command) -> bool:
     """SET_POSITION_TARGET_GLOBAL_INT; what the mask tells the autopilot to ignore may be anything."""
-    _, x, y, z, *_, mask, _, _, reference = fields
+    x, y, z, mask, reference = layouts.of_position_target(fields)
     return (
-        (mask, reference) == (_POSITION_ONLY, _GLOBAL_RELATIVE_ALT_INT)
+        (mask, reference) == (enums.POSITION_ONLY, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
         and command.kind in _TRAVELS
         and _is_point(x, y, command)
         and _is(z, command.altitude)

@@ -5,7 +5,7 @@ from math import isfinite, radians
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.ardupilot.modes import MODES
 from rtshcua.simulation.ardupilot.streams import GROUPS
 from rtshcua.simulation.autopilot import Autopilot, Handler
@@ -47,7 +47,7 @@ def _arm_disarm(a: Autopilot, command: Command) -> tuple[int, ...]:
         if vehicle.armed or forced or (a.ready and vehicle.mode in MODES.armable):
             vehicle.arm()
             return (ACCEPTED,)
-        for reason in a.flavour.arming(a) or (f"{MODES.names[vehicle.mode]} mode not armable",):
+        for reason in a.flavour.arming(a) or (f"{MODES.name(vehicle.mode)} mode not armable",):
             a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {reason}")
         return (FAILED,)
     if whole(command.p1) != 0:
@@ -133,7 +133,7 @@ def _enter_number(a: Autopilot, number: int) -> tuple[int, ...]:
         a.say(mavlink.MAV_SEVERITY_WARNING, f"No such mode {number}")
         return (FAILED,)
     if not a.can_enter(mode):
-        a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {MODES.names[mode]} failed: requires position")
+        a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {MODES.name(mode)} failed: requires position")
         return (FAILED,)
     a.vehicle.set_mode(mode)
     return (ACCEPTED,)

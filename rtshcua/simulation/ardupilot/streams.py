@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.ardupilot.targets import position_target
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.mission_telemetry import mission_current

@@ -5,7 +5,7 @@ from math import isfinite, nan
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
 from rtshcua.simulation.command_rules import (
@@ -41,7 +41,7 @@ def _arm_disarm(a: Autopilot, command: Command) -> tuple[int, ...]:
         if a.vehicle.armed or forced or (a.ready and a.vehicle.mode in MODES.armable):
             a.vehicle.arm()
             return (ACCEPTED,)
-        for reason in a.flavour.arming(a) or (f"mode {MODES.names[a.vehicle.mode]}",):
+        for reason in a.flavour.arming(a) or (f"mode {MODES.name(a.vehicle.mode)}",):
             a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arming denied: {reason}")
         return (TEMPORARILY_REJECTED,)
     if whole(command.p1) != 0:

@@ -1,6 +1,6 @@
 """How PX4 takes keys for signing (recent releases)."""
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.autopilot import Autopilot
 
 

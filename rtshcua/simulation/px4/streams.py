@@ -5,7 +5,7 @@ from math import nan
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.mission_telemetry import mission_current
 from rtshcua.simulation.px4.targets import position_target

@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Message
+from rtshcua.codec.frames import Message
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.modes import Mode
 

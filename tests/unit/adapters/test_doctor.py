@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.doctor.diagnosis import diagnose
 from rtshcua.adapters.doctor.examination import Examination
 from rtshcua.adapters.doctor.finding import Finding, Verdict
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession

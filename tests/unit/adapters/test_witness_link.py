@@ -15,10 +15,10 @@ from rtshcua.adapters.files.anchors import beside, read_anchors
 from rtshcua.adapters.files.witness import FileWitness, WitnessStore
 from rtshcua.adapters.witness_client import Anchor, Trouble, WitnessClient
 from rtshcua.adapters.witness_link import ANSWER, REQUEST, WitnessLink
+from rtshcua.codec.frames import Codec
+from rtshcua.codec.tunnel import answer_name, messages, name_of
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
 from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
-from rtshcua.mavlink.frames import Codec
-from rtshcua.mavlink.tunnel import answer_name, messages, name_of
 from rtshcua.wire.keys import SigningKey
 
 HOST = "127.0.0.1"

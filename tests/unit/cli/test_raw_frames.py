@@ -11,10 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from reference.forgery import edit, signed
 from reference.kept_frames import Entries, kept
 from rtshcua.cli import app
+from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.auditor.frames import OURS
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.frames import Codec
 from rtshcua.wire.keys import Duty
 from virtual import case
 from virtual.flight import Flight

@@ -16,8 +16,8 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.cli import app, launch
 from rtshcua.cli.meeting import unmet
 from rtshcua.cli.signing import Signing
+from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.mavlink.frames import Codec
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, State

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
+from rtshcua.codec.build_dialect import COMMAND, build_table, render
 from rtshcua.mavlink import dialect
-from rtshcua.mavlink.build_dialect import COMMAND, build_table, render
 from rtshcua.mavlink.dialect import Field
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.radio import SPAN_US, UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, State
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import signing, tlog
-from rtshcua.mavlink.frames import Codec
 from rtshcua.mavlink.framing import FLAG_SIGNED, checksum, unsigned, with_flags
 from rtshcua.mavlink.signing import EPOCH_US, MINUTE, MOST_STREAMS, SignedLink, State, stream_of, timestamp_of
 

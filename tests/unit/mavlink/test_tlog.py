@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.frames import Codec
 
 DATA = Path(__file__).parent / "data"
 

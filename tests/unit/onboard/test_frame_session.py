@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.frames import Codec
+from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frame_shape import LAYOUTS
 from rtshcua.onboard.enforcement.frames import (
     AFTER_START,
     FORCED_ARMING,
@@ -453,20 +453,6 @@ def same(got: tuple[Any, ...], meant: tuple[Any, ...]) -> bool:
         one == other or (one != one and other != other) or (isinstance(one, float) and abs(one - other) <= 2.002)
         for one, other in zip(got, meant, strict=True)
     )
-
-
-def test_layouts_are_the_dialects() -> None:
-    for number, layout in LAYOUTS.items():
-        kind = m.mavlink_map[number]
-        sizes = [layout.fields.size, kind.unpacker.size]
-        assert sizes[0] == sizes[1]
-        octets = Random(number).randbytes(sizes[0])
-        ours, theirs = layout.fields.unpack(octets), kind.unpacker.unpack(octets)
-        assert repr(ours) == repr(theirs), kind.msgname
-        names = kind.ordered_fieldnames
-        aimed = names.index("target_system") if "target_system" in names else -1
-        assert layout.target == aimed, kind.msgname
-        assert aimed < 0 or names[aimed + 1] == "target_component"
 
 
 def test_no_message_that_we_do_not_know_leaves() -> None:

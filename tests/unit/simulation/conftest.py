@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec, Received
+from rtshcua.codec.frames import Codec, Received
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.world import Simulation

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.face import _HANDLERS
 from rtshcua.simulation.world import Simulation

@@ -34,7 +34,7 @@ def test_all_modes_and_one_by_one(pilot: Pilots, flavour: str) -> None:
     assert {m.number_modes for m in modes} == {len(modes)}
     by_number = {m.custom_mode: m for m in modes}
     assert by_number[table.numbers[Mode.MISSION]].standard_mode == 6
-    assert by_number[table.numbers[Mode.RETURN]].mode_name == table.names[Mode.RETURN]
+    assert by_number[table.numbers[Mode.RETURN]].mode_name == table.name(Mode.RETURN)
     acks, modes = modes_asked(a, 2)
     assert (acks, [m.mode_index for m in modes]) == ([0], [2])
     refused = 2 if a.px4 else 4

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from recorded import difference
 from recorded.trace import SECOND, Heard, Trace
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation import faults
 from rtshcua.simulation.config import Boot, Kind, SimulationConfig
 from rtshcua.simulation.place import Home

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from recorded import difference
 from recorded.flight import LEAD_US, Flight
 from recorded.trace import SECOND, Heard, Trace
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation import faults
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.place import Home

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.plan import from_message
 from rtshcua.simulation.world import Simulation

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.simulation import faults
 from rtshcua.simulation.config import Boot, Kind, SimulationConfig
 from rtshcua.simulation.kinematics import MAX_FALL

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.dialect import DATUM, UNITS, Field, Message
 from rtshcua.ground.checker.fields import quantity, size
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.mavlink.dialect import DATUM, Field, Message
+from rtshcua.mavlink.quantise import UNITS
 from rtshcua.model.flat.limits import MAX_STALE
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SignalSource

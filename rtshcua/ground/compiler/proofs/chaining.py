@@ -14,15 +14,15 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.places import Place, from_home, from_where, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.mavlink.enums import MAV_LANDED_STATE_IN_AIR, MAV_LANDED_STATE_ON_GROUND
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.signal import ENUMERATION
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.quantity import Dimension, display
 
-#: where an autopilot reports whether it has landed, and what it then says (MAV_LANDED_STATE)
+#: where an autopilot reports whether it has landed
 LANDED = ("EXTENDED_SYS_STATE", "landed_state")
-ON_GROUND, IN_AIR = 1, 2
 
 _ALOFT = {MotionKind.FLY: "flies somewhere", MotionKind.COVER: "flies a survey", MotionKind.HOLD: "holds in the air"}
 
@@ -107,7 +107,7 @@ def _lacking(ground: Ground, invocation: PreparedInvocation, start: Place) -> Cl
     slots = list(at.slots)
     for signal in ground.prepared.policy.signals:
         if signal.kind == ENUMERATION and all((each.message, *each.fields) == LANDED for each in signal.sources):
-            slots[signal.slot] = point(IN_AIR if start.aloft else ON_GROUND)
+            slots[signal.slot] = point(MAV_LANDED_STATE_IN_AIR if start.aloft else MAV_LANDED_STATE_ON_GROUND)
     there = at.over(slots, None, 0)
     for clause, condition in (*invocation.require, *invocation.assume):
         if not condition(there) & TRUE and condition(ground.case(invocation).at) & TRUE:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import AirState, Failed, LinkBack, LinkLost, Noted, Readings, Ready, Succeeded, TakenOver
 from rtshcua.simulation.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss, LinkSilence, PilotMode

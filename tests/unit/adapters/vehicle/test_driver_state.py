@@ -5,11 +5,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.ardupilot import modes as ardupilot_modes
-from rtshcua.adapters.px4 import modes as px4_modes
 from rtshcua.adapters.vehicle.datum import NoDatum, amsl_m, home_amsl_mm, relative_m
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Ready, Said, TakenOver
@@ -185,10 +184,10 @@ def test_a_place_that_nobody_vouches_for_is_reported_as_unknown() -> None:
 
 
 @pytest.mark.parametrize(("autopilot", "flies", "other", "name"), [
-    (PX4, px4_modes.HOLD, px4_modes.LAND, "Land"),
-    (PX4, px4_modes.TAKEOFF, px4_modes.number(3), "Position"),
-    (ARDUPILOT, ardupilot_modes.GUIDED, ardupilot_modes.LAND, "LAND"),
-    (ARDUPILOT, ardupilot_modes.GUIDED, 99, "mode 99"),
+    (PX4, Px4Mode.HOLD, Px4Mode.LAND, "Land"),
+    (PX4, Px4Mode.TAKEOFF, Px4Mode.POSITION, "Position"),
+    (ARDUPILOT, CopterMode.GUIDED, CopterMode.LAND, "LAND"),
+    (ARDUPILOT, CopterMode.GUIDED, 99, "mode 99"),
 ])  # fmt: skip
 def test_a_mode_that_changes_in_the_air_is_taken_over_without_a_manoeuvre_of_ours(
     autopilot: int, flies: int, other: int, name: str
@@ -208,13 +207,13 @@ def test_a_mode_that_changes_in_the_air_is_taken_over_without_a_manoeuvre_of_our
 def test_the_end_of_a_takeoff_and_what_happens_on_the_ground_take_nothing_over() -> None:
     one = Bench()
     one.landed(1)
-    one.beat(px4_modes.LAND)
-    one.beat(px4_modes.TAKEOFF, armed=True)
+    one.beat(Px4Mode.LAND)
+    one.beat(Px4Mode.TAKEOFF, armed=True)
     one.landed(2)
-    one.beat(px4_modes.HOLD, armed=True)
+    one.beat(Px4Mode.HOLD, armed=True)
     assert one.taken() == []
     one.driver.release()
-    one.beat(px4_modes.LAND, armed=True)
+    one.beat(Px4Mode.LAND, armed=True)
     assert one.taken() == []
 
 

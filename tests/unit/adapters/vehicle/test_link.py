@@ -4,7 +4,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from hostile.target import KEY, UTC_US, Target, greeting
 from rtshcua.adapters.vehicle.link import Link
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, State

@@ -15,7 +15,7 @@ from rtshcua.adapters.vehicle.flavour import Flavour
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.parameters import Parameters
 from rtshcua.adapters.vehicle.preflight import Preflight
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, POLYGON, Zone
 from virtual.policy import POLICY, PROJECTION, VEHICLE

@@ -8,9 +8,7 @@ from typing import Any
 import pytest
 
 from recorded.trace import Heard, Question, Trace
-from rtshcua.adapters.ardupilot import modes as ardupilot_modes
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4 import modes as px4_modes
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle.commander import Commander
 from rtshcua.adapters.vehicle.estimator import Estimator
@@ -20,6 +18,7 @@ from rtshcua.adapters.vehicle.messages import FENCE
 from rtshcua.adapters.vehicle.observed import Observed
 from rtshcua.adapters.vehicle.texts import Texts
 from rtshcua.adapters.vehicle.upload import Step, Upload
+from rtshcua.mavlink.modes import CopterMode, Px4Mode
 
 ARM, TAKEOFF, MODE, REPOSITION, RETURN, LAND = 400, 22, 176, 192, 20, 21
 
@@ -93,11 +92,11 @@ def find(name: str, number: int, where: Callable[[Any], bool] = lambda m: True) 
 def test_px4_acknowledges_a_bogus_mode_as_it_does_a_good_one() -> None:
     (bogus,) = find("px4-commands", MODE, lambda m: m.param2 == 99)
     assert bogus.outcome == "accepted"
-    assert bogus.seen.mode == px4_modes.TAKEOFF, "only the heartbeat tells that nothing changed"
+    assert bogus.seen.mode == Px4Mode.TAKEOFF, "only the heartbeat tells that nothing changed"
     (sub,) = find("px4-commands", MODE, lambda m: m.param3 == 99)
     assert sub.outcome == "refused 1"
     good = find("px4-commands", MODE, lambda m: m.param3 == 3)
-    assert {(each.outcome, each.seen.mode) for each in good} == {("accepted", px4_modes.HOLD)}
+    assert {(each.outcome, each.seen.mode) for each in good} == {("accepted", Px4Mode.HOLD)}
 
 
 def test_what_was_never_answered_is_unknown() -> None:
@@ -108,7 +107,7 @@ def test_what_was_never_answered_is_unknown() -> None:
 
 def test_px4_accepts_a_takeoff_on_the_ground_disarmed_and_does_not_fly() -> None:
     first = find("px4-commands", TAKEOFF)[0]
-    assert (first.outcome, first.seen.mode, first.seen.armed) == ("accepted", px4_modes.TAKEOFF, False)
+    assert (first.outcome, first.seen.mode, first.seen.armed) == ("accepted", Px4Mode.TAKEOFF, False)
 
 
 def test_px4_wants_its_flag_with_a_reposition() -> None:
@@ -132,8 +131,8 @@ def test_arducopter_accepts_a_takeoff_in_loiter_and_stays_where_it_is() -> None:
 
 
 @pytest.mark.parametrize(("name", "number", "mode"), [
-    ("px4-commands", RETURN, px4_modes.RETURN), ("px4-commands", LAND, px4_modes.LAND),
-    ("arducopter-commands", RETURN, ardupilot_modes.RETURN), ("arducopter-commands", LAND, ardupilot_modes.LAND),
+    ("px4-commands", RETURN, Px4Mode.RETURN), ("px4-commands", LAND, Px4Mode.LAND),
+    ("arducopter-commands", RETURN, CopterMode.RTL), ("arducopter-commands", LAND, CopterMode.LAND),
 ])  # fmt: skip
 def test_returns_and_landings_show_in_the_heartbeat(name: str, number: int, mode: int) -> None:
     first = find(name, number)[0]

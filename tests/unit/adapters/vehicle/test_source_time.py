@@ -10,9 +10,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from reference.stamped_link import LinkKind, StampedVehicle
 from rtshcua.adapters.vehicle.source_time import GAP_US, SourceTime
 from rtshcua.adapters.vehicle.vehicle_clock import APART_US, DRIFT_US, EACH_US, STEP_US
+from rtshcua.codec.decode import kind_of
+from rtshcua.codec.frames import Received
 from rtshcua.mavlink import dialect
-from rtshcua.mavlink.decode import kind_of
-from rtshcua.mavlink.frames import Received
 
 S = 1_000_000
 UNIX_US = 1_767_225_600_000_000

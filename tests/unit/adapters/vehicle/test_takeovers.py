@@ -19,7 +19,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Failed, Ready, Succeeded, TakenOver
 from rtshcua.simulation.faults import Fault, LinkDelay, PilotGoto, PilotMode, PilotPause, PilotSticks

@@ -10,9 +10,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.vehicle.preflight import distance_from_home
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
+from rtshcua.codec.frames import Received
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.frames import Received
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.onboard.ports import Readings

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.announcer import EACH_US, KEPT, Announcer
 from rtshcua.adapters.vehicle.texts import BURST, CHUNK_US, LONGEST, Texts, quoted
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.onboard.ports import Said
 
 S = 1_000_000

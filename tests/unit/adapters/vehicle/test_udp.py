@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.udp import UdpVehicle
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession

@@ -8,11 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from reference.kept_frames import kept
-from rtshcua.ground.auditor.obeyed import ARDUPILOT, PX4, Home, Target, obeyed
+from rtshcua.ground.auditor.obeyed import Home, Target, obeyed
 from rtshcua.ground.auditor.sent import Frame, Nature, nature, read
+from rtshcua.mavlink.layouts import LAYOUTS
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frame_shape import LAYOUTS, read_frame
 from rtshcua.onboard.enforcement.frame_shape import Frame as Shape
+from rtshcua.onboard.enforcement.frame_shape import read_frame
 from rtshcua.onboard.enforcement.motion_frames import carries_out
 from rtshcua.onboard.ports import Command
 from virtual import case

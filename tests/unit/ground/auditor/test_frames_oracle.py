@@ -13,12 +13,12 @@ from reference.kept_frames import Entries, kept
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect, Genesis
 from rtshcua.ground.auditor.frames import OURS, Frames
-from rtshcua.ground.auditor.obeyed import ARDUPILOT, PX4
 from rtshcua.ground.auditor.sent import Nature, nature
 from rtshcua.ground.auditor.sent import read as read_frame
 from rtshcua.ground.auditor.trust import Basis, establish
+from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.frame_shape import GLOBAL_POSITION_INT
 from rtshcua.onboard.enforcement.frame_shape import read_frame as read_shape
 from rtshcua.onboard.enforcement.motion_frames import carries_out
 from rtshcua.onboard.ports import Command

@@ -2,13 +2,14 @@
 
 from binascii import crc_hqx
 from collections.abc import Container
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.mavlink.decode import Message as Message
-from rtshcua.mavlink.decode import decode, kind_of
+from rtshcua.codec.decode import Message as Message
+from rtshcua.codec.decode import decode, kind_of
 from rtshcua.mavlink.framing import CHECKSUM, FLAG_SIGNED, FLAGS, HEADER, MARKER, MIRROR, SIGNATURE, message_id
+from rtshcua.mavlink.signing import Verifier
 
 # pymavlink lets an environment variable switch the checksum off in its own decoder. Nobody here may use it so.
 ardupilotmega.MAVLINK_IGNORE_CRC = 0
@@ -29,14 +30,6 @@ class Received(NamedTuple):
 
 
 _received = tuple.__new__  # the constructor that a named tuple is given is a function more
-
-
-class Verifier(Protocol):
-    """Says whether a frame proves where it comes from; see `rtshcua.mavlink.signing`."""
-
-    def accept(self, frame: bytes, now_us: int) -> bool:
-        """Whether a frame with a right checksum may be taken in at a monotonic time."""
-        ...
 
 
 class Codec:

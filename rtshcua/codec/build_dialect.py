@@ -1,4 +1,4 @@
-"""Derives `dialect.json` from pymavlink: `python -m rtshcua.mavlink.build_dialect` writes it anew.
+"""Derives `dialect.json` from pymavlink: `python -m rtshcua.codec.build_dialect` writes it anew.
 
 A test compares the shipped table with a fresh one, so that a new pymavlink cannot change the dialect unseen.
 """
@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from rtshcua.mavlink.dialect import TABLE
 
-COMMAND = "python -m rtshcua.mavlink.build_dialect"
+COMMAND = "python -m rtshcua.codec.build_dialect"
 
 
 def build_table() -> dict[str, dict[str, Any]]:

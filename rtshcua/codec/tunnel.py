@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.mavlink.decode import Message
-from rtshcua.mavlink.frames import Received
+from rtshcua.codec.decode import Message
+from rtshcua.codec.frames import Received
 
 #: Ours. Numbers from 32768 on are nobody's, for use among parties that agree (MAV_TUNNEL_PAYLOAD_TYPE).
 PAYLOAD_TYPE: Final = 0xC05E

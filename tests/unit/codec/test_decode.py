@@ -5,8 +5,8 @@ from random import Random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.decode import decode, kind_of
-from rtshcua.mavlink.frames import Codec
+from rtshcua.codec.decode import decode, kind_of
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.framing import checksum
 
 NOT_MADE = ("_header", "_payload", "_msgbuf", "_crc")

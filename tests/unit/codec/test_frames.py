@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.frames import Codec
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "mavlink" / "data"
 
 
 def heartbeat(custom_mode: int = 0) -> object:

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.mavlink.frames import Codec, Received
-from rtshcua.mavlink.tunnel import (
+from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.tunnel import (
     CHUNK,
     LONGEST,
     MOST_OF_ONE,

@@ -1,0 +1,57 @@
+"""Numbers of the dialect that more than one part of this package means, under the dialect's own names.
+
+Commands, modes' flags, frames of reference, components (https://mavlink.io/en/messages/common.html). Whoever needs
+others, and may import pymavlink, has them there.
+"""
+
+from typing import Final
+
+MAV_TYPE_GCS: Final = 6
+MAV_TYPE_ONBOARD_CONTROLLER: Final = 18
+
+MAV_AUTOPILOT_ARDUPILOTMEGA: Final = 3
+MAV_AUTOPILOT_INVALID: Final = 8  # of a component that is none
+MAV_AUTOPILOT_PX4: Final = 12
+
+MAV_COMP_ID_AUTOPILOT1: Final = 1
+MAV_COMP_ID_ONBOARD_COMPUTER: Final = 191
+
+MAV_MODE_FLAG_CUSTOM_MODE_ENABLED: Final = 1
+MAV_MODE_FLAG_AUTO_ENABLED: Final = 4
+MAV_MODE_FLAG_GUIDED_ENABLED: Final = 8
+MAV_MODE_FLAG_STABILIZE_ENABLED: Final = 16
+MAV_MODE_FLAG_MANUAL_INPUT_ENABLED: Final = 64
+MAV_MODE_FLAG_SAFETY_ARMED: Final = 128
+
+MAV_LANDED_STATE_ON_GROUND: Final = 1
+MAV_LANDED_STATE_IN_AIR: Final = 2
+MAV_LANDED_STATE_TAKEOFF: Final = 3
+MAV_LANDED_STATE_LANDING: Final = 4
+
+MAV_FRAME_GLOBAL: Final = 0  # heights above mean sea level
+MAV_FRAME_GLOBAL_RELATIVE_ALT: Final = 3
+MAV_FRAME_GLOBAL_INT: Final = 5
+MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: Final = 6  # heights above home
+
+MAV_CMD_NAV_TAKEOFF: Final = 22
+MAV_CMD_DO_SET_MODE: Final = 176
+MAV_CMD_DO_CHANGE_SPEED: Final = 178
+MAV_CMD_DO_REPOSITION: Final = 192
+MAV_CMD_COMPONENT_ARM_DISARM: Final = 400
+MAV_CMD_RUN_PREARM_CHECKS: Final = 401  # says why it would not arm, and does nothing else
+MAV_CMD_SET_MESSAGE_INTERVAL: Final = 511
+MAV_CMD_REQUEST_MESSAGE: Final = 512
+MAV_CMD_NAV_FENCE_RETURN_POINT: Final = 5_000
+MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: Final = 5_001
+MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: Final = 5_002
+MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: Final = 5_003
+MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: Final = 5_004
+
+MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: Final = 1
+SPEED_TYPE_GROUNDSPEED: Final = 1
+MAV_MISSION_TYPE_FENCE: Final = 1
+
+#: POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
+POSITION_ONLY: Final = 0x0DF8
+#: INT32_MAX: in x and y of COMMAND_INT what NaN is in a float
+NO_PLACE: Final = (1 << 31) - 1

@@ -1,0 +1,97 @@
+"""How the payloads of messages are laid out that leave for a vehicle, and of those that tell the gate where it is.
+
+Fields stand by falling size, extensions behind them (https://mavlink.io/en/guide/serialization.html).
+"""
+
+from collections.abc import Callable
+from operator import itemgetter
+from struct import Struct
+from typing import Any, Final, NamedTuple
+
+from rtshcua.mavlink.framing import HEADER
+
+HEARTBEAT: Final = 0
+PARAM_REQUEST_READ: Final = 20
+PARAM_REQUEST_LIST: Final = 21
+PARAM_SET: Final = 23
+GLOBAL_POSITION_INT: Final = 33
+MISSION_REQUEST: Final = 40
+MISSION_REQUEST_LIST: Final = 43
+MISSION_COUNT: Final = 44
+MISSION_CLEAR_ALL: Final = 45
+MISSION_ACK: Final = 47
+MISSION_REQUEST_INT: Final = 51
+MISSION_ITEM_INT: Final = 73
+COMMAND_INT: Final = 75
+COMMAND_LONG: Final = 76
+SET_POSITION_TARGET_GLOBAL_INT: Final = 86
+TIMESYNC: Final = 111
+STATUSTEXT: Final = 253
+
+TEXT_OCTETS: Final = 50  # in one STATUSTEXT
+
+
+class Layout(NamedTuple):
+    """A message's fields, in the order of the wire.
+
+    `extra` is the octet that the frame's checksum takes in behind the payload, a digest of all this.
+    """
+
+    extra: int
+    fields: Struct
+    names: tuple[str, ...]
+
+    def at(self, name: str) -> int:
+        """Where a field stands among the fields; -1 if the message has none of this name."""
+        return self.names.index(name) if name in self.names else -1
+
+    def getter(self, names: str) -> Callable[[tuple[Any, ...]], Any]:
+        """What takes these out of the fields: one as it is, several as a tuple."""
+        return itemgetter(*map(self.names.index, names.split()))
+
+    def read(self, frame: bytes) -> tuple[Any, ...]:
+        """The fields of a whole frame whose payload is no longer than the layout."""
+        length, fields = frame[1], self.fields
+        if length == fields.size:
+            return fields.unpack_from(frame, HEADER)
+        return fields.unpack(frame[HEADER : HEADER + length].ljust(fields.size, b"\0"))  # zeros at the end are not sent
+
+
+def _layout(extra: int, fields: str, names: str) -> Layout:
+    return Layout(extra, Struct(fields), tuple(names.split()))
+
+
+_TARGET: Final = "target_system target_component"
+_PARAMETERS: Final = "param1 param2 param3 param4"
+
+LAYOUTS: Final = {
+    HEARTBEAT: _layout(50, "<IBBBBB", "custom_mode type autopilot base_mode system_status mavlink_version"),
+    PARAM_REQUEST_READ: _layout(214, "<hBB16s", f"param_index {_TARGET} param_id"),
+    PARAM_REQUEST_LIST: _layout(159, "<BB", _TARGET),
+    PARAM_SET: _layout(168, "<fBB16sB", f"param_value {_TARGET} param_id param_type"),
+    GLOBAL_POSITION_INT: _layout(104, "<IiiiihhhH", "time_boot_ms lat lon alt relative_alt vx vy vz hdg"),
+    MISSION_REQUEST: _layout(230, "<HBBB", f"seq {_TARGET} mission_type"),
+    MISSION_REQUEST_LIST: _layout(132, "<BBB", f"{_TARGET} mission_type"),
+    MISSION_COUNT: _layout(221, "<HBBB", f"count {_TARGET} mission_type"),
+    MISSION_CLEAR_ALL: _layout(232, "<BBB", f"{_TARGET} mission_type"),
+    MISSION_ACK: _layout(153, "<BBBB", f"{_TARGET} type mission_type"),
+    MISSION_REQUEST_INT: _layout(196, "<HBBB", f"seq {_TARGET} mission_type"),
+    MISSION_ITEM_INT: _layout(
+        38, "<4f2ifHHBBBBBB", f"{_PARAMETERS} x y z seq command {_TARGET} frame current autocontinue mission_type"
+    ),
+    COMMAND_INT: _layout(158, "<4f2ifHBBBBB", f"{_PARAMETERS} x y z command {_TARGET} frame current autocontinue"),
+    COMMAND_LONG: _layout(152, "<7fHBBB", f"{_PARAMETERS} param5 param6 param7 command {_TARGET} confirmation"),
+    SET_POSITION_TARGET_GLOBAL_INT: _layout(
+        5, "<I2i9fHBBB",
+        f"time_boot_ms lat_int lon_int alt vx vy vz afx afy afz yaw yaw_rate type_mask {_TARGET} coordinate_frame",
+    ),
+    TIMESYNC: _layout(34, "<qq", "tc1 ts1"),
+    STATUSTEXT: _layout(83, f"<B{TEXT_OCTETS}sHB", "severity text id chunk_seq"),
+}  # fmt: skip
+
+#: what is read of the commands: the numbers that an autopilot acts on
+of_command_long: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
+of_command_int: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
+of_position_target: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter(
+    "lat_int lon_int alt type_mask coordinate_frame"
+)

@@ -1,0 +1,71 @@
+"""The autopilots that are known, and their flight modes: `custom_mode` of HEARTBEAT, and how DO_SET_MODE says it."""
+
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Final
+
+from rtshcua.mavlink import enums
+
+PX4: Final = enums.MAV_AUTOPILOT_PX4
+ARDUPILOT: Final = enums.MAV_AUTOPILOT_ARDUPILOTMEGA
+KNOWN: Final = (PX4, ARDUPILOT)
+
+
+class Px4Mode(IntEnum):
+    """PX4's (`px4_custom_mode.h`), named as it tells them to people: `main << 16 | sub << 24`."""
+
+    MANUAL = 1 << 16
+    ALTITUDE = 2 << 16
+    POSITION = 3 << 16
+    ORBIT = 3 << 16 | 1 << 24
+    TAKEOFF = 4 << 16 | 2 << 24
+    HOLD = 4 << 16 | 3 << 24
+    MISSION = 4 << 16 | 4 << 24
+    RETURN = 4 << 16 | 5 << 24
+    LAND = 4 << 16 | 6 << 24
+    FOLLOW = 4 << 16 | 8 << 24
+    PRECISION_LAND = 4 << 16 | 9 << 24
+    ACRO = 5 << 16
+    OFFBOARD = 6 << 16
+    STABILIZED = 7 << 16
+
+    @property
+    def parameters(self) -> tuple[int, int]:
+        """Parameters 2 and 3 of DO_SET_MODE: main mode and sub-mode."""
+        return self >> 16 & 0xFF, self >> 24
+
+
+class CopterMode(IntEnum):
+    """ArduCopter's (`mode.h`, COPTER_MODE of the dialect)."""
+
+    STABILIZE = 0
+    ACRO = 1
+    ALT_HOLD = 2
+    AUTO = 3
+    GUIDED = 4
+    LOITER = 5
+    RTL = 6
+    CIRCLE = 7
+    LAND = 9
+    DRIFT = 11
+    SPORT = 13
+    FLIP = 14
+    AUTOTUNE = 15
+    POSHOLD = 16
+    BRAKE = 17
+    THROW = 18
+    AVOID_ADSB = 19
+    GUIDED_NOGPS = 20
+    SMART_RTL = 21
+    FOLLOW = 23
+    AUTO_RTL = 27
+
+    @property
+    def parameters(self) -> tuple[int, int]:
+        """Parameters 2 and 3 of DO_SET_MODE: the number, and nothing."""
+        return self.value, 0
+
+
+#: what the autopilots call them
+PX4_NAMES: Final[Mapping[int, str]] = {mode: mode.name.replace("_", " ").title() for mode in Px4Mode}
+COPTER_NAMES: Final[Mapping[int, str]] = {mode: mode.name for mode in CopterMode}

@@ -1,0 +1,89 @@
+"""Every layout, number and mode that is shared says what pymavlink's dialect says."""
+
+from random import Random
+from types import ModuleType
+
+import pytest
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.layouts import LAYOUTS, Layout
+from rtshcua.mavlink.modes import COPTER_NAMES, PX4_NAMES, CopterMode, Px4Mode
+
+
+def numbers(of: ModuleType) -> dict[str, int]:
+    return {name: value for name, value in vars(of).items() if name.isupper() and isinstance(value, int)}
+
+
+MESSAGES = {name: value for name, value in numbers(layouts).items() if name not in {"HEADER", "TEXT_OCTETS"}}
+OWN_WORDS = {"POSITION_ONLY", "NO_PLACE"}
+IGNORED = ("VX", "VY", "VZ", "AX", "AY", "AZ", "YAW", "YAW_RATE")
+
+
+def test_messages_have_the_dialects_numbers() -> None:
+    theirs = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in MESSAGES}
+    assert theirs == MESSAGES
+    assert sorted(theirs.values()) == sorted(LAYOUTS)
+
+
+@pytest.mark.parametrize(("number", "layout"), LAYOUTS.items(), ids=MESSAGES)
+def test_layouts_are_the_dialects(number: int, layout: Layout) -> None:
+    kind = dialect.mavlink_map[number]
+    assert layout.names == tuple(kind.ordered_fieldnames)
+    assert layout.extra == kind.crc_extra
+    assert layout.fields.size == kind.unpacker.size
+    octets = Random(number).randbytes(layout.fields.size)
+    for at in range(layout.fields.size):  # a turned octet shows in the same field: types and offsets are the same
+        turned = octets[:at] + bytes([octets[at] ^ 0xFF]) + octets[at + 1 :]
+        assert repr(layout.fields.unpack(turned)) == repr(kind.unpacker.unpack(turned))
+
+
+@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=MESSAGES)
+def test_a_target_is_a_system_and_behind_it_a_component(layout: Layout) -> None:
+    system, component = layout.at("target_system"), layout.at("target_component")
+    assert component == (system + 1 if system >= 0 else -1)
+
+
+def test_fields_are_taken_by_name_and_zeros_at_the_end_need_not_be_there() -> None:
+    layout = LAYOUTS[layouts.MISSION_COUNT]
+    frame = bytes([0xFD, 3, *bytes(8)]) + b"\x02\x01\x07" + b"\0\0"
+    assert layout.read(frame) == (0x102, 7, 0, 0)
+    assert layout.getter("target_system count")(layout.read(frame)) == (7, 0x102)
+    assert layout.getter("count")(layout.read(frame)) == 0x102
+
+
+@pytest.mark.parametrize(("name", "value"), numbers(enums).items(), ids=numbers(enums))
+def test_numbers_are_the_dialects(name: str, value: int) -> None:
+    if name not in OWN_WORDS:
+        assert value == getattr(dialect, name)
+
+
+def test_a_position_alone_ignores_everything_else_that_the_mask_has_a_bit_for() -> None:
+    assert sum(getattr(dialect, f"POSITION_TARGET_TYPEMASK_{each}_IGNORE") for each in IGNORED) == enums.POSITION_ONLY
+    assert enums.NO_PLACE == 2**31 - 1
+
+
+def test_arducopters_modes_are_the_dialects() -> None:
+    theirs = {mode.name: getattr(dialect, f"COPTER_MODE_{mode.name}") for mode in CopterMode}
+    assert theirs == dict(CopterMode.__members__)
+    assert {mode: mavutil.mode_mapping_acm[mode] for mode in CopterMode} == COPTER_NAMES
+    assert all(mode.parameters == (mode, 0) for mode in CopterMode)
+
+
+#: pymavlink's name of a mode and, where it is another, PX4's own; it has none of ORBIT and PRECISION_LAND
+PX4_NAMED = {"ALTCTL": "ALTITUDE", "POSCTL": "POSITION", "LOITER": "HOLD", "RTL": "RETURN", "FOLLOWME": "FOLLOW"}
+NOT_OURS = {"RATTITUDE", "RTGS"}
+
+
+def test_px4s_modes_are_those_that_pymavlink_knows() -> None:
+    theirs = {
+        PX4_NAMED.get(name, name): (main, sub)
+        for name, (_, main, sub) in mavutil.px4_map.items()
+        if name not in NOT_OURS
+    }
+    ours = {mode.name: mode.parameters for mode in Px4Mode}
+    assert ours == {**theirs, "ORBIT": (3, 1), "PRECISION_LAND": (4, 9)}
+    assert all(mode == main << 16 | sub << 24 for mode in Px4Mode for main, sub in [mode.parameters])
+    assert PX4_NAMES[Px4Mode.PRECISION_LAND] == "Precision Land"
+    assert PX4_NAMES[Px4Mode.HOLD] == "Hold"

@@ -16,6 +16,9 @@ from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home
 
 Make = Callable[..., Any]
+#: where nothing depends on the autopilot, `make test` tries one of them
+ONE_FLAVOUR = pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
+OTHER_FLAVOUR = pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.soak)])
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 
 
@@ -139,6 +142,7 @@ def test_lost_commands_are_sent_again(flyer: Make, flavour: str, command: int) -
     assert confirmations in ([], [0, 1])
 
 
+@ONE_FLAVOUR
 def test_flies_on_a_poor_and_slow_link(flyer: Make) -> None:
     one = flyer(faults=(LinkLoss(0, 2_000), LinkDelay(0, 300_000)), seed=5)
     one.up()
@@ -167,6 +171,7 @@ def test_a_command_that_is_never_answered_while_questions_are_has_failed(flyer: 
     assert (type(end), end.reason) == (Failed, "unknown/no-answer")
 
 
+@ONE_FLAVOUR
 def test_a_hurried_vehicle_is_given_more_time(flyer: Make) -> None:
     waits = []
     for slack in (1, 4):
@@ -189,6 +194,7 @@ def test_stopping_short_is_a_failure(aloft: Make, monkeypatch: pytest.MonkeyPatc
     assert one.until(Failed, 40).reason == "stopped-short"
 
 
+@OTHER_FLAVOUR
 def test_garbage_and_foreign_systems_change_nothing(flyer: Make) -> None:
     chance = Random(3)
     stranger = Codec(9, 1)

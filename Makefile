@@ -1,7 +1,7 @@
 # Everything runs in .venv, which any target that needs it makes first: Python 3.11 or later and make are enough.
-#   make PYTHON=/path/to/python3.12 ...   choose the Python        make JOBS=8 test   test processes (3)
+#   make PYTHON=/path/to/python3.12 ...   choose the Python        make JOBS=8 test   test processes (4)
 
-JOBS ?= 3
+JOBS ?= 4
 BIN := .venv/bin
 
 export PYTHON
@@ -9,7 +9,7 @@ unexport PYTHONHOME PYTHONPATH
 MAKEFLAGS += --no-print-directory
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint soak fuzz mutate bench clean
+.PHONY: help setup demo test clients lint soak fuzz mutate bench clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -20,8 +20,11 @@ setup: ## make .venv, or bring it up to date
 demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, verify its log
 	@.make/demo
 
-test: setup ## run every test, on the checkout and on the wheel; decision, wire and evidence covered in full
+test: setup ## run the tests; decision, wire and evidence covered in full
 	$(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cov --cov-report term
+
+clients: setup ## run the tests with programs that others made, and of the wheel; as root, install what is missing
+	@.make/clients
 
 lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/ruff check

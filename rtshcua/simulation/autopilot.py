@@ -155,7 +155,7 @@ class Autopilot:
         self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value)
         self.mission = Mission(flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self)
         self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
-        self.plans.listeners.append(lambda kind: flavour.on_plan(self, kind))
+        self.plans.listeners.append(partial(flavour.on_plan, self))
         self._mode_in_breach = self.vehicle.mode
         self._told_mode = self.vehicle.mode
         self._remind_us = _REMIND_US

@@ -20,7 +20,7 @@ ALLOWED = {
     "ground/handbook/page.py": "reads the templates that ship",
     "ground/language/generate.py": "a developer's tool: from the grammar to its table",
     "ground/language/table.py": "reads the table that ships",
-    "mavlink/build_dialect.py": "a developer's tool: from pymavlink to the table",
+    "codec/build_dialect.py": "a developer's tool: from pymavlink to the table",
     "mavlink/dialect.py": "reads the table that ships",
     "simulation/options.py": "the simulated vehicle's own key, and no sibling is imported from there",
 }

@@ -8,7 +8,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,16 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.wire.keys import Duty
 from virtual import case
 
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
+#: Faster, and what must leave within 1.5 s of flight must leave within less than a busy machine may hold a process up.
+SPEED = 5
 COMMAND = [sys.executable, "-m", "rtshcua.cli.app"]
 
 
 class Run:
     """One `rtshcua run --json`, or another command that says what happens in JSON lines, under way in `folder`."""
 
-    def __init__(self, folder: Path, words: Sequence[str]) -> None:
+    def __init__(self, folder: Path, command: Sequence[str], environment: Mapping[str, str]) -> None:
         self.cwd = folder
         self.until_s = time.monotonic() + PATIENCE_S
         self.events: list[dict[str, Any]] = []
@@ -35,8 +38,9 @@ class Run:
         self.stderr = ""
         self._rest = b""
         self.process = subprocess.Popen(
-            [*COMMAND, *words], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
+            command, cwd=folder, env=environment,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
 
     def until(self, event: str, **fields: Any) -> dict[str, Any]:
         """Wait for an event with these fields."""
@@ -103,13 +107,16 @@ class Run:
 class Ground:
     """A user's machine: keys, bundles, and what was started on it."""
 
-    def __init__(self, folder: Path, data: Path) -> None:
+    def __init__(self, folder: Path, data: Path, **witnesses: int) -> None:
         self.folder = folder
+        self.environment = os.environ | {"RTSHCUA_DATA_DIR": str(data), "TZ": "UTC"}
         self.store = KeyStore(data)
         now_us = time.time_ns() // 1_000
         self.store.create(
-            lambda: os.urandom(32), development=True, passphrase=None, now_us=now_us, expires_us=now_us + case.YEAR_US
-        )
+            lambda: os.urandom(32), development=True, passphrase=None, now_us=now_us, expires_us=now_us + case.YEAR_US,
+            **witnesses,
+        )  # fmt: skip
+        self.command, self.speed = COMMAND, SPEED
         self.started: list[Run] = []
 
     def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight") -> str:
@@ -120,29 +127,51 @@ class Ground:
         return f"{name}.bundle"
 
     def start(self, *words: str) -> Run:
-        self.started.append(Run(self.folder, words))
+        self.started.append(Run(self.folder, [*self.command, *words], self.environment))
         return self.started[-1]
 
-    def run(self, bundle: str, *words: str, speed: int = 20) -> Run:
-        """`rtshcua run`, at a speed at which a busy machine still keeps up."""
+    def run(self, bundle: str, *words: str, speed: int = SPEED) -> Run:
         return self.start("run", bundle, "--json", "--speed", str(speed), *words)
 
 
-@pytest.fixture
-def ground(tmp_path: Path, own_world: None) -> Iterator[Ground]:
-    made = Ground(tmp_path, Path(os.environ["RTSHCUA_DATA_DIR"]))
-    yield made
-    for run in made.started:
-        if run.process.poll() is None:
-            run.process.kill()
-        run.process.communicate()
-    for log in tmp_path.glob("runs/*/log.jsonl"):  # whatever became of it: two verifiers say the same of it
+@contextmanager
+def a_ground(folder: Path, data: Path, **witnesses: int) -> Iterator[Ground]:
+    made = Ground(folder, data, **witnesses)
+    try:
+        yield made
+    finally:
+        for run in made.started:
+            if run.process.poll() is None:
+                run.process.kill()
+            run.process.communicate()
+    for log in folder.glob("runs/*/log.jsonl"):  # whatever became of it: two verifiers say the same of it
         agree(log.read_bytes(), careful(log.read_bytes(), made.store.pin()), made.store.pin())
 
 
 @pytest.fixture
-def port() -> int:
+def ground(tmp_path: Path, own_world: None) -> Iterator[Ground]:
+    with a_ground(tmp_path, Path(os.environ["RTSHCUA_DATA_DIR"])) as made:
+        yield made
+
+
+@pytest.fixture(scope="session")
+def grounds() -> Callable[..., AbstractContextManager[Ground]]:
+    """Makes what outlives a test, so that several look at one flight: folder, data folder, numbers of witnesses."""
+    return a_ground
+
+
+@pytest.fixture(scope="session")
+def free_port() -> Callable[[], int]:
     """A UDP port that nobody has now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+
+    def found() -> int:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            return int(probe.getsockname()[1])
+
+    return found
+
+
+@pytest.fixture
+def port(free_port: Callable[[], int]) -> int:
+    return free_port()

@@ -18,6 +18,7 @@ import pytest
 from rtshcua.adapters.simulator import Simulator
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is installed on Linux only")
+pytestmark = pytest.mark.clients
 
 SPEED = 15
 PATIENCE_S = 90.0

@@ -13,6 +13,7 @@ import pytest
 from rtshcua.adapters.simulator import Simulator
 
 pytest.importorskip("mavsdk_grpc.bin", reason="MAVSDK has no server for this platform")
+pytestmark = pytest.mark.clients
 
 FLIGHT = Path(__file__).with_name("mavsdk_flight.py")
 SPEED = 15

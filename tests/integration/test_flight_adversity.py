@@ -20,7 +20,7 @@ def closed(run: Any, ending: str) -> None:
     assert run.summary["whole"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.soak), signal.SIGTERM])
 def test_a_stop_falls_back_first(ground: Any, number: signal.Signals) -> None:
     run = ground.run(ground.bundle())
     run.until("dispatched", step=1)
@@ -61,6 +61,7 @@ def test_a_pilot_takes_over(ground: Any) -> None:
     assert "taken-over" in run.effects()
 
 
+@pytest.mark.soak
 def test_a_low_battery_turns_it_home(ground: Any) -> None:
     run = ground.run(ground.bundle(), "--fault", "battery,at=12s,level=20%").end()
     assert run.code == 6
@@ -76,6 +77,7 @@ def test_a_low_battery_on_the_ground_is_refused(ground: Any) -> None:
     assert run.dispatched() == []
 
 
+@pytest.mark.soak
 def test_a_vehicle_that_goes_silent(ground: Any) -> None:
     """It may come back as long as it can fly; who asks for the end waits for half a minute."""
     run = ground.run(ground.bundle(), "--fault", "link-silence,at=12s")
@@ -161,36 +163,11 @@ class Relay(threading.Thread):
 def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
     relay = Relay(port)
     relay.start()
-    ground.start("sim", "--port", str(relay.port), "--speed", "5", "--json").until("ready")
+    vehicle = ground.start("sim", "--port", str(relay.port), "--speed", str(ground.speed), "--json")
+    vehicle.until("ready", flavour="px4", peer=relay.port)
     run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY).end()
     assert run.code == 0, run.stderr
     closed(run, "completed")
     assert relay.added > 1_000
-
-
-def test_a_run_that_was_killed_in_the_air_comes_down_and_does_not_resume(ground: Any, port: int) -> None:
-    ground.start("sim", "--port", str(port), "--speed", "20", "--json").until("ready")
-    bundle = ground.bundle()
-    words = ("--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
-    first = ground.run(bundle, *words)
-    first.until("dispatched", step=1)
-    first.process.kill()
-    second = ground.run(bundle, *words, "--runs", "later").end()
-    assert second.code == 6, second.stderr
-    assert not [event for event in second.events if event["event"] == "dispatched" and event.get("step", -1) >= 0]
-    assert second.until("resumed")
-    third = ground.run(bundle, *words).end()
-    assert third.code == 5
-
-
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_sim_serves_a_run_and_ends_cleanly(ground: Any, port: int, flavour: str) -> None:
-    vehicle = ground.start(
-        "sim", "--connect", f"udpout:127.0.0.1:{port}", "--flavour", flavour, "--speed", "20", "--json"
-    )
-    ready = vehicle.until("ready")
-    assert (ready["flavour"], ready["peer"]) == (flavour, port)
-    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY).end()
-    assert run.code == 0, run.stderr
     vehicle.signal(signal.SIGINT)
     assert vehicle.end().code == 0

@@ -8,6 +8,7 @@ import errno
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -88,13 +89,18 @@ def verified(flown: Flown) -> None:
     assert flown.audit().report.verdict is Verdict.VERIFIED, flown.audit().report.failure
 
 
-FAULTS: list[tuple[Fault, str]] = [
-    *((refuses(number), case_) for case_, number in REFUSED.items()),
-    (fills, "full within a line"),
-]
+FAULTS = {**{name: refuses(number) for name, number in REFUSED.items()}, "full within a line": fills}
 
 
-@pytest.mark.parametrize("fault", [fault for fault, _ in FAULTS], ids=[name for _, name in FAULTS])
+def faults(tried: str) -> list[Any]:
+    """All of them: a disk that refuses for this reason, and one that fills up; the other reasons are for soak."""
+    sample = (tried, "full within a line")
+    return [
+        pytest.param(fault, id=name, marks=() if name in sample else pytest.mark.soak) for name, fault in FAULTS.items()
+    ]
+
+
+@pytest.mark.parametrize("fault", faults("full"))
 def test_a_disk_that_refuses_ends_the_mission_where_the_policy_lands(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, LAND)
     flown = run.fly(fault, 18, 40)
@@ -106,7 +112,7 @@ def test_a_disk_that_refuses_ends_the_mission_where_the_policy_lands(fault: Faul
     verified(flown)
 
 
-@pytest.mark.parametrize("fault", [fault for fault, _ in FAULTS], ids=[name for _, name in FAULTS])
+@pytest.mark.parametrize("fault", faults("defect"))
 def test_what_runs_may_finish_where_the_policy_refuses_and_then_the_contingency_flies(
     fault: Fault, tmp_path: Path
 ) -> None:
@@ -121,7 +127,7 @@ def test_what_runs_may_finish_where_the_policy_refuses_and_then_the_contingency_
     verified(flown)
 
 
-@pytest.mark.parametrize("fault", [fault for fault, _ in FAULTS], ids=[name for _, name in FAULTS])
+@pytest.mark.parametrize("fault", faults("read-only"))
 def test_a_mission_goes_on_once_everything_is_recorded_again(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, REFUSE)
     flown = run.fly(fault, 18, 28)

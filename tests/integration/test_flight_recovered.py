@@ -1,4 +1,4 @@
-"""A flight whose process is killed: the next run ends its log, names it, and goes on."""
+"""A run that is killed in the air: the next one comes down and ends its log, and those after it go on from there."""
 
 import json
 import signal
@@ -7,37 +7,54 @@ from typing import Any
 
 from rtshcua.evidence.merkle import leaf_hash
 
+BROKEN_OFF = b'{"_prev":"'
+
+
+def lines(folder: Path) -> list[bytes]:
+    return (folder / "log.jsonl").read_bytes().splitlines(keepends=True)
+
 
 def records(folder: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (folder / "log.jsonl").read_bytes().splitlines()]
+    return [json.loads(line) for line in lines(folder)]
 
 
-def test_the_log_of_a_flight_that_was_killed_is_ended_by_the_next(ground: Any) -> None:
-    first = ground.run(ground.bundle())
-    first.until("dispatched")
+def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the_next(ground: Any, port: int) -> None:
+    def runs() -> set[Path]:
+        return set((ground.folder / "runs").iterdir())
+
+    ground.start("sim", "--port", str(port), "--speed", str(ground.speed), "--json").until("ready")
+    bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
+    first = ground.run(bundle, *words)
+    first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)
     assert first.process.wait() == -signal.SIGKILL
-    killed = first.folder
+    (killed,) = runs()
     with (killed / "log.jsonl").open("ab") as log:
-        log.write(b'{"_prev":"')
-    before = (killed / "log.jsonl").read_bytes().splitlines(keepends=True)[:-1]
-    second = ground.run(ground.bundle(name="second")).end()
-    assert second.code == 0, second.stderr
-    log = (killed / "log.jsonl").read_bytes().splitlines(keepends=True)
-    assert log[:-2] == before
-    assert [json.loads(line)["type"] for line in log[-2:]] == ["recover", "close"]
-    assert json.loads(log[-2])["discarded_bytes"] == len(b'{"_prev":"')
-    (other,) = [entry for entry in (ground.folder / "runs").iterdir() if entry != killed]
-    assert records(other)[0]["before"] == leaf_hash(log[-1]).hex()
-    assert [record["event"] for record in records(other)[1:3]] == ["simulated", "log-before"]
-    assert f"{len(before)} records of it are kept" in records(other)[2]["detail"]
+        log.write(BROKEN_OFF)
+    before = lines(killed)[:-1]
+
+    second = ground.run(bundle, *words).end()
+    assert second.code == 6, second.stderr
+    assert not [event for event in second.events if event["event"] == "dispatched" and event.get("step", -1) >= 0]
+    assert [event for event in second.events if event["event"] == "resumed"]
+    ended = lines(killed)
+    assert ended[:-2] == before
+    assert [json.loads(line)["type"] for line in ended[-2:]] == ["recover", "close"]
+    assert json.loads(ended[-2])["discarded_bytes"] == len(BROKEN_OFF)
+    (other,) = runs() - {killed}
+    assert records(other)[0]["before"] == leaf_hash(ended[-1]).hex()
+    (noted,) = [record for record in records(other) if record.get("event") == "log-before"]
+    assert f"{len(before)} records of it are kept" in noted["detail"]
     for folder in (killed, other):
         verified = ground.start("verify-log", str(folder), "--json").end()
         assert verified.code == 0, verified.events
-    third = ground.run(ground.bundle(name="third")).end()
-    assert third.code == 0, third.stderr
-    (last,) = [entry for entry in (ground.folder / "runs").iterdir() if entry not in (killed, other)]
-    assert (
-        records(last)[0]["before"] == leaf_hash((other / "log.jsonl").read_bytes().splitlines(keepends=True)[-1]).hex()
-    )
+
+    assert ground.run(bundle, *words).end().code == 5, "a bundle flies once"
+    assert runs() == {killed, other}
+    fourth = ground.run(ground.bundle(name="another"), *words)
+    fourth.until("plan")
+    fourth.signal(signal.SIGINT)
+    assert fourth.end().code == 130
+    (last,) = runs() - {killed, other}
+    assert records(last)[0]["before"] == leaf_hash(lines(other)[-1]).hex()
     assert "log-before" not in [record["event"] for record in records(last) if record["type"] == "effect"]

@@ -104,13 +104,12 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
         assert flown.ending is Ending.COMPLETED, told
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize(
-    ("stage", "seconds", "way"),
+    ("flavour", "stage", "seconds", "way"),
     [
-        ("leg", 8.0, Way.UP),
-        ("survey", 45.0, Way.DOWN),
-        ("hover link", 5.0, Way.BOTH),
+        ("px4", "leg", 8.0, Way.UP),
+        ("ardupilot", "survey", 45.0, Way.DOWN),
+        ("px4", "hover link", 5.0, Way.BOTH),
     ],
 )
 def test_a_silence_lands_nothing_on_the_spot(flavour: str, stage: str, seconds: float, way: Way) -> None:

@@ -1,8 +1,10 @@
 """Whole flights in virtual time: the shipped missions, and what goes wrong on them; `verify-log` accepts every log."""
 
+from functools import cache
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from rtshcua.codec.frames import Codec
 from rtshcua.evidence.report import Verdict
@@ -10,11 +12,18 @@ from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.simulation.fault_text import parse_fault
 from virtual import case
+from virtual.copying import copied
 from virtual.flight import Flight, Flown
+from virtual.sampling import each_once
 from virtual.shipped import NAMES, shipped
 
 STEPS = {"short": 3, "standard": 6, "extended": 12, "one_bridge": 6}
 FLAVOURS = ("px4", "ardupilot")
+#: where nothing depends on the autopilot but what its own tests hold it to, `make test` flies one of them
+PX4_OR_SOAK = ("px4", pytest.param("ardupilot", marks=pytest.mark.soak))
+ARDUPILOT_OR_SOAK = ("ardupilot", pytest.param("px4", marks=pytest.mark.soak))
+#: until here all flights of the standard mission are the same: faults begin later
+SHARED_US = 49 * case.S
 
 
 def verified(flown: Flown) -> Flown:
@@ -32,8 +41,27 @@ def fly(name: str, flavour: str, *faults: str, **more: Any) -> Flown:
     return verified(Flight(shipped(name), config, **more).fly())
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("name", NAMES)
+@cache
+def begun(flavour: str, fence: bool) -> Flight:
+    flight = Flight(shipped("standard"), case.simulated(flavour), fence=fence)
+    while flight.clock.elapsed_us < SHARED_US:
+        assert flight.loop.turn() is None
+    return flight
+
+
+def under_way(flavour: str, *faults: str, fence: bool = True) -> Flight:
+    """The standard mission at 49 s, with faults that come after that."""
+    flight = copied(begun(flavour, fence))
+    for fault in faults:
+        flight.vehicle.simulation.inject(parse_fault(fault))
+    return flight
+
+
+def fly_on(flavour: str, *faults: str, fence: bool = True) -> Flown:
+    return verified(under_way(flavour, *faults, fence=fence).fly())
+
+
+@pytest.mark.parametrize(("name", "flavour"), each_once(NAMES, FLAVOURS))
 def test_the_shipped_missions_complete(name: str, flavour: str) -> None:
     flown = fly(name, flavour)
     assert flown.ending is Ending.COMPLETED
@@ -65,6 +93,13 @@ def test_equal_flights_leave_equal_logs() -> None:
     assert fly("short", "px4").lines == fly("short", "px4").lines
 
 
+def test_flight_that_goes_on_from_a_copy_is_the_same_flight() -> None:
+    fault = "battery,at=50s,level=24%"
+    from_a_copy = [fly_on("px4", fault) for _ in range(2)]
+    whole = fly("standard", "px4", fault)
+    assert [flown.lines for flown in from_a_copy] == [whole.lines] * 2
+
+
 FALLBACKS = {
     "battery,at=50s,level=24%": ["return_home"],
     "wind,at=50s,speed=12m/s,from=270deg": ["hover", "return_home"],
@@ -73,19 +108,18 @@ FALLBACKS = {
 }
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("fault", FALLBACKS)
+@pytest.mark.parametrize(("fault", "flavour"), each_once(FALLBACKS, FLAVOURS))
 def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> None:
-    flown = fly("standard", flavour, fault)
+    flown = fly_on(flavour, fault)
     assert flown.ending is Ending.ABORTED
     assert flown.effects("violated")
     assert flown.dispatched() == ["takeoff", "goto", "inspect_area", *FALLBACKS[fault]]
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_a_dropout_lands_nothing_and_ends_nothing(flavour: str) -> None:
     """With charge and position good after it, a silence of 5 s landed the vehicle where it was (recorded, 3 of 3)."""
-    flown = fly("standard", flavour, "link-silence,at=50s,for=5s")
+    flown = fly_on(flavour, "link-silence,at=50s,for=5s")
     assert flown.ending is Ending.COMPLETED
     assert len(flown.effects("link-lost")) == len(flown.effects("link-back")) == 1
 
@@ -93,9 +127,9 @@ def test_a_dropout_lands_nothing_and_ends_nothing(flavour: str) -> None:
 PILLAR = "pillar,at=0s,north=118.5m,east=140m,radius=2m,height=28m"
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
 def test_a_survey_stops_before_what_stands_in_its_way(flavour: str) -> None:
-    flown = fly("standard", flavour, PILLAR)
+    flown = fly_on(flavour, PILLAR)
     assert flown.dispatched() == ["takeoff", "goto", "inspect_area", "hover", "return_home"]
     (violated,) = flown.effects("violated")
     assert violated["detail"] == "obstacle.distance > 3 m + speed * 2 s"
@@ -106,9 +140,9 @@ JUMP = "gps-jump,at=50s,north=300m,east=0m"
 JUMPED = ["takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_land"]
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str) -> None:
-    flown = fly("standard", flavour, JUMP, fence=False)
+    flown = fly_on(flavour, JUMP, fence=False)
     assert flown.ending is Ending.ABORTED
     assert flown.dispatched() == JUMPED
 
@@ -116,7 +150,7 @@ def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str) -> None:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_the_autopilots_own_fence_is_a_second_line_of_defence_and_wins(flavour: str) -> None:
     """ArduCopter returns. PX4 holds, in the mode that it is in already: only its target tells."""
-    flown = fly("standard", flavour, JUMP)
+    flown = fly_on(flavour, JUMP)
     assert flown.ending is Ending.STOOD_DOWN
     (taken,) = flown.effects("taken-over")
     assert taken["detail"] == {"px4": "another target", "ardupilot": "RTL"}[flavour]
@@ -130,10 +164,9 @@ TAKEN = {
 }
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("fault", TAKEN)
+@pytest.mark.parametrize(("fault", "flavour"), each_once(TAKEN, FLAVOURS))
 def test_whoever_takes_over_wins(fault: str, flavour: str) -> None:
-    flown = fly("standard", flavour, fault)
+    flown = fly_on(flavour, fault)
     assert flown.ending is Ending.STOOD_DOWN
     (taken,) = flown.effects("taken-over")
     assert taken["detail"] in (TAKEN[fault][FLAVOURS.index(flavour)], *TAKEN[fault][2:])
@@ -142,22 +175,40 @@ def test_whoever_takes_over_wins(fault: str, flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_vehicle_that_stays_silent_is_lost(flavour: str) -> None:
-    flown = fly("standard", flavour, "link-silence,at=50s")
+def test_vehicle_that_stays_silent_is_lost_once_it_can_fly_no_more(flavour: str) -> None:
+    """This one flies for 5 minutes; what ships says 18, of which all but the beginning is silence."""
+    policy, fault = case.policy(), parse_fault("link-silence,at=20s")
+    policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=ENDURANCE_US))
+    flight = Flight(case.seal(case.mission(case.short_steps()), policy), case.simulated(flavour, faults=(fault,)))
+    flown = verified(flight.fly())
+    assert flown.ending is Ending.LINK_LOST
+    (lost,) = flown.effects("link-lost")
+    assert ENDURANCE_US < flown.records[-1]["at_us"] - lost["at_us"] < ENDURANCE_US + 60 * case.S
+
+
+ENDURANCE_US = 5 * case.MIN
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_vehicle_of_the_shipped_mission_that_stays_silent_is_lost(flavour: str) -> None:
+    flown = fly_on(flavour, "link-silence,at=50s")
     assert flown.ending is Ending.LINK_LOST
     assert flown.effects("link-lost")
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_poor_and_slow_link_is_survived(flavour: str) -> None:
-    for fault in ("link-loss,at=20s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-loss,at=50s,for=700ms"):
-        assert fly("standard", flavour, fault).ending is Ending.COMPLETED
+POOR_LINKS = ("link-loss,at=20s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-loss,at=50s,for=700ms")
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize(("fault", "flavour"), each_once(POOR_LINKS, FLAVOURS))
+def test_a_poor_and_slow_link_is_survived(fault: str, flavour: str) -> None:
+    assert fly("standard", flavour, fault).ending is Ending.COMPLETED
+
+
+@pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
 def test_a_lost_fix_stops_it_and_one_that_is_back_brings_it_home(flavour: str) -> None:
     """While the autopilot still vouches for the position nothing lands it on the spot."""
-    flown = fly("standard", flavour, "gps-loss,at=50s,for=3s")
+    flown = fly_on(flavour, "gps-loss,at=50s,for=3s")
     assert flown.ending is Ending.ABORTED
     assert [record["detail"].partition(":")[0] for record in flown.effects("violated")] == ["gps.fix >= fix_3d"]
     assert flown.dispatched()[-2:] == ["hover", "return_home"]
@@ -170,7 +221,7 @@ def test_a_low_battery_on_the_ground_flies_nothing(level: str) -> None:
     assert flown.dispatched() == []
 
 
-@pytest.mark.parametrize("at_s", [0, 1, 3, 10, 60, 200])
+@pytest.mark.parametrize("at_s", [0, 1, 3, 10, 60, pytest.param(200, marks=pytest.mark.soak)])
 def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
     pressed = []
 
@@ -180,7 +231,8 @@ def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
         pressed.append(True)
         return [Interrupted(flight.clock.now().monotonic_us)]
 
-    flown = verified(Flight(shipped("standard"), case.simulated("px4")).fly(press))
+    flight = Flight(shipped("standard"), case.simulated("px4")) if at_s * case.S < SHARED_US else under_way("px4")
+    flown = verified(flight.fly(press))
     assert flown.ending is Ending.INTERRUPTED
 
 

@@ -1,20 +1,121 @@
-"""Whole flights over real UDP: they complete, they are recorded, and nothing of the ground was on board."""
+"""Whole flights over real UDP: they complete, they are recorded, and what they leave behind proves them.
+
+Two are flown for all these tests: a PX4 that two witnesses watch, after a dry run of the same bundle, and an ArduCopter
+that insists on a signed link, with a witness that is not there.
+"""
 
 import json
+import shutil
+import signal
 import subprocess
 import sys
-from typing import Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 
+from rtshcua.adapters.files.signing import fingerprint, read_link_key, write_link_key
 from rtshcua.codec.frames import Codec
+from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink import tlog
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_a_short_mission_is_flown_and_recorded(ground: Any, flavour: str) -> None:
-    run = ground.run(ground.bundle(), "--flavour", flavour).end()
-    assert run.code == 0, run.stderr
+class Flown(NamedTuple):
+    """A flight that is over, and what else ran beside it or before."""
+
+    ground: Any
+    bundle: str
+    run: Any
+    others: tuple[Any, ...]
+    modules: tuple[str, ...] = ()
+
+
+#: `rtshcua`, which says at its end which modules it loaded
+TELLING = """
+import sys
+from pathlib import Path
+from rtshcua.cli.app import main
+code = main(sys.argv[1:])
+Path("modules").write_text(" ".join(sys.modules))
+sys.exit(code)
+"""
+
+
+@pytest.fixture(scope="module")
+def watched(grounds: Any, free_port: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Flown]:
+    """A PX4, and its two witnesses, both of whom must have cosigned; `others` is the dry run."""
+    top = tmp_path_factory.mktemp("watched")
+    with grounds(top, top / "data", witnesses=2, witness_threshold=2) as ground:
+        bundle = ground.bundle()
+        rehearsal = ground.run(bundle, "--dry-run").end()
+        ports = (free_port(), free_port())
+        watching = [witness(ground, name, at) for name, at in zip(("witness.key", "witness-2.key"), ports, strict=True)]
+        words = [word for at in ports for word in ("--witness", f"udpout:127.0.0.1:{at}")]
+        command, ground.command = ground.command, [sys.executable, "-c", TELLING]
+        run = ground.run(bundle, *words).end()
+        ground.command = command
+        assert run.code == ExitCode.OK, run.log()
+        for each in watching:
+            each.until("cosigned", size=len(run.log()) - 1)
+            each.signal(signal.SIGINT)
+            assert each.end().code == ExitCode.OK
+        yield Flown(ground, bundle, run, (rehearsal,), tuple((top / "modules").read_text().split()))
+
+
+def witness(ground: Any, name: str, port: int) -> Any:
+    words = ["--connect", f"udpin:127.0.0.1:{port}", "--key", str(ground.store.folder / name), "--json"]
+    run = ground.start("witness", *words)
+    run.until("ready")
+    return run
+
+
+@pytest.fixture(scope="module")
+def signed(grounds: Any, free_port: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Flown]:
+    """An ArduCopter of `rtshcua sim`, which ends on SIGINT after the flight and is the only one of `others`."""
+    top = tmp_path_factory.mktemp("signed")
+    with grounds(top, top / "data") as ground:
+        port, key = free_port(), ["--signing-key", str(top / "link.key")]
+        write_link_key(top / "link.key", bytes(range(32)))
+        words = ["--connect", f"udpout:127.0.0.1:{port}", "--flavour", "ardupilot", "--speed", str(ground.speed), *key]
+        vehicle = ground.start("sim", *words, "--json")
+        ready = vehicle.until("ready")
+        assert (ready["flavour"], ready["peer"]) == ("ardupilot", port)
+        link = ["--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", *key, "--unsigned-radio"]
+        bundle = ground.bundle()
+        run = ground.run(bundle, *link, "--witness", f"udpout:127.0.0.1:{free_port()}").end()
+        assert run.code == ExitCode.OK, run.stderr
+        vehicle.signal(signal.SIGINT)
+        yield Flown(ground, bundle, run, (vehicle,))
+
+
+@pytest.fixture(params=["watched", "signed"])
+def flown(request: pytest.FixtureRequest) -> Flown:
+    """Either of them."""
+    found: Flown = request.getfixturevalue(request.param)
+    return found
+
+
+def audited(ground: Any, folder: Path) -> dict[str, Any]:
+    """What `verify-log --audit` says of a sound log."""
+    run = ground.start("verify-log", str(folder / "log.jsonl"), "--audit", "--json")
+    out = run.process.stdout.read()
+    assert run.process.wait(60) == ExitCode.OK
+    found: dict[str, Any] = json.loads(out)
+    return found
+
+
+def kept(flown: Flown, folder: Path) -> Path:
+    """A copy of the run's folder, to be changed."""
+    return Path(shutil.copytree(flown.run.folder, folder / "kept"))
+
+
+# -------------------------------------------------------------------------------------------- the flight
+
+
+def test_a_short_mission_is_flown_and_recorded(flown: Flown) -> None:
+    run = flown.run
     assert run.dispatched() == ["takeoff", "goto", "return_home"]
     assert run.effects().count("succeeded") == 3
     records = run.log()
@@ -22,28 +123,136 @@ def test_a_short_mission_is_flown_and_recorded(ground: Any, flavour: str) -> Non
     assert records[-1]["tlog"] is not None
     summary = json.loads((run.folder / "summary.json").read_text())
     assert summary == {key: value for key, value in run.summary.items() if key != "event"}
-    assert (summary["flavour"], summary["steps_done"], summary["whole"]) == (flavour, 3, True)
+    assert (summary["steps_done"], summary["whole"]) == (3, True)
     frames = list(tlog.read((run.folder / "telemetry.tlog").read_bytes()))
     assert [entry.at_us for entry in frames] == sorted(entry.at_us for entry in frames)
     names = {frame.name for entry in frames for frame in Codec(1, 1).parse(entry.frame)}
     assert {"HEARTBEAT", "GLOBAL_POSITION_INT", "COMMAND_LONG", "COMMAND_ACK"} <= names
 
 
-def test_each_decision_is_written_before_it_is_acted_on(ground: Any) -> None:
-    run = ground.run(ground.bundle()).end()
-    kinds = [(r["type"], r.get("event") or r.get("outcome")) for r in run.log() if r.get("step") == 1]
+def test_summary_names_the_autopilot(watched: Flown, signed: Flown) -> None:
+    assert (watched.run.summary["flavour"], signed.run.summary["flavour"]) == ("px4", "ardupilot")
+
+
+def test_each_decision_is_written_before_it_is_acted_on(flown: Flown) -> None:
+    kinds = [(r["type"], r.get("event") or r.get("outcome")) for r in flown.run.log() if r.get("step") == 1]
     assert kinds == [("decision", "allow"), ("effect", "dispatched"), ("effect", "succeeded")]
 
 
-def test_nothing_of_the_ground_is_loaded_on_board(ground: Any) -> None:
-    words = ["run", ground.bundle(), "--speed", "20", "--json"]
-    program = f"import sys; from rtshcua.cli.app import main; print(main({words})); print(*sys.modules)"
+def test_sim_ends_cleanly_after_it_served_a_run(signed: Flown) -> None:
+    (vehicle,) = signed.others
+    assert vehicle.end().code == ExitCode.OK
+
+
+def test_dry_run_decides_the_mission_and_leaves_nothing_behind(watched: Flown) -> None:
+    """The bundle flew after it, in the only folder of a run that there is."""
+    (rehearsal,) = watched.others
+    assert rehearsal.code == ExitCode.OK, rehearsal.stderr
+    (said,) = rehearsal.events
+    assert (said["event"], said["ready"], said["exit_code"]) == ("rehearsal", True, 0)
+    assert {step["outcome"] for step in said["steps"]} == {"allow"}
+    assert len(list((watched.ground.folder / "runs").iterdir())) == 1
+
+
+def test_dry_run_names_what_refuses_a_step(watched: Flown) -> None:
+    poor = watched.ground.run(watched.ground.bundle(name="poor"), "--dry-run", "--battery", "30").end()
+    assert poor.code == ExitCode.REFUSED
+    first = poor.events[0]["steps"][0]
+    assert (first["outcome"], first["hopeful"]) == ("fallback", False)
+    assert first["nearest"][0]["subject"] == "battery"
+
+
+def test_bundle_flies_once(watched: Flown) -> None:
+    """A run that follows is a new process: it is on the disk."""
+    again = watched.ground.run(watched.bundle).end()
+    assert again.code == ExitCode.REFUSED
+    assert "a bundle flies once" in again.stderr
+    assert again.events == [{"event": "refused", "slug": "replayed", "text": again.events[0]["text"], "exit_code": 5}]
+    assert len(list((watched.ground.folder / "runs").iterdir())) == 1
+
+
+def test_bundle_flies_again_with_fresh_state_and_a_pipe_gets_plain_lines(watched: Flown, tmp_path: Path) -> None:
+    words = ["run", watched.bundle, "--fresh-state", "--runs", str(tmp_path), "--speed", str(watched.ground.speed)]
     run = subprocess.run(
-        [sys.executable, "-c", program], cwd=ground.folder, capture_output=True, text=True, check=True, timeout=60
-    )
-    *_, code, modules = run.stdout.splitlines()
-    assert code == "0"
-    loaded = modules.split()
+        [sys.executable, "-m", "rtshcua.cli.app", *words], cwd=watched.ground.folder, env=watched.ground.environment,
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    lines = run.stdout.splitlines()
+    assert lines[0].startswith("mission inspect_bridge_a under bridge_inspection@7 on quad-07")
+    assert [line.split()[2:4] for line in lines if " dispatched " in line] == [["dispatched", "step"]] * 3
+    assert lines[-4].startswith("completed: 3 of 3 steps done in ")
+    assert lines[-1].split()[:3] == ["next", "rtshcua", "verify-log"]
+
+
+# ----------------------------------------------------------------------------------------- a signed link
+
+
+def test_signatures_are_not_in_the_raw_frames_and_what_they_promise_is_kept(signed: Flown) -> None:
+    frames = [entry.frame for entry in tlog.read((signed.run.folder / "telemetry.tlog").read_bytes())]
+    assert len(frames) > 100
+    assert not any(frame[FLAGS] & FLAG_SIGNED for frame in frames)
+    link_key = read_link_key(signed.ground.folder / "link.key")
+    (state,) = (signed.ground.folder / "data").rglob(fingerprint(link_key))
+    streams = json.loads(state.read_text())["streams"]
+    assert [stream[:2] for stream in streams] == [[1, 1]]
+
+
+# ------------------------------------------------------------------------------------------- witnesses
+
+
+def test_flight_that_two_witnesses_watch_is_anchored_to_its_end(watched: Flown, tmp_path: Path) -> None:
+    count = len(watched.run.log())
+    assert watched.run.effects().count("anchored") >= 4
+    assert audited(watched.ground, watched.run.folder)["anchored"] == count
+    # Without what stands beside the log it is anchored as far as its own records say, and says what is not.
+    folder = kept(watched, tmp_path)
+    (folder / "log.anchors").unlink()
+    assert 0 < audited(watched.ground, folder)["anchored"] < count
+
+
+def test_witness_notices_a_log_that_was_cut(watched: Flown, tmp_path: Path) -> None:
+    """Who holds the log's keys still cannot cut it: the witness remembers."""
+    log = kept(watched, tmp_path) / "log.jsonl"
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[: len(lines) // 2]))
+    assert watched.ground.start("witness", str(log), "--json").end().code == ExitCode.ANCHOR
+
+
+def test_flight_whose_witness_is_not_there_says_so(signed: Flown) -> None:
+    assert any("did not cosign the end of the log" in str(event) for event in signed.run.events)
+    assert "anchored" not in signed.run.effects()
+    assert audited(signed.ground, signed.run.folder)["anchored"] == 0
+
+
+# ---------------------------------------------------------------------------------------------- proofs
+
+PROOFS = ("whole", "part", "receipt", "since")
+
+
+def test_records_of_a_flight_are_proven_without_its_log(watched: Flown, tmp_path: Path) -> None:
+    folder = kept(watched, tmp_path)
+    assert (folder / "log.secret").stat().st_mode & 0o777 == 0o600
+    records = watched.run.log()
+    number = next(record["seq"] for record in records if record["type"] == "decision")
+    words = ([str(number)], [str(number), "--redact", "state,context"], [str(number), "--cose"], ["--since", "0"])
+    made = [str(tmp_path / name) for name in PROOFS]
+    for name, inputs in zip(made, words, strict=True):
+        assert watched.ground.start("prove", str(folder), *inputs, "-o", name, "--json").end().code == ExitCode.OK
+    shutil.rmtree(folder)
+    verified = watched.ground.start("verify-proof", *made, "--json").end()
+    assert verified.code == ExitCode.OK, verified.events
+    whole, part, receipt, since = verified.events
+    assert whole["record"] == receipt["record"] == records[number]
+    shown = {key: value for key, value in records[number].items() if key not in part["withheld"]}
+    assert (part["record"], part["withheld"]) == (shown, ["_prev", "context", "state"])
+    assert (since["kind"], since["size"]) == ("consistency", len(records) - 1)
+
+
+# ---------------------------------------------------------------------------------------- what it is made of
+
+
+def test_nothing_of_the_ground_is_loaded_on_board(watched: Flown) -> None:
+    loaded = watched.modules
     ours = [name for name in loaded if name.startswith("rtshcua.")]
     assert "rtshcua.onboard.runtime.runtime" in ours
     ground_only = ("lark", "shapely", "rtshcua.ground", "rtshcua.model.ir")
@@ -52,29 +261,3 @@ def test_nothing_of_the_ground_is_loaded_on_board(ground: Any) -> None:
     program = f"import sys\nfor name in {ours}: __import__(name)\nprint('pydantic' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
     assert run.stdout == "False\n"
-
-
-def test_a_bundle_flies_once(ground: Any) -> None:
-    bundle = ground.bundle()
-    assert ground.run(bundle).end().code == 0
-    for _ in range(2):  # each is a new process: it is on the disk
-        again = ground.run(bundle).end()
-        assert again.code == 5
-        assert "a bundle flies once" in again.stderr
-        assert again.events == [
-            {"event": "refused", "slug": "replayed", "text": again.events[0]["text"], "exit_code": 5}
-        ]
-    assert len(list((ground.folder / "runs").iterdir())) == 1
-    assert ground.run(bundle, "--fresh-state").end().code == 0
-
-
-def test_without_json_a_pipe_gets_plain_lines(ground: Any) -> None:
-    run = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", "run", ground.bundle(), "--speed", "20"],
-        cwd=ground.folder, capture_output=True, text=True, check=True, timeout=60,
-    )  # fmt: skip
-    lines = run.stdout.splitlines()
-    assert lines[0].startswith("mission inspect_bridge_a under bridge_inspection@7 on quad-07")
-    assert [line.split()[2:4] for line in lines if " dispatched " in line] == [["dispatched", "step"]] * 3
-    assert lines[-4].startswith("completed: 3 of 3 steps done in ")
-    assert lines[-1].split()[:3] == ["next", "rtshcua", "verify-log"]

@@ -22,6 +22,8 @@ from rtshcua.cli.init import project
 ROOT = Path(__file__).resolve().parents[2]
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
 
+pytestmark = pytest.mark.clients
+
 Commit = Callable[..., subprocess.CompletedProcess[str]]
 
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.clients
+
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 

@@ -16,6 +16,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from reference.resealing import resealed
 from reference.verifiers import ROOT_KEY, agree
+from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit, audit
 from rtshcua.simulation.faults import BatteryLevel
 from rtshcua.wire.keys import Duty, SigningKey
@@ -48,6 +49,17 @@ def prove(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> Audit:
     found = audit(lines, pinned)
     agree(b"".join(lines), found, pinned)
     return found
+
+
+def sound(lines: Iterable[bytes]) -> Audit:
+    """The audit of a log without a flaw, in which every decision is derived again."""
+    lines = list(lines)
+    result = prove(lines)
+    assert result.report.failure is None, result.report.failure
+    assert result.report.verdict is Verdict.VERIFIED
+    assert result.derived == sum(read(line)["type"] == "decision" for line in lines)
+    assert result.dispatches == sum(read(line).get("event") == "dispatched" for line in lines)
+    return result
 
 
 def expect(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> tuple[str, int]:

@@ -4,7 +4,16 @@ from collections.abc import Callable
 from itertools import count
 
 
+class _Seeds:
+    """The numbers from 1 on, each as a secret; a copy of it goes on from where it is."""
+
+    def __init__(self) -> None:
+        self._numbers = count(1)
+
+    def __call__(self) -> bytes:
+        return next(self._numbers).to_bytes(32)
+
+
 def epoch_seeds() -> Callable[[], bytes]:
     """What a recorder draws its epoch keys from."""
-    numbers = count(1)
-    return lambda: next(numbers).to_bytes(32)
+    return _Seeds()

@@ -17,15 +17,18 @@ class Watched:
         self._stream = stream
 
     def readline(self) -> bytes:
-        """One line; nothing at the end."""
-        return self._seen(self._stream.readline())
+        """One line; a part of one, or nothing, at the end."""
+        data = self._stream.readline()
+        return self._seen(data, ended=not data.endswith(b"\n"))
 
     def read(self, size: int) -> bytes:
         """So many bytes; fewer at the end."""
-        return self._seen(self._stream.read(size))
+        data = self._stream.read(size)
+        return self._seen(data, ended=len(data) < size)
 
-    def _seen(self, data: bytes) -> bytes:
-        if not data:
+    def _seen(self, data: bytes, *, ended: bool) -> bytes:
+        # Told by what is cut off, too: whoever cannot answer it, for nobody listens any more, reads no further.
+        if ended:
             forced = Timer(GRACE, os._exit, (0,))
             forced.daemon = True
             forced.start()

@@ -83,6 +83,7 @@ def test_bash_completes_files_by_their_kind(tab: Complete) -> None:
     assert "e.txt" in tab("run", "--log-key", "")
 
 
+@pytest.mark.clients
 @pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not installed")
 def test_fish_completes(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (place / ".script").write_text(asked(capsys, "fish"))
@@ -95,6 +96,7 @@ def test_fish_completes(place: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert done.stdout.endswith("b.bundle\nsub/\n.\n")
 
 
+@pytest.mark.clients
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not installed")
 def test_zsh_can_load_it(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (place / "_rtshcua").write_text(asked(capsys, "zsh"))

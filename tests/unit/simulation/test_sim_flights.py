@@ -11,12 +11,20 @@ from rtshcua.simulation.wind import Wind
 
 
 @pytest.mark.parametrize(
-    ("north_m", "east_m", "up_m", "cruise_mm_s"),
-    [(100, 0, 20, 5_000), (-150, 200, 40, 12_000), (0, -300, 12, 8_000)],
+    ("flavour", "there", "cruise_mm_s"),
+    [
+        ("px4", (100, 0, 20), 5_000),
+        ("ardupilot", (-150, 200, 40), 12_000),
+        pytest.param("px4", (0, -300, 12), 8_000, marks=pytest.mark.soak),
+        pytest.param("ardupilot", (100, 0, 20), 5_000, marks=pytest.mark.soak),
+        pytest.param("px4", (-150, 200, 40), 12_000, marks=pytest.mark.soak),
+        ("ardupilot", (0, -300, 12), 8_000),
+    ],
 )
 def test_out_and_home(
-    pilot: Callable[..., Any], flavour: str, north_m: float, east_m: float, up_m: float, cruise_mm_s: int
+    pilot: Callable[..., Any], flavour: str, there: tuple[float, float, float], cruise_mm_s: int
 ) -> None:
+    north_m, east_m, up_m = there
     p = pilot(flavour, cruise_mm_s=cruise_mm_s, wind=Wind(4_000, 300, 1_000))
     p.take_off(20)
     assert p.truth.in_air

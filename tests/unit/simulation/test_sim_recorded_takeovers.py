@@ -7,6 +7,7 @@ leave the list.
 """
 
 from collections.abc import Mapping
+from functools import cache
 from math import nan
 
 import pytest
@@ -83,6 +84,7 @@ KEPT: Mapping[str, Mapping[str, str]] = {
 }
 
 
+@cache
 def again(name: str) -> Flight:
     trace = Trace(name, wall=name == STALLED)
     home = next(h.message for h in trace.heard if h.name == "HOME_POSITION")

@@ -56,6 +56,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.clients
 def test_a_cluster_comes_to_the_same(take: Add, fleet: Path, tmp_path: Path, checkout: Path) -> None:
     """A scheduler and two workers, each a process of its own, on this machine."""
     script = tmp_path / "on_cluster.py"

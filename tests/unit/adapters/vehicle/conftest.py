@@ -1,6 +1,7 @@
 """A driver that flies the simulated vehicle in virtual time, with no runtime above it."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Readings, Ready, Succeeded, TakenOver
 from rtshcua.simulation.config import Kind, SimulationConfig
+from virtual.copying import copied
 from virtual.policy import POLICY, geo
 from virtual.vehicle import SECOND, VirtualVehicle
 
@@ -83,3 +85,14 @@ def flavour(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def flyer(flavour: str) -> Callable[..., Flyer]:
     return lambda **config: Flyer(flavour, **config)
+
+
+@cache
+def climbed(flavour: str, altitude: int) -> Flyer:
+    return Flyer(flavour).up(altitude)
+
+
+@pytest.fixture
+def aloft(flavour: str) -> Callable[..., Flyer]:
+    """One that has climbed: to 20 m, or to an altitude in mm."""
+    return lambda altitude=20_000: copied(climbed(flavour, altitude))

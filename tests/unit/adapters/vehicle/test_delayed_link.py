@@ -1,5 +1,8 @@
 """A link that holds frames back: what arrives late is old, whoever sent it, and an old state is an unknown one."""
 
+from functools import cache
+
+import pytest
 from msgspec.structs import replace
 
 from rtshcua.adapters.vehicle.observed import Observed
@@ -9,6 +12,7 @@ from rtshcua.onboard.ports import Readings, Ready
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.faults import LinkDelay
+from virtual.copying import copied
 from virtual.policy import POLICY
 from virtual.vehicle import SECOND, VirtualVehicle
 
@@ -53,9 +57,20 @@ class Watched:
         }
 
 
-def test_a_position_that_is_delayed_by_3_s_is_unknown_when_it_is_stale_after_2_s(flavour: str) -> None:
+@cache
+def watched(flavour: str) -> Watched:
     one = Watched(flavour)
     one.wait(20)
+    return one
+
+
+def ready(flavour: str) -> Watched:
+    """One that has been heard for 20 s."""
+    return copied(watched(flavour))
+
+
+def test_a_position_that_is_delayed_by_3_s_is_unknown_when_it_is_stale_after_2_s(flavour: str) -> None:
+    one = ready(flavour)
     assert any(isinstance(event, Ready) for event in one.events)
     assert set(REPORTED) <= one.known()
     one.delay(3 * SECOND)
@@ -74,8 +89,7 @@ def test_a_position_that_is_delayed_by_3_s_is_unknown_when_it_is_stale_after_2_s
 
 
 def test_what_is_delayed_by_less_stays_known_and_its_age_says_so(flavour: str) -> None:
-    one = Watched(flavour)
-    one.wait(20)
+    one = ready(flavour)
     one.delay(500_000)
     one.wait(5)
     for _ in range(20):
@@ -88,6 +102,7 @@ def test_what_is_delayed_by_less_stays_known_and_its_age_says_so(flavour: str) -
     assert source.clock.round_trip_us == 1_000_000
 
 
+@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 def test_a_link_that_was_slow_from_the_beginning_counts_the_way_up_as_well(flavour: str) -> None:
     """Nothing tells how a round trip is divided: all of it may have been the way down."""
     one = Watched(flavour)
@@ -105,8 +120,7 @@ def test_a_link_that_was_slow_from_the_beginning_counts_the_way_up_as_well(flavo
 
 
 def test_a_first_silence_leaves_no_age_that_is_too_young(flavour: str) -> None:
-    one = Watched(flavour)
-    one.wait(20)
+    one = ready(flavour)
     one.delay(700_000)
     one.wait(0.69)
     held = one.monitor.state(one.now_us)

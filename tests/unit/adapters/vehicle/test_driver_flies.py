@@ -18,8 +18,8 @@ def test_is_ready_once_its_streams_run(flyer: Make) -> None:
     assert readings == set(range(7))
 
 
-def test_climbs_and_says_so(flyer: Make) -> None:
-    one = flyer().up(20_000)
+def test_climbs_and_says_so(aloft: Make) -> None:
+    one = aloft(20_000)
     assert abs(one.truth.up_mm - 20_000) < 1_500
     states = [(event.armed, event.airborne) for event in one.events if isinstance(event, AirState)]
     assert states[0] == (False, False)
@@ -27,8 +27,8 @@ def test_climbs_and_says_so(flyer: Make) -> None:
     assert [event.token for event in one.events if isinstance(event, Sent)] == [1]
 
 
-def test_flies_to_a_point_at_its_speed(flyer: Make) -> None:
-    one = flyer().up()
+def test_flies_to_a_point_at_its_speed(aloft: Make) -> None:
+    one = aloft()
     one.begin(MotionKind.FLY, (60_000, 80_000), altitude=25_000, speed=3_000)
     fastest = 0
     while not any(isinstance(event, Succeeded) and event.token == 2 for event in one.events):
@@ -40,8 +40,8 @@ def test_flies_to_a_point_at_its_speed(flyer: Make) -> None:
     assert 2_500 < fastest < 3_500
 
 
-def test_covers_a_path_point_by_point(flyer: Make) -> None:
-    one = flyer().up()
+def test_covers_a_path_point_by_point(aloft: Make) -> None:
+    one = aloft()
     path = [(0, 40_000), (30_000, 40_000), (30_000, 10_000)]
     one.begin(MotionKind.COVER, *path, altitude=20_000, speed=5_000)
     near = set()
@@ -51,8 +51,8 @@ def test_covers_a_path_point_by_point(flyer: Make) -> None:
     assert near == {0, 1, 2}
 
 
-def test_holds_for_its_time_and_no_longer(flyer: Make) -> None:
-    one = flyer().up()
+def test_holds_for_its_time_and_no_longer(aloft: Make) -> None:
+    one = aloft()
     one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=8_000)
     one.wait(8)
     begun = one.now_us
@@ -63,22 +63,22 @@ def test_holds_for_its_time_and_no_longer(flyer: Make) -> None:
     assert here.east_mm < 100_000
 
 
-def test_holds_on_without_a_time(flyer: Make) -> None:
-    one = flyer().up()
+def test_holds_on_without_a_time(aloft: Make) -> None:
+    one = aloft()
     one.begin(MotionKind.HOLD)
     assert not any(isinstance(event, Succeeded) for event in one.wait(60))
 
 
-def test_comes_home_and_lands_there(flyer: Make) -> None:
-    one = flyer().up()
+def test_comes_home_and_lands_there(aloft: Make) -> None:
+    one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (50_000, 0), altitude=20_000, speed=8_000), Succeeded)
     assert isinstance(one.fly(MotionKind.HOME), Succeeded)
     assert not one.truth.armed
     assert abs(one.truth.east_mm) < 2_000
 
 
-def test_lands_where_it_is(flyer: Make) -> None:
-    one = flyer().up()
+def test_lands_where_it_is(aloft: Make) -> None:
+    one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (50_000, 0), altitude=20_000, speed=8_000), Succeeded)
     assert isinstance(one.fly(MotionKind.LAND), Succeeded)
     assert not one.truth.armed
@@ -94,9 +94,9 @@ def test_landing_what_stands_already_is_done_at_once(flyer: Make) -> None:
         assert one.now_us - begun < 1_000_000
 
 
-def test_one_command_replaces_another_without_a_false_take_over(flyer: Make) -> None:
+def test_one_command_replaces_another_without_a_false_take_over(aloft: Make) -> None:
     """Modes show in the heartbeat with a delay, so the mode of a command just replaced may still come."""
-    one = flyer().up()
+    one = aloft()
     one.begin(MotionKind.FLY, (100_000, 0), altitude=20_000, speed=5_000)
     one.wait(4)
     for kind in (MotionKind.HOLD, MotionKind.LAND, MotionKind.HOLD):

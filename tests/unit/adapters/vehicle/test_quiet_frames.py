@@ -9,6 +9,7 @@ from rtshcua.onboard.ports import Event
 from rtshcua.simulation.fault_text import parse_fault
 from virtual import case
 from virtual.flight import Flight
+from virtual.sampling import each_once
 from virtual.shipped import shipped
 
 FAULTS = ("link-loss,at=5s,loss=40%", "link-delay,at=0s,delay=400ms")
@@ -19,8 +20,7 @@ def flown(flavour: str, fault: str) -> tuple[list[bytes], Sequence[Event]]:
     return flight.fly().lines, flight.events
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize(("flavour", "fault"), each_once(["px4", "ardupilot"], FAULTS))
 def test_a_flight_is_the_same_when_every_frame_is_shown(
     flavour: str, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

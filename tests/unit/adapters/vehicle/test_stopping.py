@@ -37,9 +37,9 @@ def stops(one: Any, seconds: float = 9) -> None:
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.3, 1.0, 4.0, 8.0])
-def test_a_leg_is_stopped_whenever_that_is_asked(flyer: Make, after_s: float) -> None:
+def test_a_leg_is_stopped_whenever_that_is_asked(aloft: Make, after_s: float) -> None:
     """PX4 is in Hold already, where DO_SET_MODE to Hold changes nothing (recorded: it flew on for 46 m)."""
-    one = flyer().up()
+    one = aloft()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
     one.wait(after_s)
     stops(one)
@@ -55,8 +55,8 @@ def test_a_climb_is_stopped(flyer: Make) -> None:
 
 
 @pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
-def test_a_return_and_a_landing_are_stopped(flyer: Make, kind: MotionKind) -> None:
-    one = flyer().up(40_000)
+def test_a_return_and_a_landing_are_stopped(aloft: Make, kind: MotionKind) -> None:
+    one = aloft(40_000)
     one.fly(MotionKind.FLY, (60_000, 0), altitude=40_000, speed=8_000)
     one.begin(kind)
     one.wait(4)
@@ -65,9 +65,9 @@ def test_a_return_and_a_landing_are_stopped(flyer: Make, kind: MotionKind) -> No
 
 
 @pytest.mark.parametrize("after_s", [0.6, 1.2, 1.8])
-def test_a_vehicle_that_still_gathers_speed_is_stopped_over_a_slow_link(flyer: Make, after_s: float) -> None:
+def test_a_vehicle_that_still_gathers_speed_is_stopped_over_a_slow_link(aloft: Make, after_s: float) -> None:
     """The speed that is known when the stop is sent is not the one that it has when it obeys."""
-    one = flyer().up()
+    one = aloft()
     one.vehicle.simulation.inject(LinkDelay(0, 300_000))
     one.wait(1)
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
@@ -76,8 +76,8 @@ def test_a_vehicle_that_still_gathers_speed_is_stopped_over_a_slow_link(flyer: M
 
 
 @pytest.mark.parametrize("delay_us", [0, 700_000])
-def test_the_place_where_it_stops_is_nobody_elses_target(flyer: Make, delay_us: int) -> None:
-    one = flyer().up()
+def test_the_place_where_it_stops_is_nobody_elses_target(aloft: Make, delay_us: int) -> None:
+    one = aloft()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=12_000)
     one.wait(8)
     one.vehicle.simulation.inject(LinkDelay(0, delay_us))
@@ -85,9 +85,9 @@ def test_the_place_where_it_stops_is_nobody_elses_target(flyer: Make, delay_us: 
     stops(one, 15)
 
 
-def test_a_return_from_far_gets_somewhere_wherever_home_is(flyer: Make) -> None:
+def test_a_return_from_far_gets_somewhere_wherever_home_is(aloft: Make) -> None:
     """A program that began in the air never saw the vehicle stand at home."""
-    one = flyer().up(40_000)
+    one = aloft(40_000)
     assert isinstance(one.fly(MotionKind.FLY, (450_000, 0), altitude=40_000, speed=12_000), Succeeded)
     again = Driver(POLICY, one.vehicle.frames, fence=False)
     one.vehicle.driver = again
@@ -95,9 +95,9 @@ def test_a_return_from_far_gets_somewhere_wherever_home_is(flyer: Make) -> None:
     assert isinstance(one.fly(MotionKind.HOME), Succeeded)
 
 
-def test_a_hold_that_does_not_stop_has_failed(flyer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hold_that_does_not_stop_has_failed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is acknowledged, the mode is right, and the vehicle flies on."""
-    one = flyer().up()
+    one = aloft()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
     one.wait(8)
     monkeypatch.setattr(Vehicle, "hold", lambda self, up=None: None)
@@ -108,8 +108,8 @@ def test_a_hold_that_does_not_stop_has_failed(flyer: Make, monkeypatch: pytest.M
     assert failed.at_us - begun < 8 * S, "it declares no brakes: by the cautious guess"
 
 
-def test_a_hold_that_drifts_away_has_failed(flyer: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = flyer().up()
+def test_a_hold_that_drifts_away_has_failed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = aloft()
     one.begin(MotionKind.HOLD)
     one.wait(4)
     vehicle = one.vehicle.simulation._autopilot.vehicle
@@ -224,15 +224,15 @@ def test_a_vehicle_that_flies_into_a_pillar_has_crashed(flyer: Make) -> None:
     assert sum(isinstance(event, Crashed) for event in one.events) == 1
 
 
-def test_motors_that_stop_in_the_air_are_a_crash(flyer: Make) -> None:
-    one = flyer().up()
+def test_motors_that_stop_in_the_air_are_a_crash(aloft: Make) -> None:
+    one = aloft()
     one.vehicle.simulation.inject(Kill(0))
     assert isinstance(one.until((Crashed, Succeeded, TakenOver), 10), Crashed)
 
 
 @pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
-def test_a_landing_is_no_crash(flyer: Make, kind: MotionKind) -> None:
-    one = flyer().up()
+def test_a_landing_is_no_crash(aloft: Make, kind: MotionKind) -> None:
+    one = aloft()
     one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000, speed=8_000)
     assert isinstance(one.fly(kind), Succeeded)
     one.wait(10)

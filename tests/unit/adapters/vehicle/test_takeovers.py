@@ -6,11 +6,8 @@ be on which a frame leaves, and the link's delay; and a takeover that shows afte
 what we do.
 """
 
-import copyreg
 from collections.abc import Callable, Iterator
-from copy import deepcopy
 from itertools import product
-from struct import Struct
 from typing import Any
 
 import pytest
@@ -24,12 +21,12 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Failed, Ready, Succeeded, TakenOver
 from rtshcua.simulation.faults import Fault, LinkDelay, PilotGoto, PilotMode, PilotPause, PilotSticks
 from rtshcua.simulation.modes import Mode
+from virtual.copying import copied
 from virtual.policy import POLICY
 
 Make = Callable[..., Any]
 ASKS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
 MS, S = 1_000, 1_000_000
-copyreg.pickle(Struct, lambda made: (Struct, (made.format,)))  # a flight is copied with its codec
 WITHIN_US = {"px4": PX4.mode_within_us, "ardupilot": ARDUPILOT.mode_within_us}
 #: how long it may take until the driver looks again
 TICK_US = 40 * MS
@@ -76,9 +73,9 @@ TAKEOVERS: dict[str, Callable[[int], Fault]] = {
 
 
 @pytest.mark.parametrize("name", TAKEOVERS)
-def test_a_takeover_in_a_leg_is_seen_and_not_fought(flyer: Make, flavour: str, name: str) -> None:
+def test_a_takeover_in_a_leg_is_seen_and_not_fought(aloft: Make, flavour: str, name: str) -> None:
     """PX4's pause and go-to, and ArduCopter's guided target, change no mode (recorded)."""
-    one = flyer().up()
+    one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
     sent = Sent(one)
@@ -94,8 +91,8 @@ def test_a_takeover_in_a_leg_is_seen_and_not_fought(flyer: Make, flavour: str, n
 
 
 @pytest.mark.parametrize("name", ["go-to", "land", "position"])
-def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(flyer: Make, name: str) -> None:
-    one = flyer().up()
+def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(aloft: Make, name: str) -> None:
+    one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000, speed=5_000), Succeeded)
     one.wait(3)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
@@ -103,9 +100,9 @@ def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(flyer: Make, name
 
 
 @pytest.mark.parametrize("name", ["pause", "go-to", "land", "position"])
-def test_a_takeover_is_seen_while_it_holds(flyer: Make, flavour: str, name: str) -> None:
+def test_a_takeover_is_seen_while_it_holds(aloft: Make, flavour: str, name: str) -> None:
     """ArduCopter obeys no pause in BRAKE: there is nothing to see."""
-    one = flyer().up()
+    one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
     one.begin(MotionKind.HOLD)
@@ -121,9 +118,9 @@ def test_a_takeover_is_seen_while_it_holds(flyer: Make, flavour: str, name: str)
     assert sent.at_us == []
 
 
-def test_sticks_end_what_px4_does_by_itself(flyer: Make, flavour: str) -> None:
+def test_sticks_end_what_px4_does_by_itself(aloft: Make, flavour: str) -> None:
     """ArduCopter does not mind them in GUIDED."""
-    one = flyer().up()
+    one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
     one.vehicle.simulation.inject(PilotSticks(0))
@@ -133,9 +130,9 @@ def test_sticks_end_what_px4_does_by_itself(flyer: Make, flavour: str) -> None:
         assert not any(isinstance(event, (TakenOver, Failed)) for event in one.wait(10))
 
 
-def test_our_own_targets_are_nobody_elses(flyer: Make) -> None:
+def test_our_own_targets_are_nobody_elses(aloft: Make) -> None:
     """Leg after leg, a hold, and another leg."""
-    one = flyer().up()
+    one = aloft()
     path = [(20_000, 0), (20_000, 20_000), (0, 20_000), (0, 0), (20_000, 0)]
     assert isinstance(one.fly(MotionKind.COVER, *path, altitude=20_000, speed=5_000), Succeeded)
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=8_000)
@@ -146,8 +143,8 @@ def test_our_own_targets_are_nobody_elses(flyer: Make) -> None:
     assert not any(isinstance(event, TakenOver) for event in one.events)
 
 
-def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(flyer: Make, flavour: str) -> None:
-    one = flyer().up()
+def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(aloft: Make, flavour: str) -> None:
+    one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
     sent = Sent(one)
@@ -164,9 +161,9 @@ def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(flyer: Make, f
 OLD = {"px4": Mode.LOITER, "ardupilot": Mode.GUIDED}
 
 
-def test_nothing_is_begun_once_somebody_else_flies(flyer: Make) -> None:
+def test_nothing_is_begun_once_somebody_else_flies(aloft: Make) -> None:
     """Neither what waited for its record while the takeover showed, nor anything after it."""
-    one = flyer().up()
+    one = aloft()
     one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
     one.until(TakenOver, 3)
     sent = Sent(one)
@@ -176,10 +173,10 @@ def test_nothing_is_begun_once_somebody_else_flies(flyer: Make) -> None:
 
 @pytest.mark.parametrize(("mode", "others"), [(Mode.POSITION, True), (Mode.LAND, True), (Mode.LOITER, None)])
 def test_a_program_that_begins_in_the_air_says_who_flies(
-    flyer: Make, flavour: str, mode: Mode, others: bool | None
+    aloft: Make, flavour: str, mode: Mode, others: bool | None
 ) -> None:
     """PX4 loiters for us too; ArduCopter's LOITER is a pilot's."""
-    one = flyer().up()
+    one = aloft()
     one.vehicle.simulation.inject(PilotMode(0, mode))
     one.wait(1)
     one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
@@ -198,9 +195,9 @@ def moments(whole: bool) -> Iterator[tuple[int, int, int]]:
     return product((ms * MS for ms in acts), (ms * MS for ms in phases), delays)
 
 
-def under_way(flyer: Make, delay_us: int) -> Any:
+def under_way(aloft: Make, delay_us: int) -> Any:
     """A flight in the middle of a leg."""
-    one = flyer().up()
+    one = aloft()
     if delay_us:
         one.vehicle.simulation.inject(LinkDelay(0, delay_us))
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
@@ -229,18 +226,18 @@ def holds(one: Any, flavour: str, name: str, acts_us: int, phase_us: int, delay_
     assert latest_us <= late_us, f"{(latest_us - takes_us) / MS} ms after it took effect"
 
 
-def try_all(flyer: Make, flavour: str, name: str, *, whole: bool) -> None:
-    flights = {delay_us: under_way(flyer, delay_us) for delay_us in DELAYS_US}
+def try_all(aloft: Make, flavour: str, name: str, *, whole: bool) -> None:
+    flights = {delay_us: under_way(aloft, delay_us) for delay_us in DELAYS_US}
     for acts_us, phase_us, delay_us in moments(whole):
-        holds(deepcopy(flights[delay_us]), flavour, name, acts_us, phase_us, delay_us)
+        holds(copied(flights[delay_us]), flavour, name, acts_us, phase_us, delay_us)
 
 
 @pytest.mark.parametrize("name", ["land", "go-to"])
-def test_no_frame_leaves_later_than_w(flyer: Make, flavour: str, name: str) -> None:
-    try_all(flyer, flavour, name, whole=False)
+def test_no_frame_leaves_later_than_w(aloft: Make, flavour: str, name: str) -> None:
+    try_all(aloft, flavour, name, whole=False)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("name", ["land", "return", "position", "go-to"])
-def test_no_frame_leaves_later_than_w_at_any_moment(flyer: Make, flavour: str, name: str) -> None:
-    try_all(flyer, flavour, name, whole=True)
+def test_no_frame_leaves_later_than_w_at_any_moment(aloft: Make, flavour: str, name: str) -> None:
+    try_all(aloft, flavour, name, whole=True)

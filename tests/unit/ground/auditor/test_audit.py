@@ -1,59 +1,37 @@
-"""Whatever happens on a flight, its log is audited without a flaw; and what it proves is said exactly."""
+"""Whatever the mission does, its log is audited without a flaw; and what it proves is said exactly.
+
+`test_frames_follow` audits the log of every kind of flight.
+"""
 
 from collections.abc import Sequence
 
 import pytest
 from msgspec.structs import replace
 
-from reference.forgery import LOG_KEY, ROOT_KEY, edit, flight, prove, read, signed
+from reference.forgery import LOG_KEY, ROOT_KEY, edit, flight, prove, read, signed, sound
+from reference.kinds_of_flight import FAULTS, recorded
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit, audit
 from rtshcua.model.flat.mission import Mission, OnInadmissible
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Event, Interrupted
-from rtshcua.simulation.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
+from rtshcua.simulation.faults import BatteryLevel, Fault
 from rtshcua.wire.keys import Duty
 from virtual import case
 from virtual.flight import Flight
+from virtual.sampling import each_once
 
-S, M = case.S, case.M
+S = case.S
 
 
-def fly(*faults: Fault, of: Mission | None = None, kind: str = "px4", mode: Mode = Mode.SOFTWARE) -> list[bytes]:
+def fly(*faults: Fault, of: Mission | None = None) -> list[bytes]:
     mission = of or case.mission(case.short_steps())
-    return Flight(case.seal(mission), case.simulated(kind, faults=faults), mode=mode).fly().lines
+    return Flight(case.seal(mission), case.simulated("px4", faults=faults)).fly().lines
 
 
-def sound(lines: Sequence[bytes]) -> Audit:
-    result = prove(lines)
-    assert result.report.failure is None, result.report.failure
-    assert result.report.verdict is Verdict.VERIFIED
-    assert result.derived == sum(read(line)["type"] == "decision" for line in lines)
-    assert result.dispatches == sum(read(line).get("event") == "dispatched" for line in lines)
-    return result
-
-
-FAULTS: dict[str, tuple[Fault, ...]] = {
-    "none": (),
-    "low battery": (BatteryLevel(15 * S, 2_000),),
-    "empty battery on the ground": (BatteryLevel(0, 1_500),),
-    "wind": (WindStep(15 * S, 14 * M),),
-    "no fix": (GpsLoss(15 * S),),
-    "no fix for a while": (GpsLoss(12 * S, 4 * S),),
-    "obstacle": (Obstacle(15 * S, 2 * M),),
-    "pilot": (PilotMode(15 * S),),
-    "silence": (LinkSilence(15 * S),),
-}
-
-
-@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-@pytest.mark.parametrize("faults", FAULTS.values(), ids=FAULTS.keys())
-def test_the_log_of_every_kind_of_flight_is_sound(faults: tuple[Fault, ...], kind: str) -> None:
-    sound(fly(*faults, kind=kind))
-
-
-@pytest.mark.parametrize("behaviour", list(OnInadmissible))
-@pytest.mark.parametrize("kind", ["wind", "no fix for a while", "low battery"])
+@pytest.mark.parametrize(
+    ("behaviour", "kind"), each_once(OnInadmissible, ["wind", "no fix for a while", "low battery"])
+)
 def test_whatever_the_mission_does_when_a_step_is_not_admitted(behaviour: OnInadmissible, kind: str) -> None:
     mission = case.mission()
     steps = tuple(replace(step, on_inadmissible=behaviour) for step in mission.invocations)
@@ -113,8 +91,7 @@ def test_a_log_that_fails_proves_nothing() -> None:
 
 
 def test_mode_none_needs_no_permits_and_says_so() -> None:
-    lines = fly(of=case.mission(), mode=Mode.NONE)
-    report = sound_without_permits(lines)
+    report = sound_without_permits(recorded("none", "px4", Mode.NONE).lines)
     assert "enforcement" in [claim.slug for claim in report.report.unproven]
     assert "dispatches" not in [claim.slug for claim in report.report.proven]
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from reference.kept_frames import kept
+from reference.kinds_of_flight import recorded
 from rtshcua.ground.auditor.obeyed import Home, Target, obeyed
 from rtshcua.ground.auditor.sent import Frame, Nature, nature, read
 from rtshcua.mavlink.layouts import LAYOUTS
@@ -17,8 +17,6 @@ from rtshcua.onboard.enforcement.frame_shape import Frame as Shape
 from rtshcua.onboard.enforcement.frame_shape import read_frame
 from rtshcua.onboard.enforcement.motion_frames import carries_out
 from rtshcua.onboard.ports import Command
-from virtual import case
-from virtual.flight import Flight
 
 AUTOPILOTS = {"px4": PX4, "ardupilot": ARDUPILOT}
 HOME = 488_000
@@ -27,9 +25,7 @@ HOME = 488_000
 @cache
 def commands(kind: str) -> tuple[Shape, ...]:
     """The commands among the frames of a flight."""
-    flight = Flight(case.seal(case.mission()), case.simulated(kind))
-    entries = kept(flight)
-    flight.fly()
+    entries = recorded("none", kind).entries
     frames = [read_frame(octets) for _, octets in entries if nature_of(octets) is Nature.COMMAND]
     return tuple(dict.fromkeys(frame for frame in frames if frame is not None))
 

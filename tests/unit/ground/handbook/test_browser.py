@@ -31,7 +31,10 @@ const scroll = document.documentElement.scrollWidth;
 document.body.dataset.found = JSON.stringify({scroll, inner: innerWidth, wide, thin, over});
 """
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+pytestmark = [
+    pytest.mark.clients,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine"),
+]
 
 
 def dumped(tmp_path: Path, text: str, width: int) -> tuple[str, str]:

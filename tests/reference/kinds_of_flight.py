@@ -1,0 +1,44 @@
+"""What may happen on a flight, each flown once: its log, and the raw frames beside it."""
+
+from functools import cache
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from reference.flat_case import MIN, M, S
+from reference.kept_frames import Entries, kept
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.simulation.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
+from virtual import case
+from virtual.flight import Flight
+
+FAULTS: dict[str, tuple[Fault, ...]] = {
+    "none": (),
+    "low battery": (BatteryLevel(15 * S, 2_000),),
+    "empty battery on the ground": (BatteryLevel(0, 1_500),),
+    "wind": (WindStep(15 * S, 14 * M),),
+    "no fix": (GpsLoss(15 * S),),
+    "no fix for a while": (GpsLoss(12 * S, 4 * S),),
+    "obstacle": (Obstacle(15 * S, 2 * M),),
+    "pilot": (PilotMode(15 * S),),
+    "silence": (LinkSilence(15 * S),),
+}
+
+
+class Recorded(NamedTuple):
+    """The lines of a flight's log, and the frames that came and were sent: (UTC us, frame)."""
+
+    lines: tuple[bytes, ...]
+    entries: Entries
+
+
+@cache
+def recorded(fault: str, flavour: str, mode: Mode = Mode.SOFTWARE) -> Recorded:
+    """The reference mission with one of `FAULTS`. A vehicle that is never heard again flies for 6 minutes at most."""
+    policy = case.policy()
+    if fault == "silence":
+        policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=6 * MIN))
+    config = case.simulated(flavour, faults=FAULTS[fault])
+    flight = Flight(case.seal(case.mission(), policy), config, mode=mode)
+    entries = kept(flight)
+    return Recorded(tuple(flight.fly().lines), entries)

@@ -9,7 +9,7 @@ unexport PYTHONHOME PYTHONPATH
 MAKEFLAGS += --no-print-directory
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test clients lint soak fuzz mutate bench clean
+.PHONY: help setup demo test clients lint soak fuzz mutate bench size clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -47,6 +47,9 @@ mutate: setup ## change one thing at a time in what decides, and list what no te
 bench: setup ## run every benchmark; each prints a ratio against a peer or a limit
 	@status=0; for file in bench/*.py; do $(BIN)/python "$$file" || { echo "$$file: limit not met" >&2; status=1; }; done; \
 	exit $$status
+
+size: setup ## count modules, code lines, shared names and functions that are too long, by package
+	@$(BIN)/python .make/size
 
 clean: ## remove set-up, builds and caches; runs/ and keys stay
 	rm -rf .venv build dist .coverage .coverage.* .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

@@ -47,15 +47,20 @@ class StateMonitor:
             self._unseen.add(slot)
 
     def current(self, now_us: int) -> frozenset[int]:
-        """The slots that were reported, and are not stale."""
-        limits, stamps = self._policy.limits, self._stamps
+        """The slots with a value that is known, and not stale."""
+        limits, values = self._policy.limits, self._values
         return frozenset(
-            slot for slot, stamp in enumerate(stamps) if stamp is not None and now_us - stamp <= limits[slot].stale_us
+            slot
+            for slot, stamp in enumerate(self._stamps)
+            if stamp is not None and values[slot] is not None and now_us - stamp <= limits[slot].stale_us
         )
 
     def unreported(self, slots: frozenset[int], since_us: int) -> frozenset[int]:
-        """Those of `slots` nothing of which was measured after `since_us`."""
-        return frozenset(slot for slot in slots if (self._stamps[slot] or 0) <= since_us)
+        """Those of `slots` of which no value was measured after `since_us`.
+
+        That one is not known is no value: after a silence an estimator's word on a position comes behind the position.
+        """
+        return frozenset(slot for slot in slots if self._values[slot] is None or (self._stamps[slot] or 0) <= since_us)
 
     def hides(self, readings: Readings) -> bool:
         """Whether these readings replace a value that nobody has looked at: frames came faster than steps were made."""

@@ -293,6 +293,30 @@ def test_what_was_measured_before_the_loss_is_not_fresh() -> None:
     assert run.flown[-1] == "inspect_area"
 
 
+def test_a_position_that_is_not_vouched_for_yet_is_waited_for() -> None:
+    """After a silence the estimator's word on a position comes behind the position: till then it is not known."""
+    run = falling(AfterSilence.CONTINUE)
+    be_silent(run, 45)
+    where = {slot: run.vehicle.values[slot] for slot in (POSITION_X, POSITION_Y, HEIGHT)}
+    run.vehicle.values.update(dict.fromkeys(where))
+    come_back(run, 0)
+    assert "fresh" not in run.events
+    assert run.flown[-1] == "hover", "not the landing that needs no position"
+    run.vehicle.values.update(where)
+    run.tick()
+    assert "fresh" in run.events
+    assert run.flown[-1] == "return_home"
+
+
+def test_a_position_that_was_not_known_before_is_not_waited_for() -> None:
+    run = falling(AfterSilence.CONTINUE)
+    run.vehicle.values.update(dict.fromkeys((POSITION_X, POSITION_Y)))
+    run.tick()
+    be_silent(run, 8)
+    come_back(run, 0)
+    assert "fresh" in run.events, "before its time was over"
+
+
 def test_a_signal_that_is_stale_a_moment_later_is_waited_for_too() -> None:
     """The link is back just before most signals are stale; nothing has come again when they are."""
     run = running(AfterSilence.CONTINUE)

@@ -17,10 +17,13 @@ from hypothesis import settings
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
-# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same examples everywhere;
-# `make soak` looks further, with new ones each time.
-settings.register_profile("test", deadline=None, derandomize=True, max_examples=100)
-settings.register_profile("soak", deadline=None, max_examples=20_000)
+# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same few examples everywhere;
+# `make soak` tries many in every property test, and new ones each time. A test that needs more or fewer than others
+# takes a share of the profile's: `@settings(max_examples=settings().max_examples * 2)`. `make mutate` needs
+# the same examples for each change, and enough of them to notice it.
+settings.register_profile("test", deadline=None, derandomize=True, max_examples=25)
+settings.register_profile("mutate", deadline=None, derandomize=True, max_examples=100)
+settings.register_profile("soak", deadline=None, max_examples=5_000)
 settings.load_profile("test")
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced

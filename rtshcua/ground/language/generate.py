@@ -7,6 +7,7 @@ grammar gives the same bytes whatever the order of Lark's sets.
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ GRAMMAR = Path(__file__).parents[3] / "grammar" / "rtshcua.lark"
 Row = dict[str, tuple[Any, Any]]
 
 
+@cache
 def lark(grammar: str) -> Lark:
     """Lark's own parser of the grammar: what the table is made of, and the oracle of the tests and the benchmark."""
     return Lark(grammar, start=START, parser="lalr", lexer="contextual", propagate_positions=True)

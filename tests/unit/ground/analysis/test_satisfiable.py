@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.decision import tree
@@ -132,7 +132,6 @@ POINTS = st.builds(
 )
 
 
-@settings(max_examples=settings().max_examples * 2)
 @given(st.lists(st.tuples(conditions(ALL), GOALS), min_size=1, max_size=3), st.lists(POINTS, min_size=1, max_size=20))
 def test_no_is_never_wrong_and_yes_is_confirmed(goals: list[tuple[tree.Node, int]], points: list[Environment]) -> None:
     answer = satisfiable(goals, SPACE)

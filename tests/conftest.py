@@ -28,13 +28,6 @@ settings.load_profile("test")
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
 COVERING = ("unit/decision", "unit/wire", "unit/evidence")
-#: and the attacks that reach what these do not: documents in flight, proofs in files, witnesses' heads
-COVERING_ATTACKS = (
-    "test_approval", "test_proof_", "test_recall", "test_receipt_", "test_redacted_", "test_replacement",
-    "test_time_of_day_", "test_witness_",
-)  # fmt: skip
-
-
 #: what they cover (`pyproject.toml` names it too)
 COVERED = ("rtshcua.decision", "rtshcua.evidence", "rtshcua.wire")
 
@@ -144,13 +137,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = CHECKOUT / "tests"
     places = spread({item.path for item in items}, tests / "integration")
     items.sort(key=lambda item: places[item.path])  # the same order in every process
-    covering = {
-        path: (path.is_relative_to(tests / "attacks") and path.name.startswith(COVERING_ATTACKS))
-        or any(path.is_relative_to(tests / folder) for folder in COVERING)
-        for path in {item.path for item in items}
-    }  # fmt: skip
+    covering = {path for path in places if any(path.is_relative_to(tests / folder) for folder in COVERING)}
     for item in items:
-        if not covering[item.path] or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+        if item.path not in covering or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
             item.add_marker("no_cover")
 
 

@@ -34,8 +34,8 @@ lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/rtshcua fmt --check skills policies missions examples
 	$(BIN)/rtshcua lint skills policies missions examples
 
-soak: setup ## run the long campaigns
-	$(BIN)/pytest -n $(JOBS) -m soak --hypothesis-profile soak
+soak: setup ## run the long campaigns, and every property test with many examples
+	$(BIN)/pytest -n $(JOBS) -m "soak or hypothesis" --hypothesis-profile soak
 
 fuzz: setup ## look for inputs that break parser, checker, compiler or boundary: MINUTES=10, TARGETS=... for some
 	@MINUTES="$(MINUTES)" .make/fuzz $(TARGETS)

@@ -17,21 +17,17 @@ from hypothesis import settings
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
-# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same examples everywhere;
-# `make soak` looks further, with new ones each time.
-settings.register_profile("test", deadline=None, derandomize=True, max_examples=100)
-settings.register_profile("soak", deadline=None, max_examples=20_000)
+# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same few examples everywhere;
+# `make soak` tries many in every property test, and new ones each time. A test that needs more or fewer than others
+# takes a share of the profile's: `@settings(max_examples=settings().max_examples * 2)`. `make mutate` needs
+# the same examples for each change, and enough of them to notice it.
+settings.register_profile("test", deadline=None, derandomize=True, max_examples=25)
+settings.register_profile("mutate", deadline=None, derandomize=True, max_examples=100)
+settings.register_profile("soak", deadline=None, max_examples=5_000)
 settings.load_profile("test")
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
 COVERING = ("unit/decision", "unit/wire", "unit/evidence")
-#: and the attacks that reach what these do not: documents in flight, proofs in files, witnesses' heads
-COVERING_ATTACKS = (
-    "test_approval", "test_proof_", "test_recall", "test_receipt_", "test_redacted_", "test_replacement",
-    "test_time_of_day_", "test_witness_",
-)  # fmt: skip
-
-
 #: what they cover (`pyproject.toml` names it too)
 COVERED = ("rtshcua.decision", "rtshcua.evidence", "rtshcua.wire")
 
@@ -141,13 +137,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = CHECKOUT / "tests"
     places = spread({item.path for item in items}, tests / "integration")
     items.sort(key=lambda item: places[item.path])  # the same order in every process
-    covering = {
-        path: (path.is_relative_to(tests / "attacks") and path.name.startswith(COVERING_ATTACKS))
-        or any(path.is_relative_to(tests / folder) for folder in COVERING)
-        for path in {item.path for item in items}
-    }  # fmt: skip
+    covering = {path for path in places if any(path.is_relative_to(tests / folder) for folder in COVERING)}
     for item in items:
-        if not covering[item.path] or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+        if item.path not in covering or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
             item.add_marker("no_cover")
 
 

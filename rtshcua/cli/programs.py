@@ -1,7 +1,6 @@
 """Several sources at once: which programs they make."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +8,6 @@ from rtshcua.cli.asked import SPECIFICATION as SPECIFICATION
 from rtshcua.cli.asked import roots
 from rtshcua.cli.asked import unfolded as unfolded
 from rtshcua.cli.sources import Reading, read_sources
-from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.paths import shown
 
 
@@ -31,9 +29,6 @@ def programs(files: Sequence[Path], further: Sequence[Path] = ()) -> tuple[Asked
     asked = frozenset(names)
     if files[0].suffix.lower() == SPECIFICATION:
         return (Asked(names[0], read_sources([*files, *further]), asked),)
-    remembering = lru_cache(maxsize=None)(parse)
-    made = [
-        Asked(name, read_sources([path, *further], remembering), asked) for name, path in zip(names, files, strict=True)
-    ]
+    made = [Asked(name, read_sources([path, *further]), asked) for name, path in zip(names, files, strict=True)]
     members = [frozenset(unit.file for unit in each.reading.program.units) for each in made]
     return tuple(made[number] for number in roots(names, members))

@@ -12,8 +12,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.ground.elaborate.settings import parse_settings
 from rtshcua.ground.language.faults import MAX_SIZE
-from rtshcua.ground.language.load import Program, load, remembered
-from rtshcua.ground.language.parse import Parsed
+from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.language.paths import shown
 from rtshcua.mavlink import dialect
 
@@ -25,7 +24,7 @@ class Reading(NamedTuple):
     pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]]
 
 
-def read_sources(paths: Sequence[Path], parse: Callable[[Source], Parsed] = remembered) -> Reading:
+def read_sources(paths: Sequence[Path]) -> Reading:
     """Sources and all that they import. The first may be a mission specification (.json), as an agent proposes it."""
     first, shipped = paths[0], str(library.root())
     rest = [str(path) for path in paths[1:]]
@@ -34,16 +33,16 @@ def read_sources(paths: Sequence[Path], parse: Callable[[Source], Parsed] = reme
 
         program, specification = load_specification(str(first), rest, _read, shipped, _listing, _pack)
         return Reading(program, specification.pointed)
-    return Reading(load([str(first), *rest], _read, shipped, _listing, parse, _pack), tuple)
+    return Reading(load([str(first), *rest], _read, shipped, _listing, packs=_pack), tuple)
 
 
-def read_text(name: str, text: str, parse: Callable[[Source], Parsed] = remembered) -> Reading:
+def read_text(name: str, text: str) -> Reading:
     """A source that is not written yet, as if it were in the file `name`, and all that it imports."""
 
     def read(path: str) -> bytes:
         return text.encode("utf-8") if path == shown(name) else _read(path)
 
-    return Reading(load([name], read, str(library.root()), _listing, parse, _pack), tuple)
+    return Reading(load([name], read, str(library.root()), _listing, packs=_pack), tuple)
 
 
 def compile_sources(

@@ -11,7 +11,7 @@ from fuzz.mutation.blanks import joined, sprinkled
 from fuzz.mutation.sentences import sentence
 from fuzz.targets.format import WIDTHS, check, mutated, pieces
 
-SLOW = settings(suppress_health_check=list(HealthCheck), deadline=None)
+SLOW = settings(suppress_health_check=list(HealthCheck))
 CHANCES = st.integers(0, (1 << 64) - 1)
 
 
@@ -22,13 +22,13 @@ def one(seed: int) -> bool:
 
 
 @given(CHANCES)
-@settings(SLOW, max_examples=40)
+@SLOW
 def test_sprinkled_sources(seed: int) -> None:
     one(seed)
 
 
 @given(CHANCES)
-@settings(SLOW, max_examples=40)
+@SLOW
 def test_sentences_of_the_grammar_on_lines_at_random(seed: int) -> None:
     of = Random(seed)
     check(sprinkled(joined(sentence(of), of), of), of.choice(WIDTHS))

@@ -17,7 +17,7 @@ from rtshcua.evidence import note
 from rtshcua.evidence.verify import verify
 
 LOGS = (tuple(sealed()), tuple(recovered()[0]), flight(), other_flight())
-SAMPLE, SHARDS, SHARD = 1_500, 40, 25_000
+SAMPLE, SHARDS, SHARD = 400, 40, 25_000
 LIMIT_S = 2.0  # of CPU, for one log
 LIMIT_KB = 200 << 10  # by which all of a shard may make the process larger
 

@@ -15,7 +15,7 @@ from fuzz.targets import check, condition, parse
 
 #: CPU seconds that nothing may take
 LIMIT = 10
-SLOW = settings(suppress_health_check=list(HealthCheck), deadline=None)
+SLOW = settings(suppress_health_check=list(HealthCheck))
 CHANCES = st.integers(0, (1 << 64) - 1)
 
 
@@ -42,19 +42,19 @@ def near_condition(seed: int) -> bytes:
 
 
 @given(CHANCES)
-@settings(SLOW, max_examples=40)
+@SLOW
 def test_near_valid_sources(seed: int) -> None:
     within_limit(check.one, near(seed))
 
 
 @given(CHANCES)
-@settings(SLOW, max_examples=100)
+@SLOW
 def test_near_valid_conditions(seed: int) -> None:
     within_limit(condition.one, near_condition(seed))
 
 
 @given(CHANCES)
-@settings(SLOW, max_examples=60)
+@SLOW
 def test_sentences_of_the_grammar(seed: int) -> None:
     text = sentence(Random(seed)).encode()
     within_limit(parse.one, text)

@@ -7,6 +7,8 @@ import pytest
 
 from reference import proof_mutations
 
+SAMPLE = 700
+
 
 def campaign(seed: int, count: int) -> Counter[str]:
     """How often what was said."""
@@ -19,9 +21,9 @@ def test_every_proof_that_is_begun_with_is_true() -> None:
 
 
 def test_some_tampered_proofs() -> None:
-    said = campaign(7, 2_500)
+    said = campaign(7, SAMPLE)
     assert {"proof/malformed", "proof/extra", "proof/record", "proof/path", "proof/signature", "proof/key"} <= set(said)
-    assert said["true"] < 400  # a mutation may hit nothing, or give another proof that is true
+    assert said["true"] < SAMPLE * 0.16  # a mutation may hit nothing, or give another proof that is true
 
 
 @pytest.mark.soak

@@ -1,13 +1,11 @@
 """Tests that are generated of a policy in a text, and what they notice when it changes."""
 
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
-from rtshcua.ground.language.parse import parse
 from rtshcua.ground.testing import case as cases
 from rtshcua.ground.testing.boundaries.generate import Generated, generate
 from rtshcua.ground.testing.boundaries.plan import Plan
@@ -17,7 +15,6 @@ from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 DIALECT = dialect.load()
-PARSE = lru_cache(maxsize=None)(parse)
 ENTRY = ((104_967, 113_402),)  # of bridge_a, local mm
 
 
@@ -30,7 +27,7 @@ def play(text: str, others: Mapping[str, str]) -> cases.Suite:
             return text.encode()
         return others[name].encode() if name in others else (CHECKOUT / path).read_bytes()
 
-    return suite(load(["tests.rts"], read, str(CHECKOUT), None, PARSE), DIALECT)
+    return suite(load(["tests.rts"], read, str(CHECKOUT)), DIALECT)
 
 
 def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) -> Generated:
@@ -39,7 +36,7 @@ def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) 
     def read(path: str) -> bytes:
         return text.encode() if Path(path).name == name else (CHECKOUT / path).read_bytes()
 
-    checked = examine_program(load([name], read, str(CHECKOUT), None, PARSE), DIALECT)
+    checked = examine_program(load([name], read, str(CHECKOUT)), DIALECT)
     (ground,) = checked.grounds
     plan = Plan(skills, (imports,), None, None, ENTRY)
     return generate(cases.Tested(ground.lowered, ground.prepared), plan, lambda draft: play(draft, {name: text}))

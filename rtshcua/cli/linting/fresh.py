@@ -1,7 +1,6 @@
 """Examines programs: loads, checks, proves, and looks for habits. Importing this brings the whole compiler."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 
 from rtshcua import library
@@ -10,18 +9,16 @@ from rtshcua.cli.linting.session import Session
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
-from rtshcua.ground.language.parse import parse
 from rtshcua.ground.lint.lint import lint
 from rtshcua.mavlink import dialect
 
 
 class Fresh:
-    """The programs of one run, which share the texts that were parsed."""
+    """The programs of one run."""
 
     def __init__(self, session: Session, asked: Mapping[str, int | None]) -> None:
         self._session = session
         self._asked = asked
-        self._parse = lru_cache(maxsize=None)(parse)
         self._programs: dict[Path, tuple[Program, _Reads]] = {}
 
     def loaded(self, path: Path, further: Sequence[Path]) -> Examined:
@@ -42,7 +39,7 @@ class Fresh:
         if found is None:
             reads = _Reads(self._session)
             names = [str(path), *map(str, further)]
-            program = load(names, reads.read, str(library.root()), listing, self._parse, reads.folder)
+            program = load(names, reads.read, str(library.root()), listing, packs=reads.folder)
             found = self._programs[path] = program, reads
         return found
 

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +18,6 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.checks.tests import MAX_CASES
 from rtshcua.ground.format.format import formatted
-from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.paths import on_a_shelf, shown
 from rtshcua.ground.testing.boundaries.generate import Generated
 from rtshcua.ground.testing.boundaries.generate import generate as generated
@@ -127,11 +125,10 @@ def _write(one: _Found, wanted: Wanted, findings: Findings, *, quiet: bool) -> E
         message = f"there is no nominal `{wanted.nominal}` under `{policy.name}`"
         return findings.refuse(ExitCode.USAGE, "usage", message)
     name = str(wanted.output or _IN_MEMORY)
-    remembering = lru_cache(maxsize=None)(parse)
     sources: dict[str, Source] = {}
 
     def play(text: str) -> Suite:
-        found = suite(read_text(name, text, remembering).program, dialect.load())
+        found = suite(read_text(name, text).program, dialect.load())
         sources.update(found.sources)
         return found
 

@@ -1,7 +1,6 @@
 """Runs the tests of files: each file is a program of its own with what it imports, and its own tests run."""
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +9,6 @@ from rtshcua.cli.sources import Reading, examine, read_sources
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.testing.case import Case, Suite, Tested
 from rtshcua.ground.testing.coverage.tally import Covered, Tally
@@ -40,8 +38,7 @@ class _Work(NamedTuple):
 
 def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool) -> Results:
     """Run the cases whose name has `chosen` in it, in whatever case; empty: all."""
-    remembering = lru_cache(maxsize=None)(parse)
-    work = [_Work(shown(str(path)), read_sources([path], remembering)) for path in files]
+    work = [_Work(shown(str(path)), read_sources([path])) for path in files]
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
     ran: list[Ran] = []

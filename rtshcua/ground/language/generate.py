@@ -7,6 +7,7 @@ grammar gives the same bytes whatever the order of Lark's sets.
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ GRAMMAR = Path(__file__).parents[3] / "grammar" / "rtshcua.lark"
 Row = dict[str, tuple[Any, Any]]
 
 
+@cache
 def lark(grammar: str) -> Lark:
     """Lark's own parser of the grammar: what the table is made of, and the oracle of the tests and the benchmark."""
     return Lark(grammar, start=START, parser="lalr", lexer="contextual", propagate_positions=True)
@@ -37,6 +39,7 @@ def generate(grammar: str) -> str:
     names = re.compile(next(t.pattern.to_regexp() for t in patterns if t.name == "NAME"))
     keys = fixed | {t.name: f"<{t.name}>" for t in patterns} | {"$END": "<END>"}
     rules = sorted(made.rules, key=lambda rule: (rule.origin.name, [symbol.name for symbol in rule.expansion]))
+    places = {rule: number for number, rule in enumerate(rules)}
     automaton = made.parser.parser._parse_table
     order = _reached(automaton.states, automaton.start_states[START])
     table = {
@@ -46,7 +49,7 @@ def generate(grammar: str) -> str:
         "marks": sorted((text for text in fixed.values() if not text.isalpha()), key=lambda text: (-len(text), text)),
         "words": {text: bool(names.fullmatch(text)) for text in sorted(fixed.values()) if text.isalpha()},
         "rules": [_rule(rule) for rule in rules],
-        "states": [_row(automaton.states[state], keys, order, rules) for state in order],
+        "states": [_row(automaton.states[state], keys, order, places) for state in order],
     }
     return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in table.items()) + "\n}\n"
 
@@ -67,10 +70,10 @@ def _reached(states: dict[int, Row], start: int) -> dict[int, int]:
     return order
 
 
-def _row(row: Row, keys: dict[str, str], order: dict[int, int], rules: list[Rule]) -> dict[str, int]:
+def _row(row: Row, keys: dict[str, str], order: dict[int, int], rules: dict[Rule, int]) -> dict[str, int]:
     """What a state does with each symbol: go to a state (0 or more), or reduce by rule `~n` (negative)."""
     return {
-        keys.get(symbol, f"<{symbol}>"): order[to] if action is Shift else ~rules.index(to)
+        keys.get(symbol, f"<{symbol}>"): order[to] if action is Shift else ~rules[to]
         for symbol, (action, to) in sorted(row.items())
     }
 

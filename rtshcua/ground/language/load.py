@@ -59,9 +59,9 @@ class Program:
     whole: bool = True
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def remembered(source: Source) -> Parsed:
-    """What `parse` makes of a text, which never changes: a process that loads often reads the library once."""
+    """What `parse` makes of a text, which never changes: programs that share files parse them once."""
     return parse(source)
 
 

@@ -9,7 +9,6 @@ from lark.grammar import Rule
 
 from fuzz import corpus
 from fuzz.mutation.words import TOKEN, changed
-from fuzz.world import CHECKOUT
 from rtshcua.ground.language import generate
 
 #: a derivation deeper than this takes the shortest way out
@@ -32,7 +31,7 @@ _LED = {
 @cache
 def grammar() -> Lark:
     """The grammar as Lark reads it."""
-    return generate.lark((CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8"))
+    return generate.lark(generate.GRAMMAR.read_text(encoding="utf-8"))
 
 
 @cache

@@ -5,6 +5,7 @@ import errno
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -34,6 +35,23 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def filled(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The archive of all runs."""
+    folder = tmp_path_factory.mktemp("filled")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv("RTSHCUA_DATA_DIR", str(folder))
+        assert archive("add", runs, *ROOT) == ExitCode.INCOMPLETE
+    return folder / "archive"
+
+
+@pytest.fixture
+def archived(filled: Path, tmp_path: Path) -> None:
+    """The archive of all runs, in this test's folder."""
+    shutil.copytree(filled, tmp_path / "archive")
+
+
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -41,11 +59,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def archive(*words: object) -> int:
     return app.main(["archive", *map(str, words)])
-
-
-def added(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    archive("add", runs, *ROOT)
-    capsys.readouterr()
 
 
 def as_json(capsys: pytest.CaptureFixture[str]) -> Any:
@@ -95,14 +108,14 @@ def test_audit_derives(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "decision/" in capsys.readouterr().out
 
 
-def test_verified_again(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    added(runs, capsys)
+@pytest.mark.usefixtures("archived")
+def test_verified_again(capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("verify", *ROOT, "--jobs", 1) == ExitCode.INCOMPLETE
     assert "6 logs, 6 of them verified now" in capsys.readouterr().out
 
 
-def test_logs_of_another_root_are_left_and_told(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    added(runs, capsys)
+@pytest.mark.usefixtures("archived")
+def test_logs_of_another_root_are_left_and_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("verify", "--root", "00" * 32) == ExitCode.UNTRUSTED
     out = capsys.readouterr().out
     assert out.startswith("0 logs, 0 of them verified now")
@@ -112,8 +125,8 @@ def test_logs_of_another_root_are_left_and_told(runs: Path, capsys: pytest.Captu
     assert len(as_json(capsys)) == 2
 
 
-def test_a_damaged_index_is_told_and_made_anew(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    added(runs, capsys)
+@pytest.mark.usefixtures("archived")
+def test_a_damaged_index_is_told_and_made_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "archive" / "index" / "logs.parquet").write_bytes(b"PAR1")
     assert archive("stats") == ExitCode.INPUT
     assert "help: `rtshcua archive verify --reindex`" in capsys.readouterr().err
@@ -145,8 +158,8 @@ def test_questions_that_ship_are_listed(capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().out.startswith("SELECT skill, COUNT(*)")
 
 
-def test_who_was_refused_what_when_under_which_version(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    added(runs, capsys)
+@pytest.mark.usefixtures("archived")
+def test_who_was_refused_what_when_under_which_version(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("--vehicle", "quad-07", "--skill", "goto", "--policy", "bridge_inspection@8", "--since", "2025-06-15")
     assert archive("query", "refused", *words, "--json") == ExitCode.OK
     rows = as_json(capsys)
@@ -163,8 +176,8 @@ def test_who_was_refused_what_when_under_which_version(runs: Path, capsys: pytes
     assert as_json(capsys) == []
 
 
-def test_a_select_of_ones_own(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    added(runs, capsys)
+@pytest.mark.usefixtures("archived")
+def test_a_select_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         archive("query", "--sql", "SELECT COUNT(*) AS n FROM decided", "--vehicle", "quad-08", "--json") == ExitCode.OK
     )
@@ -174,8 +187,8 @@ def test_a_select_of_ones_own(runs: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "is one SELECT" in capsys.readouterr().err
 
 
-def test_list_and_stats(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    added(runs, capsys)
+@pytest.mark.usefixtures("archived")
+def test_list_and_stats(capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("list", "--vehicle", "quad-08", "--json") == ExitCode.OK
     assert [row["policy_version"] for row in as_json(capsys)] == [7, 7, 8]
     assert archive("list") == ExitCode.OK
@@ -276,10 +289,10 @@ def test_text_of_the_world_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize("again", [(), ("--reindex",)])
+@pytest.mark.usefixtures("archived")
 def test_a_log_that_is_gone_fails_and_the_others_are_verified(
     again: tuple[str, ...], runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    added(runs, capsys)
     gone = tmp_path / "archive" / "logs"
     data = (runs / "quad-07-0" / "log.jsonl").read_bytes()
     (log,) = (path for path in gone.glob("*/*/log.jsonl") if path.read_bytes() == data)

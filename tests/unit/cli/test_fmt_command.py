@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -209,6 +210,15 @@ def test_a_file_that_may_not_be_written(here: Path, capsys: pytest.CaptureFixtur
     assert main(["fmt", "--check", "a.rts"]) == ExitCode.DIAGNOSTICS
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A shell starts a background job with SIGINT ignored, and its tests inherit that: here it interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_leaves_whole_files(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

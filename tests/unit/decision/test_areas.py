@@ -3,7 +3,7 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from reference import worlds
 from reference.naive_geometry import in_shape
@@ -87,7 +87,6 @@ def test_tables_of_a_zig_zag() -> None:
     assert not bands.clear(1, 500, 3, 500, (0, 0, 0, 0))
 
 
-@settings(max_examples=60)
 @given(worlds.CHANCES)
 def test_tables_of_a_zig_zag_give_the_same_answers(of: Random) -> None:
     slabs, zone = Slabs(LEGS), polygon(ZIG_ZAG)
@@ -97,7 +96,6 @@ def test_tables_of_a_zig_zag_give_the_same_answers(of: Random) -> None:
         assert slabs.contains(x, y) == in_shape((x, y), zone)
 
 
-@settings(max_examples=100)
 @given(worlds.CHANCES)
 def test_every_corner_and_its_neighbours(of: Random) -> None:
     made = rings(of)

@@ -2,7 +2,6 @@
 
 from random import Random
 
-import pytest
 from hypothesis import assume, given, settings
 
 from reference import flat_case as flat
@@ -16,7 +15,7 @@ from rtshcua.decision.prepare import prepare, prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.model.outcome import Outcome
 
-MANY = settings(max_examples=500)
+MANY = settings(max_examples=settings().max_examples * 4)
 
 
 def prepared(of: Random) -> tuple[PreparedPolicy, PreparedInvocation]:
@@ -27,7 +26,9 @@ def prepared(of: Random) -> tuple[PreparedPolicy, PreparedInvocation]:
     return policy, invocation
 
 
-def decides_the_same(of: Random) -> None:
+@MANY
+@given(worlds.CHANCES)
+def test_the_oracle_decides_the_same(of: Random) -> None:
     policy, invocation = prepared(of)
     state, now, context = (
         worlds.state(of, len(policy.monitors)),
@@ -43,23 +44,6 @@ def decides_the_same(of: Random) -> None:
     decision = decide(invocation, state, policy, context, now)
     assert (decision.outcome, decision.reason, decision.step) == (outcome, reason, step)
     assert (decision.link, decision.target) == (target or (None, None))
-
-
-def holds_what_is_decided(of: Random) -> None:
-    policy, invocation = prepared(of)
-    sets, context = worlds.sets(of, len(policy.monitors)), worlds.context(of, invocation.invocation)
-    answers = possible(invocation, sets, policy, context)
-    assert answers
-    for _ in range(8):
-        state, now = worlds.situation(of, sets, len(policy.monitors))
-        decision = decide(invocation, state, policy, context, now)
-        assert (decision.outcome, decision.reason, decision.target) in answers
-
-
-@MANY
-@given(worlds.CHANCES)
-def test_the_oracle_decides_the_same(of: Random) -> None:
-    decides_the_same(of)
 
 
 @MANY
@@ -87,7 +71,14 @@ def test_the_oracle_chooses_the_same_links(of: Random) -> None:
 @MANY
 @given(worlds.CHANCES)
 def test_what_is_possible_holds_what_is_decided(of: Random) -> None:
-    holds_what_is_decided(of)
+    policy, invocation = prepared(of)
+    sets, context = worlds.sets(of, len(policy.monitors)), worlds.context(of, invocation.invocation)
+    answers = possible(invocation, sets, policy, context)
+    assert answers
+    for _ in range(8):
+        state, now = worlds.situation(of, sets, len(policy.monitors))
+        decision = decide(invocation, state, policy, context, now)
+        assert (decision.outcome, decision.reason, decision.target) in answers
 
 
 @given(worlds.CHANCES)
@@ -103,17 +94,3 @@ def test_one_situation_has_one_answer(of: Random) -> None:
     assert is_situation(sets, policy)
     answers = possible(invocation, sets, policy, context)
     assert answers == {(decision.outcome, decision.reason, decision.target)}
-
-
-@pytest.mark.soak
-@settings(max_examples=20_000, derandomize=False)
-@given(worlds.CHANCES)
-def test_the_oracle_decides_the_same_for_long(of: Random) -> None:
-    decides_the_same(of)
-
-
-@pytest.mark.soak
-@settings(max_examples=20_000, derandomize=False)
-@given(worlds.CHANCES)
-def test_what_is_possible_holds_what_is_decided_for_long(of: Random) -> None:
-    holds_what_is_decided(of)

@@ -58,7 +58,7 @@ def compiled(condition: Condition, arguments: tuple[int, ...], sets: Sets) -> in
     return condition(environment(sets, POLICY, tuple(map(point, arguments)), PHASE))
 
 
-@settings(max_examples=500)
+@settings(max_examples=settings().max_examples * 4)
 @given(worlds.CHANCES)
 def test_a_single_situation(of: Random) -> None:
     code, arguments, condition = question(of)
@@ -66,7 +66,7 @@ def test_a_single_situation(of: Random) -> None:
     assert compiled(condition, arguments, situation(state, POLICY, now)) == naive(code, arguments, state, now)
 
 
-@settings(max_examples=500)
+@settings(max_examples=settings().max_examples * 4)
 @given(worlds.CHANCES)
 def test_sets_hold_the_truth_of_each_of_their_situations(of: Random) -> None:
     code, arguments, condition = question(of)

@@ -241,7 +241,7 @@ def test_the_nearest_that_a_change_allows(change: Change, value: Any, answer: in
     assert nearest_in(change, value) == answer
 
 
-@settings(max_examples=150)
+@settings(max_examples=settings().max_examples * 2)
 @given(worlds.CHANCES)
 def test_made_together_the_changes_help(of: Random) -> None:
     """Whatever the condition of the permit: an invocation changed as offered, in a state as offered, is permitted."""

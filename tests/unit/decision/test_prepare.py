@@ -217,6 +217,12 @@ def test_a_malformed_policy(policy: Policy, what: str) -> None:
     assert found.text.startswith(what)
 
 
+@pytest.mark.parametrize("part", ["require", "assume", "maintain"])
+def test_a_clause_left_out_of_a_part_of_a_contract_is_accepted(part: str) -> None:
+    left_out = tuple(LeftOut(skill, part, "x", 0, 0, 1) for skill in range(2))
+    assert not isinstance(prepare(lacking("a", left_out=left_out)), Refusal)
+
+
 def test_more_combinations_of_skills_and_roles_than_fit() -> None:
     wide = replace(P.rules[3], skills=tuple(range(250)), roles=tuple(range(64)))
     policy = replace(P, contracts=P.contracts[1:2] * 250, roles=("r",) * 64, rules=(wide,) * 17)
@@ -417,7 +423,7 @@ def damage(of: Random, struct: Any) -> Any:
         return struct
 
 
-@settings(max_examples=1_000)
+@settings(max_examples=settings().max_examples * 8)
 @given(worlds.CHANCES)
 def test_no_damage_makes_it_fail(of: Random) -> None:
     whole = of.choice([worlds.policy(of), flat.POLICY])

@@ -26,13 +26,13 @@ def agree(outlines: list[Ring]) -> bool:
     return answer
 
 
-@settings(max_examples=150)
+@settings(max_examples=settings().max_examples * 2)
 @given(worlds.CHANCES)
 def test_what_is_well_formed(of: Random) -> None:
     assert agree(rings(of))
 
 
-@settings(max_examples=400)
+@settings(max_examples=settings().max_examples * 4)
 @given(worlds.CHANCES)
 def test_one_thing_changed(of: Random) -> None:
     """A corner moved, a ring turned round, left out or moved: mostly wrong, sometimes still right."""
@@ -54,7 +54,7 @@ def test_one_thing_changed(of: Random) -> None:
     agree([tuple(ring) for ring in made])
 
 
-@settings(max_examples=600)
+@settings(max_examples=settings().max_examples * 4)
 @given(
     st.lists(
         st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=3, max_size=6).map(tuple),
@@ -104,7 +104,7 @@ def test_a_long_zig_zag_is_well_formed() -> None:
     assert problem(ring) is None
 
 
-@settings(max_examples=50)
+@settings(max_examples=settings().max_examples // 2)
 @given(worlds.CHANCES)
 def test_one_crossing_among_many_edges_is_found(of: Random) -> None:
     ring = list(zig_zag(100))

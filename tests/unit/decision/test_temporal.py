@@ -142,7 +142,7 @@ WINDOWS = st.sampled_from([1, 2, 50_000, HALF, S - 1, S, S + 1, 3 * S, 600 * S])
 TRACES = st.lists(st.tuples(STEPS, st.sampled_from("TTFU")), min_size=1, max_size=25)
 
 
-@settings(max_examples=1_000)
+@settings(max_examples=settings().max_examples * 8)
 @given(st.sampled_from([*MonitorKind]), WINDOWS, TRACES)
 def test_one_monitor_says_what_its_whole_history_says(kind: int, window_us: int, steps: list[tuple[int, str]]) -> None:
     monitor = Monitor(kind, 0 if kind in (RISING, FALLING) else window_us, CALM)
@@ -155,7 +155,7 @@ def test_one_monitor_says_what_its_whole_history_says(kind: int, window_us: int,
     assert run(policy_of(monitor), history) == expected
 
 
-@settings(max_examples=200)
+@settings(max_examples=settings().max_examples * 2)
 @given(worlds.CHANCES)
 def test_nested_monitors_of_random_worlds_say_what_their_histories_say(of: Random) -> None:
     policy = loaded(replace(flat.POLICY, monitors=worlds.monitors(of, 4)))

@@ -113,7 +113,7 @@ def test_examples(value, encoded):
     assert parse(bytes.fromhex(encoded)) == value
 
 
-@settings(max_examples=200)
+@settings(max_examples=settings().max_examples * 2)
 @given(VALUES)
 def test_bytes_are_those_of_the_naive_encoder_and_come_back(value):
     data = cbor.encode(value)
@@ -123,7 +123,7 @@ def test_bytes_are_those_of_the_naive_encoder_and_come_back(value):
     assert cbor2.loads(data, immutable=True) == value
 
 
-@settings(max_examples=200)
+@settings(max_examples=settings().max_examples * 2)
 @given(FLAT)
 def test_without_maps_cbor2_writes_the_same_bytes(value):
     data = cbor.encode(value)
@@ -135,7 +135,7 @@ def test_lists_are_arrays_too():
     assert cbor.encode([1, [2]]) == cbor.encode((1, (2,)))
 
 
-@settings(max_examples=200)
+@settings(max_examples=settings().max_examples * 2)
 @given(st.binary(max_size=60))
 @example(b"")
 def test_arbitrary_bytes_are_canonical_or_refused(data):
@@ -146,7 +146,7 @@ def test_arbitrary_bytes_are_canonical_or_refused(data):
         assert cbor.encode(found[0]) == data
 
 
-@settings(max_examples=200)
+@settings(max_examples=settings().max_examples * 2)
 @given(VALUES | FLAT, st.data())
 def test_the_fast_decoder_agrees_with_the_strict_one_on_damaged_bytes(value, data):
     encoded = bytearray(cbor.encode(value))

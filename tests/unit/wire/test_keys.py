@@ -191,7 +191,7 @@ def test_relabelling_a_file_makes_another_key():
     assert relabelled.kid != signing_key().kid
 
 
-@settings(max_examples=50)
+@settings(max_examples=settings().max_examples // 2)
 @given(st.integers(0, len(PLAIN) - 1), st.integers(0, 255))
 def test_any_changed_byte_gives_a_refusal_or_another_key(at, byte):
     damaged = PLAIN[:at] + bytes([byte]) + PLAIN[at + 1 :]

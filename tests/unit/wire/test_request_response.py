@@ -1,7 +1,9 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
+from reference import flat_case
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import artefact, cbor, names, permit, response
@@ -9,6 +11,19 @@ from rtshcua.wire.permit import SIZE, Permit
 from rtshcua.wire.response import Answer, Status
 
 ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE)
+
+
+@pytest.mark.parametrize("answer", [ANSWER, replace(ANSWER, permit=b"")])
+def test_an_answer_with_and_without_a_permit_is_read_back(answer: Answer) -> None:
+    assert response.decode(response.encode(answer)) == answer
+
+
+def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract() -> None:
+    policy, contract = flat_case.POLICY, flat_case.CONTRACTS[flat_case.INSPECT]
+    assert policy.airspace is not None
+    assert response.shared_clauses(policy) == (*policy.rules, policy.airspace)
+    assert response.shared_clauses(replace(policy, airspace=None)) == policy.rules
+    assert response.own_clauses(contract) == (*contract.require, *contract.assume, *contract.maintain)
 
 
 @given(

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
@@ -89,7 +89,6 @@ def test_findings_fail_by_their_severity() -> None:
 anything = st.text(max_size=20) | st.text("<>&'\"]\r\n\t\0\x1b\ufffe\ud800\U0010ffff -!", max_size=12)
 
 
-@settings(max_examples=60)
 @given(anything, anything, anything, anything, anything)
 def test_hostile_text_is_read_back_as_it_is_shown(name: str, file: str, why: str, kind: str, output: str) -> None:
     cases = (Outcome(name, file, 1, failure=why, kind=kind, output=output), Outcome(name, file, skipped=why))

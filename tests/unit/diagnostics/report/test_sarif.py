@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 import jsonschema
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics import codes
@@ -154,7 +154,6 @@ def test_a_finding_in_a_file_that_was_not_read_keeps_its_offsets() -> None:
 words = st.text(max_size=30)
 
 
-@settings(max_examples=60)
 @given(words, words, words.filter(bool), st.data())
 def test_hostile_text_stays_text(message: str, text: str, file: str, data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(text)))

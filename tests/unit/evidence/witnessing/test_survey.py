@@ -67,6 +67,26 @@ def test_nothing_follows_the_close(more: bytes) -> None:
     assert (found.slug, found.record) == ("close/junk-after", len(log.lines))
 
 
+def test_an_edited_field_of_a_signed_record_is_found(log: Log) -> None:
+    """The tree of the lines before it is as it was: the checkpoint is over the record too."""
+    edited = log.lines[4].replace(b'"epoch":0', b'"epoch":1')
+    assert edited != log.lines[4]
+    for line, slug in ((edited, "seal/self"), (log.lines[4].replace(b'"seq"', b'"sex"'), "record/malformed")):
+        found = survey([*log.lines[:4], line])
+        assert isinstance(found, Finding)
+        assert (found.slug, found.record) == (slug, 4)
+
+
+def test_a_checkpoint_that_follows_another_one_than_the_log_has_is_found() -> None:
+    log = Log()
+    log.recorder._head.after = bytes(32)
+    log.effects(2)
+    log.seal()
+    found = survey(log.lines)
+    assert isinstance(found, Finding)
+    assert (found.slug, found.record) == ("seal/after", 3)
+
+
 def test_what_is_no_log(log: Log) -> None:
     for lines, slug in (
         ([], "genesis/missing"),

@@ -181,6 +181,15 @@ def test_other_lines_below_the_checkpoint_that_was_cosigned(split_view: tuple[Lo
         assert "the tree begins with that of 6 records" in found.text
 
 
+def test_another_genesis_under_the_key_of_the_one_that_was_cosigned_is_a_contradiction() -> None:
+    log, other, witness = Log(), Log(bundle=b"another bundle"), Judge()
+    cosigned(witness, asked(log, None))
+    other.effects(2)
+    other.seal()
+    found = refused(witness, asked(other, 0))
+    assert (found.status, found.contradiction) == (CONFLICT, True)
+
+
 def test_rollback_and_truncation(split_view: tuple[Log, Log, Judge]) -> None:
     log, _, witness = split_view
     found = refused(witness, asked(log, 0, 4))

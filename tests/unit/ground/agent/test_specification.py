@@ -240,7 +240,7 @@ def test_what_json_writes_is_read_back(value: Any) -> None:
         assert json.loads(source.slice(span)) == part
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_mutated_specification_is_compiled_or_explained(
     good: dict[str, Any], compile_text: Compile, dumped: Dump, data: st.DataObject

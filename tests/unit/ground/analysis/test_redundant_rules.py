@@ -3,7 +3,7 @@
 from itertools import product
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.decision.evaluate import Environment
@@ -71,7 +71,6 @@ def outcome(prepared: PreparedPolicy, kept: list[int], at: Environment) -> str:
     return "defer" if (RuleKind.FORBID, UNKNOWN) in truths else "pass"
 
 
-@settings(max_examples=60, deadline=None)
 @given(RULES)
 def test_what_is_reported_decides_nothing(rules: list[str]) -> None:
     text = TEXT.format("\n  ".join(rules))

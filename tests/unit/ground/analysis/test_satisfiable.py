@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.decision import tree
@@ -111,7 +111,6 @@ def situations(numeric: bool, placed: bool) -> Iterator[Environment]:
             yield Environment(slots, [one, two, point(0), point(0), point(0)], ((0, 0),), (0, 0))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(conditions(NUMERIC), GOALS), min_size=1, max_size=3))
 def test_numbers_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]]) -> None:
     built = [(build(node, TABLES), wanted) for node, wanted in goals]
@@ -133,7 +132,6 @@ POINTS = st.builds(
 )
 
 
-@settings(max_examples=300, deadline=None)
 @given(st.lists(st.tuples(conditions(ALL), GOALS), min_size=1, max_size=3), st.lists(POINTS, min_size=1, max_size=20))
 def test_no_is_never_wrong_and_yes_is_confirmed(goals: list[tuple[tree.Node, int]], points: list[Environment]) -> None:
     answer = satisfiable(goals, SPACE)
@@ -146,7 +144,6 @@ def test_no_is_never_wrong_and_yes_is_confirmed(goals: list[tuple[tree.Node, int
             assert not all(build(node, TABLES)(at) & wanted for node, wanted in goals)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(conditions(st.builds(tree.Inside, st.integers(0, 3))), GOALS), min_size=1, max_size=3))
 def test_places_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]]) -> None:
     """At midnight; where no place of whole millimetres shows it and no relation rules it out, it stays open."""

@@ -204,6 +204,9 @@ def on_board(found: Lowered, history: Sequence[World], phase: str | None) -> str
     return LETTERS[found.condition(at)]
 
 
+SAMPLE = 400
+
+
 def campaign(seed: int, expressions: int) -> tuple[int, dict[str, int]]:
     """Compares that many expressions that fit on board, each in three histories; how many there were, and of what
     truths.
@@ -227,9 +230,9 @@ def campaign(seed: int, expressions: int) -> tuple[int, dict[str, int]]:
 
 
 def test_an_expression_means_on_board_what_it_says() -> None:
-    done, truths = campaign(1, 1_500)
-    assert done == 1_500
-    assert min(truths.values()) > 400, truths
+    done, truths = campaign(1, SAMPLE)
+    assert done == SAMPLE
+    assert min(truths.values()) > SAMPLE // 4, truths
 
 
 @pytest.mark.soak

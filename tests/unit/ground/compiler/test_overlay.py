@@ -155,7 +155,7 @@ def test_a_disc_lies_between_its_polygons(radius: int) -> None:
         assert all(far((0, 0), edge, room) for edge in edges(Outline(small)))
 
 
-@settings(max_examples=25)
+@settings(max_examples=settings().max_examples // 2)
 @given(areas(), st.sampled_from([20_000, 3_000, 200, -200, -1_500, -4_000]))
 def test_areas_grow_and_shrink_on_the_safe_side(shape: Cornered, margin: int) -> None:
     """Holes shrink when an area grows, and vanish; parts flow together, and fall apart."""
@@ -222,7 +222,7 @@ def rings(shape: Shape) -> tuple[Ring, ...]:
     return shape.rings
 
 
-@settings(max_examples=25)
+@settings(max_examples=settings().max_examples // 2)
 @given(areas(), st.one_of(areas(), LARGE.map(Outline)))
 def test_relations_of_areas_agree_with_shapely(one: Cornered, other: Cornered) -> None:
     a, b = Region(one, 0, 10), Region(other, 0, 10)

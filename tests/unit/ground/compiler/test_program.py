@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rtshcua.decision.prepare import prepare, prepare_mission
@@ -253,7 +253,6 @@ def mutations(draw: st.DrawFn) -> tuple[str, str]:
     return name, " ".join(words)
 
 
-@settings(max_examples=60)
 @given(mutations())
 @example(("lib:policies/site.rts", ""))
 def test_a_mutated_source_is_compiled_or_explained(mutation: tuple[str, str]) -> None:

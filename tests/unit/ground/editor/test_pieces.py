@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.span import Source
@@ -35,7 +35,6 @@ def agree(old: str, *texts: str) -> None:
         assert now.parsed == whole
 
 
-@settings(max_examples=settings().max_examples * 3 // 4)
 @given(
     st.sampled_from([TEXT, TWIN, TEXT[:900], TWIN[:1500]]),
     st.lists(st.tuples(st.integers(0, 40_000), st.integers(0, 120), st.sampled_from(PARTS)), min_size=1, max_size=4),

@@ -91,7 +91,7 @@ NAMES = st.one_of(
 )
 
 
-@settings(max_examples=settings().max_examples // 8)
+@settings(max_examples=settings().max_examples // 4)
 @given(st.data(), st.sampled_from(FILES), NAMES)
 def test_what_is_renamed_means_the_same(make_lake: Desk, data: st.DataObject, file: str, name: str) -> None:
     view = make_lake.view(DIP)

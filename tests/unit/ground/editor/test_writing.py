@@ -90,7 +90,7 @@ def test_proposals(desk: Desk, before: str, some: list[str], none: list[str]) ->
     assert [each for each in none if each in found] == []
 
 
-@settings(max_examples=settings().max_examples // 3)
+@settings(max_examples=settings().max_examples // 2)
 @given(st.integers(0, 10_000), st.integers(0, 400))
 def test_any_place_has_an_answer(make_lake: Desk, start: int, cut_off: int) -> None:
     """Also in the middle of anything: no place makes it fail, and what is proposed begins where the word does."""

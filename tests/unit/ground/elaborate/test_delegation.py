@@ -139,7 +139,7 @@ def matches(rules: list[Said], kind: str, skill: str, role: str, source: str, he
     )
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=settings().max_examples * 2, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(rule, min_size=1, max_size=5), st.lists(delegation, min_size=1, max_size=4))
 def test_the_grantee_may_what_the_grantor_may_and_no_more(rules: list[Line], delegations: list[Line]) -> None:
     lines = [*rules, *delegations]

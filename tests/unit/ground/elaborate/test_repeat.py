@@ -47,7 +47,7 @@ def mission_of(body: str) -> tuple[MissionDecl, Report]:
     return parsed.unit.missions[0], Report({"x.rts": source})
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=settings().max_examples * 2, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(items, max_size=4))
 def test_it_is_unrolled_in_order(phase: list[Any]) -> None:
     mission, report = mission_of(" ".join(map(text_of, phase)))

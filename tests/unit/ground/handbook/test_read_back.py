@@ -148,7 +148,7 @@ def atoms_of(names: Vocabulary) -> frozenset[str]:
     return frozenset(told_condition(condition(text), names) for text in ATOMS)
 
 
-@settings(max_examples=150)
+@settings(max_examples=settings().max_examples * 2)
 @given(text=texts)
 def test_a_condition_reads_back_as_itself(text: str) -> None:
     one = condition(text)

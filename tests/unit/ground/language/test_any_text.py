@@ -1,13 +1,12 @@
 """Whatever the text, parsing ends with findings, never with an exception; and it agrees with Lark on what fits."""
 
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lark import Lark, UnexpectedInput
+from lark import UnexpectedInput
 
 from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.span import Source
@@ -18,16 +17,12 @@ from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.table import table
 
 CHECKOUT = Path(__file__).resolve().parents[4]
+GRAMMAR = generate.GRAMMAR.read_text(encoding="utf-8")
 SHIPPED = [
     path.read_text(encoding="utf-8")
     for folder in ("skills", "policies", "missions")
     for path in sorted((CHECKOUT / folder).glob("*.rts"))
 ] + [Path(__file__).with_name("forms.rts").read_text(encoding="utf-8")]
-
-
-@cache
-def lark() -> Lark:
-    return generate.lark((CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8"))
 
 
 LED = [
@@ -76,7 +71,7 @@ def fits(text: str) -> bool:
 
 def as_lark_reads_it(text: str) -> str | None:
     """The tokens that Lark finds, with spaces between them; None where Lark finds an error."""
-    parser = lark().parse_interactive(text)
+    parser = generate.lark(GRAMMAR).parse_interactive(text)
     try:
         tokens = parser.exhaust_lexer()
         parser.feed_eof()
@@ -140,34 +135,26 @@ def test_too_large() -> None:
     assert parse(Source("x", " " * MAX_SIZE)).diagnostics == ()
 
 
-@pytest.mark.parametrize(
-    "part",
-    [
-        "(",
-        "{",
-        "}",
-        '"',
-        '"\\"',
-        "/*",
-        "//",
-        "a",
-        "a.",
-        "1",
-        "1_",
-        ".",
-        "not ",
-        "\n",
-        "\r",
-        "\t",
-        ")\n",
-        "1 m\n",
-        "é",
-        "zone ",
-        "skill a() { x } ",
-    ],
-)
-@pytest.mark.parametrize(
-    "before", ["", "skill s() {\nrequire ", "zone z = circle(", 'import "', "mission m under p@1 on v { phase a {"]
-)
-def test_long_runs_of_one_thing(before: str, part: str) -> None:
+PARTS = (
+    "(", "{", "}", '"', '"\\"', "/*", "//", "a", "a.", "1", "1_", ".", "not ", "\n", "\r", "\t", ")\n", "1 m\n", "é",
+    "zone ", "skill a() { x } ",
+)  # fmt: skip
+BEGINNINGS = ("", "skill s() {\nrequire ", "zone z = circle(", 'import "', "mission m under p@1 on v { phase a {")
+#: each part in one place; a part is a hazard by itself, whatever stands before it
+ONE_PLACE = [(BEGINNINGS[number % len(BEGINNINGS)], part) for number, part in enumerate(PARTS)]
+
+
+def long_run(before: str, part: str) -> None:
     sound(before + part * (200_000 // len(part)))
+
+
+@pytest.mark.parametrize(("before", "part"), ONE_PLACE)
+def test_a_long_run_of_one_thing_ends_with_findings(before: str, part: str) -> None:
+    long_run(before, part)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("before", BEGINNINGS)
+def test_long_runs_in_every_place_end_with_findings(before: str, part: str) -> None:
+    long_run(before, part)

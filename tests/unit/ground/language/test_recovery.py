@@ -163,7 +163,7 @@ def test_every_kind_of_nesting_has_the_limit(text: str, before: str, after: str)
 
     assert runs(MAX_DEPTH // 2 - 1)
     assert not runs(MAX_DEPTH + 1)
-    assert not runs(MAX_DEPTH * 100)
+    assert not runs(MAX_DEPTH * 20)  # beyond what Python's own stack would take
 
 
 def test_a_text_with_very_many_errors_ends_early() -> None:

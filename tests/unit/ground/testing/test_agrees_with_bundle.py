@@ -198,7 +198,7 @@ test "it" {{
     return found.outcome.name, found.reason.value, flies
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=settings().max_examples // 2)
 @given(asked())
 def test_a_case_is_decided_as_the_step_of_a_bundle_on_board(asked: Asked) -> None:
     assert as_tested(asked) == on_board(asked)

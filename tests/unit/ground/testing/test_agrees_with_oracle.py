@@ -169,7 +169,7 @@ def _answers(policy: Policy, granted: int, at_us: int) -> tuple[Approval, ...]:
     return (Approval(rule, role, granted, at_us),)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=settings().max_examples // 2)
 @given(asked(), st.lists(rows(), min_size=1, max_size=12))
 def test_decided_as_the_oracle_decides(asked: Asked, rows: list[Row]) -> None:
     columns = ", ".join(SIGNALS)

@@ -89,7 +89,7 @@ def test_what_these_tests_reach() -> None:
     assert AS_WRITTEN.decisions == 5
 
 
-@settings(max_examples=25)
+@settings(max_examples=settings().max_examples // 2)
 @given(st.randoms(use_true_random=False))
 def test_formatting_and_comments_change_nothing(chance: random.Random) -> None:
     text = "".join(token + chance.choice(BREAKS) for token in TOKENS.findall(TEXT))

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -150,7 +150,6 @@ def flips(part: Part, here: Scene) -> Iterator[frozenset[int]]:
             yield frozenset({value, value + 1})
 
 
-@settings(max_examples=60)
 @given(conditions(), st.integers(LOW, HIGH))
 def test_every_place_where_a_condition_turns_is_found(code: flat.Code, wind: int) -> None:
     clause = flat.clause("of the wind", code)

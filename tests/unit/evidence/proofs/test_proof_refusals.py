@@ -1,0 +1,244 @@
+"""Proofs and receipts with one part changed: each is refused for its reason."""
+
+from base64 import b64encode
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from reference.proof_parts import (
+    LOG,
+    OTHER,
+    THIEF,
+    Parts,
+    changed_root,
+    consistency,
+    disclosure,
+    inclusion,
+    origin,
+    receipt,
+    signed,
+    slug_of_receipt,
+)
+from reference.sealed_log import LOG_KEY, PIN
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.proofs.check import check_proof
+from rtshcua.evidence.proofs.file import MAX_PROOF
+from rtshcua.wire import cbor
+from virtual import case
+
+Change = Callable[[Parts], None]
+
+
+def body(note: str) -> str:
+    return note.rpartition("\n\n")[0] + "\n"
+
+
+def put(name: str, value: Any) -> Change:
+    """Sets a part that stands in the extra."""
+
+    def change(parts: Parts) -> None:
+        parts.extra[name] = value
+
+    return change
+
+
+def number(text: str) -> Change:
+    def change(parts: Parts) -> None:
+        parts.number = text
+
+    return change
+
+
+def path(made: Callable[[list[str]], list[str]]) -> Change:
+    def change(parts: Parts) -> None:
+        parts.path = made(parts.path)
+
+    return change
+
+
+def note(made: Callable[[str], str]) -> Change:
+    def change(parts: Parts) -> None:
+        parts.note = made(parts.note)
+
+    return change
+
+
+def chain(made: Callable[[tuple[str, ...], Parts], tuple[str, ...]]) -> Change:
+    def change(parts: Parts) -> None:
+        parts.extra["chain"] = made(parts.extra["chain"], parts)
+
+    return change
+
+
+def fields(made: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> Change:
+    def change(parts: Parts) -> None:
+        parts.extra["fields"] = made(parts.extra["fields"])
+
+    return change
+
+
+def valued(key: str, value: bytes) -> Change:
+    """The value that is shown of a field."""
+    return fields(lambda all: tuple((k, (v[0], value)) if k == key else (k, v) for k, v in all))
+
+
+def named(name: str) -> Change:
+    """The first checkpoint is in the name of another log."""
+
+    def made(_: tuple[str, ...], parts: Parts) -> tuple[str, ...]:
+        return (signed("\n".join([name, *parts.note.split("\n")[1:5], ""]), LOG_KEY, name),)
+
+    return chain(made)
+
+
+def renamed(_: tuple[str, ...], parts: Parts) -> tuple[str, ...]:
+    """The log key vouches for another log in the name of this one."""
+    first = parts.extra["chain"][0]
+    mixed = body(first).replace(origin(LOG), origin(OTHER)).replace("\n0\n", "\n1\n")
+    return (first, signed(mixed, LOG_KEY, origin(LOG)))
+
+
+INCLUSION: list[tuple[Change, str]] = [
+    (put("record", inclusion(4).extra["record"]), "proof/record"),
+    (put("record", inclusion(3).extra["record"].replace(b'"token":3', b'"token":4')), "proof/path"),
+    (put("record", inclusion(3).extra["record"][:-1]), "proof/record"),
+    (put("signed", b"{}\n"), "proof/record"),
+    (put("signed", inclusion(3).extra["record"]), "proof/signed"),
+    (put("signed", inclusion(3).extra["signed"].replace(b'"epoch":0', b'"epoch":1')), "proof/signed"),
+    (put("root", b"junk"), "trust/root-malformed"),
+    (put("root", changed_root(vehicles=("quad-08",))), "trust/log-key"),
+    (put("chain", ()), "trust/log-key"),
+    (number("index x"), "proof/malformed"),
+    (number("index 4"), "proof/record"),
+    (path(lambda all: [b64encode(bytes(31)).decode(), *all[1:]]), "proof/malformed"),
+    (path(lambda all: all[1:]), "proof/path"),
+    (note(body), "proof/note"),
+    (note(lambda text: signed(body(text), LOG_KEY, origin(LOG))), "proof/signed"),
+    (note(lambda text: text + "\u2014 witness AAAA\n"), "proof/note"),
+    (note(lambda text: text.replace("rtshcua", "other", 1)), "proof/signature"),
+    (chain(lambda all, _: (signed(body(all[0]), THIEF, origin(LOG)),)), "trust/log-key"),
+    (chain(lambda all, _: (*all, all[0])), "proof/chain"),
+    (chain(lambda *_: (*inclusion(18).extra["chain"], inclusion(18).note)), "proof/chain"),
+    (chain(renamed), "proof/chain"),
+    (chain(lambda all, _: ("junk", *all)), "proof/note"),
+    (named("rtshcua/log/x"), "proof/origin"),
+    (named("rtshcua/log/x+y/z"), "proof/origin"),
+]
+
+
+@pytest.mark.parametrize(("change", "slug"), INCLUSION)
+def test_a_changed_proof_of_inclusion_is_refused(change: Change, slug: str) -> None:
+    parts = inclusion(3)
+    assert parts.slug() == "believed"
+    change(parts)
+    assert parts.slug() == slug
+
+
+def test_a_checkpoint_again_in_the_chain_is_refused() -> None:
+    parts = inclusion(14)
+    first, *rest = parts.extra["chain"]
+    parts.extra["chain"] = (first, first, *rest)
+    assert parts.slug() == "proof/chain"
+
+
+@pytest.mark.parametrize(
+    ("change", "slug"),
+    [
+        (number("old 7"), "proof/chain"),
+        (path(lambda all: all[1:]), "proof/consistency"),
+        (put("record", LOG.lines[3]), "proof/extra"),
+    ],
+)
+def test_a_changed_proof_of_consistency_is_refused(change: Change, slug: str) -> None:
+    parts = consistency(6, 12)
+    assert parts.slug() == "believed"
+    change(parts)
+    assert parts.slug() == slug
+
+
+@pytest.mark.parametrize(
+    ("change", "slug"),
+    [
+        (put("signed", inclusion(3).extra["signed"]), "proof/signed"),
+        (fields(lambda all: ((all[0][0], (b"salt", b"value")), *all[1:])), "proof/fields"),
+        (fields(lambda all: tuple((k, (bytes(31),)) if k == "detail" else (k, v) for k, v in all)), "proof/fields"),
+        (fields(lambda all: all[1:]), "proof/fields"),
+        (valued("type", b"{"), "proof/fields"),
+        (valued("type", b"7"), "proof/fields"),
+        (valued("seq", b"4"), "proof/fields"),
+        (valued("seq", b"true"), "proof/fields"),
+        (valued("utc_us", b"1"), "proof/path"),
+    ],
+)
+def test_a_changed_record_in_part_is_refused(change: Change, slug: str) -> None:
+    parts = disclosure(3, "detail")
+    assert parts.slug() == "believed"
+    change(parts)
+    assert parts.slug() == slug
+
+
+def test_fields_under_a_checkpoint_without_a_root_for_them_are_refused() -> None:
+    parts, other = disclosure(3, "detail"), inclusion(3)
+    for name in ("signed", "chain"):
+        parts.extra[name] = other.extra[name]
+    parts.note = other.note
+    assert parts.slug() == "proof/disclosure"
+
+
+def test_the_record_that_carries_the_checkpoint_is_only_proven_in_its_own_place() -> None:
+    parts = inclusion(18)
+    assert parts.slug() == "believed"
+    parts.number = "index 17"
+    assert parts.slug() == "proof/record"
+
+
+@pytest.mark.parametrize(
+    ("data", "slug"),
+    [
+        (bytes(MAX_PROOF + 1), "proof/too-long"),
+        (b"\xff", "proof/malformed"),
+        (b"junk", "proof/malformed"),
+        (b"c2sp.org/tlog-proof@v1\n\n", "proof/malformed"),
+        (b"c2sp.org/tlog-proof@v1\nextra \nindex 0\n\n", "proof/extra"),
+    ],
+)
+def test_a_file_that_is_no_proof_is_refused(data: bytes, slug: str) -> None:
+    found = check_proof(data, PIN)
+    assert isinstance(found, Flaw)
+    assert found.slug == slug
+
+
+def test_what_a_proof_carries_must_be_in_its_one_form() -> None:
+    parts = inclusion(3)
+    extra = b64encode(cbor.encode(("rtshcua/proof", 1, {**parts.extra, "fields": ()}))).decode()
+    lines = parts.together().decode().split("\n")
+    found = check_proof("\n".join([lines[0], f"extra {extra}", *lines[2:]]).encode(), PIN)
+    assert isinstance(found, Flaw)
+    assert found.slug == "proof/extra"
+
+
+@pytest.mark.parametrize(
+    ("changed", "slug"),
+    [
+        ({"signature": 7}, "proof/malformed"),
+        ({"protected": {395: 2}}, "proof/malformed"),
+        ({"path": ()}, "proof/malformed"),
+        ({"unprotected": {"more": 1}}, "proof/malformed"),
+        ({"unprotected": {"rtshcua/record": b"{}"}}, "proof/record"),
+        ({"unprotected": {"rtshcua/root": b"junk"}}, "trust/root-malformed"),
+        ({"unprotected": {"rtshcua/root": changed_root(expires_us=case.flat.ISSUED)}}, "trust/log-key"),
+        ({"protected": {4: THIEF.kid}, "sign_it": True}, "trust/log-key"),
+        ({"protected": {15: {1: "elsewhere", 2: "6"}}, "sign_it": True}, "proof/origin"),
+        ({"number": 2}, "proof/path"),
+        ({"signature": bytes(64)}, "proof/signature"),
+        ({"sign_it": True}, "believed"),
+    ],
+)
+def test_a_changed_receipt_is_refused(changed: dict[str, Any], slug: str) -> None:
+    assert slug_of_receipt(receipt(**changed)) == slug
+
+
+@pytest.mark.parametrize("data", [b"", b"\xd2", b"\xd2\x80", b"junk"])
+def test_bytes_that_are_no_receipt_are_refused(data: bytes) -> None:
+    assert slug_of_receipt(data) == "proof/malformed"

@@ -21,7 +21,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.wire.keys import Duty
 from virtual import case
 
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0
 #: Faster, and what must leave within 1.5 s of flight must leave within less than a busy machine may hold a process up.
 SPEED = 5
 COMMAND = [sys.executable, "-m", "rtshcua.cli.app"]

@@ -12,7 +12,7 @@ The largest one: 21 octets around the body, 79 before the state, 12 for each of 
 
 from functools import cache
 from struct import Struct
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -26,6 +26,15 @@ from rtshcua.wire.digest import DIGEST_BYTES
 STEP, FALLBACK_LINK, CONTINGENCY_LINK = 0, 1, 2
 #: the `link` that stands for the target of a degrade rule
 DEGRADE: Final = -1
+
+
+class Ref(NamedTuple):
+    """What a request, a permit, a command or a record is about: `link` is -1 for a step, `step` for the contingency."""
+
+    kind: int
+    step: int
+    link: int
+
 
 #: the largest request in octets
 MAX_SIZE: Final = 1023
@@ -55,6 +64,11 @@ class Request(msgspec.Struct, frozen=True):
     released_us: int
     phase: int
     remaining_us: int
+
+    @property
+    def ref(self) -> Ref:
+        """What it asks for."""
+        return Ref(self.kind, self.step, self.link)
 
 
 def encode(request: Request) -> bytes:

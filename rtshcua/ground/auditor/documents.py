@@ -2,11 +2,10 @@
 
 from typing import Final
 
+from rtshcua.decision.session import Session
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Effect
 from rtshcua.evidence.rooted import octets
-from rtshcua.ground.auditor.derive import Deriver
-from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.receipt import APPROVAL, RECALL, REPLACEMENT
 
@@ -16,9 +15,8 @@ _KINDS: Final = {"approval": APPROVAL, "recall": RECALL, "replacement": REPLACEM
 class Documents:
     """Follows the documents that a log says were accepted. `counts` has how many there were of each kind."""
 
-    def __init__(self, basis: Basis, deriver: Deriver) -> None:
-        self._basis = basis
-        self._deriver = deriver
+    def __init__(self, session: Session) -> None:
+        self._session = session
         self.counts = dict.fromkeys(_KINDS, 0)
 
     def check(self, record: Effect) -> Flaw | None:
@@ -30,13 +28,10 @@ class Documents:
         if document is None:
             return Flaw("document/base64", f"the {record.event} is not canonical base64")
         now = Now(record.at_us, record.utc_us, record.utc_error_us)
-        deriver = self._deriver
-        receipt = self._basis.in_force.take(document, now, decided=deriver.decided, released=deriver.released)
+        receipt = self._session.take(document, now)
         if not receipt.accepted:
             return Flaw(f"document/{receipt.slug}", f"the {record.event} was not to be trusted: {receipt.text}")
         if receipt.kind != kind or receipt.step != record.step:
             return Flaw("document/other", f"the document is not the {record.event} that its record says it is")
-        if kind == REPLACEMENT:
-            deriver.replaced(receipt.step)
         self.counts[record.event] += 1
         return None

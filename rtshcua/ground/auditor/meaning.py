@@ -1,13 +1,16 @@
 """What the records of a log mean together: each decision follows from its inputs, and each command from a record."""
 
+from rtshcua.decision.session import Session
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import AnyRecord, Decision, Effect
 from rtshcua.ground.auditor.cover import Cover
-from rtshcua.ground.auditor.derive import UNENFORCED, Deriver
+from rtshcua.ground.auditor.derive import Deriver
 from rtshcua.ground.auditor.documents import Documents
 from rtshcua.ground.auditor.frames import Frames
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.ground.auditor.turns import Turns
+
+UNENFORCED = "none"
 
 
 class Meaning:
@@ -19,8 +22,9 @@ class Meaning:
         if frames is not None:
             frames.begin(basis)
         self.derived = 0
-        self._deriver = Deriver(basis)
-        self._documents = Documents(basis, self._deriver)
+        session = Session(basis.policy, basis.in_force, enforced=mode != UNENFORCED)
+        self._deriver = Deriver(basis, session)
+        self._documents = Documents(session)
         self._cover = Cover()
         self._turns = Turns(basis)
 

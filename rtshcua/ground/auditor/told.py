@@ -2,8 +2,7 @@
 
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.records import Genesis
-from rtshcua.ground.auditor.derive import UNENFORCED
-from rtshcua.ground.auditor.meaning import Meaning
+from rtshcua.ground.auditor.meaning import UNENFORCED, Meaning
 from rtshcua.ground.auditor.trust import Basis
 
 Claims = tuple[tuple[Claim, ...], tuple[Claim, ...]]

@@ -49,6 +49,7 @@ def test_the_largest_request_fits() -> None:
     state = State((MAX_VALUE,) * MAX_SLOTS, (MAX_AGE_US,) * MAX_SLOTS, (4,) * MAX_MONITORS)
     now = Now(MAX_VALUE, MAX_VALUE, MAX_VALUE)
     largest = Request(2, (1 << 15) - 1, (1 << 15) - 1, bytes(32), now, state, MAX_VALUE, (1 << 15) - 1, MAX_VALUE)
+    assert largest.ref == (2, (1 << 15) - 1, (1 << 15) - 1)
     assert len(request.encode(largest)) == 21 + 79 + 12 * MAX_SLOTS + MAX_MONITORS <= MAX_SIZE
 
 

@@ -1,0 +1,297 @@
+"""The rules of a session, by hand: whose turn it is, which ids are used up, and what is decided about links."""
+
+from dataclasses import replace as with_fields
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from reference import documents, world
+from reference import flat_case as flat
+from reference.flat_case import BATTERY, FIX, HOME, HOVER, LAND, NOW, S
+from rtshcua.decision.in_force import InForce
+from rtshcua.decision.session import LinkDecision, Session
+from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.wire.permit import LINK_VALID_US
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
+from rtshcua.wire.response import Status
+
+LOADED = world.loaded()
+ALLOW, DENY, DEFER, FALLBACK = Outcome.ALLOW, Outcome.DENY, Outcome.DEFER, Outcome.FALLBACK
+UNKNOWN_STEP, NOT_CURRENT = Status.UNKNOWN_STEP, Status.NOT_CURRENT
+DEGRADE = -1
+AT_US = NOW.monotonic_us
+
+
+class Asked:
+    """A session, asked by hand. Each step is released when it is asked for, at the bridge."""
+
+    def __init__(self, of: Loaded = LOADED, *, enforced: bool = True) -> None:
+        self.in_force = InForce(of.bundle, of.policy, of.invocations, world.ROOT, world.VEHICLE)
+        self.session = Session(of.policy, self.in_force, enforced=enforced)
+
+    def step(self, step: int, values: dict[int, int | None] | None = None, **context: Any) -> Outcome:
+        assert self.session.refusal(Ref(STEP, step, -1)) is None
+        invocation = self.in_force.invocations[step].invocation
+        told = {
+            "consumed": self.session.consumed(step),
+            "phase": invocation.phase,
+            "approvals": self.in_force.approvals(invocation, NOW),
+        }
+        given = flat.context(invocation, **(told | context))
+        return self.session.decide_step(step, at(step, values), given, NOW).outcome
+
+    def link(
+        self, ref: Ref, values: dict[int, int | None] | None = None, *, binding: bytes | None = None
+    ) -> LinkDecision:
+        assert self.session.refusal(ref) is None
+        if binding is None:
+            contingency = ref.kind == CONTINGENCY_LINK
+            bundle, invocations = self.in_force.bundle, self.in_force.invocations
+            binding = bundle.policy_digest if contingency else invocations[ref.step].invocation.binding
+        return self.session.decide_link(ref, binding, flat.state(values), NOW)
+
+    def turns(self) -> list[int]:
+        """The steps that may be asked for."""
+        steps = range(-2, len(self.in_force.invocations) + 2)
+        return [step for step in steps if self.session.refusal(Ref(STEP, step, -1)) is None]
+
+    def used(self) -> list[int]:
+        """The steps whose ids are used up."""
+        return [step for step in range(len(self.in_force.invocations)) if self.session.consumed(step)]
+
+
+def at(step: int, values: dict[int, int | None] | None) -> State:
+    """Where an honest runtime asks for a step: on the ground for the first, else at the bridge."""
+    ground: dict[int, int | None] = {flat.HEIGHT: 0, flat.POSITION_X: 0, flat.POSITION_Y: 0} if step == 0 else {}
+    return flat.state(ground | (values or {}))
+
+
+def with_mission(on_inadmissible: int) -> Loaded:
+    """The mission, each step of which does this when it is not admitted."""
+    steps = tuple(replace(each, on_inadmissible=on_inadmissible) for each in flat.INVOCATIONS)
+    return world.loaded(mission=replace(flat.MISSION, invocations=steps))
+
+
+# ------------------------------------------------------------------------------------------- whose turn it is
+
+
+@pytest.mark.parametrize(
+    ("asked", "turns", "used", "current"),
+    [
+        ((), [0], [], 0),
+        ((0,), [0, 1], [0], 0),
+        ((0, 1), [0, 1, 2], [0, 1], 1),
+        ((0, 0), [0, 1], [0], 0),  # a replay moves nothing
+        ((0, 1, 0), [0, 1, 2], [0, 1], 1),
+    ],
+)
+def test_steps_have_their_turns_in_order(
+    asked: tuple[int, ...], turns: list[int], used: list[int], current: int
+) -> None:
+    of = Asked()
+    for step in asked:
+        of.step(step)
+    assert (of.turns(), of.used(), of.session.current) == (turns, used, current)
+
+
+BINDING, EMPTY = {"binding": bytes(32)}, {BATTERY: None}
+LATE = {"released_us": AT_US - flat.INVOCATIONS[0].contract.deadline_us - S}
+
+
+@pytest.mark.parametrize(
+    ("on_inadmissible", "values", "context", "outcome", "turns", "used"),
+    [
+        (OnInadmissible.ABORT, {}, {}, ALLOW, [0, 1], [0]),
+        (OnInadmissible.ABORT, {}, BINDING, DENY, [0], []),  # a forger uses no id up
+        (OnInadmissible.ABORT, EMPTY, {}, DEFER, [0, 1], []),
+        (OnInadmissible.ABORT, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], [0]),
+        (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], [0]),
+        (OnInadmissible.HOLD, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], []),
+        (OnInadmissible.HOLD, {}, LATE, FALLBACK, [0, 1], [0]),  # not after its deadline
+    ],
+)
+def test_what_uses_an_id_up(
+    on_inadmissible: int,
+    values: dict[int, int | None],
+    context: dict[str, Any],
+    outcome: Outcome,
+    turns: list[int],
+    used: list[int],
+) -> None:
+    of = Asked(with_mission(on_inadmissible))
+    assert of.step(0, values, **context) is outcome
+    assert (of.turns(), of.used()) == (turns, used)
+
+
+def test_a_step_that_was_passed_over_has_no_turn_any_more() -> None:
+    of = Asked()
+    assert of.step(0, {BATTERY: None}) is DEFER
+    of.step(1)
+    assert of.turns() == [1, 2]
+
+
+def test_where_nothing_is_enforced_a_denied_step_is_the_current_one() -> None:
+    of = Asked(enforced=False)
+    assert of.step(0, **BINDING) is DENY
+    assert (of.turns(), of.used()) == ([0, 1], [])
+
+
+# ------------------------------------------------------------------------------------------- links
+
+
+@pytest.mark.parametrize(
+    ("ref", "before", "during", "after"),
+    [
+        (Ref(STEP, 0, 0), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(STEP, -1, -1), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(STEP, 4, -1), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(3, 0, -1), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(FALLBACK_LINK, 0, 0), NOT_CURRENT, None, NOT_CURRENT),
+        (Ref(FALLBACK_LINK, 0, DEGRADE), NOT_CURRENT, None, NOT_CURRENT),
+        (Ref(FALLBACK_LINK, 0, DEGRADE - 1), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(FALLBACK_LINK, 0, 9), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(FALLBACK_LINK, 1, 0), NOT_CURRENT, NOT_CURRENT, None),
+        (Ref(FALLBACK_LINK, -1, 0), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(FALLBACK_LINK, 4, 0), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(CONTINGENCY_LINK, -1, 0), None, None, None),
+        (Ref(CONTINGENCY_LINK, -1, 2), None, None, None),
+        (Ref(CONTINGENCY_LINK, -1, 3), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(CONTINGENCY_LINK, -1, -1), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+        (Ref(CONTINGENCY_LINK, 0, 0), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
+    ],
+)
+def test_what_may_be_asked_for_before_a_step_during_it_and_in_the_next(
+    ref: Ref, before: Status | None, during: Status | None, after: Status | None
+) -> None:
+    of = Asked()
+    assert of.session.refusal(ref) is before
+    of.step(0)
+    assert of.session.refusal(ref) is during
+    of.step(1)
+    assert of.session.refusal(ref) is after
+
+
+@pytest.mark.parametrize(
+    ("ref", "values", "skill"),
+    [
+        (Ref(FALLBACK_LINK, 2, 0), {}, HOVER),
+        (Ref(FALLBACK_LINK, 2, 1), {}, HOME),
+        (Ref(FALLBACK_LINK, 2, 1), {FIX: 2}, None),
+        (Ref(FALLBACK_LINK, 2, 2), {FIX: None}, LAND),
+        (Ref(FALLBACK_LINK, 2, DEGRADE), {}, None),  # no rule degrades
+        (Ref(FALLBACK_LINK, 2, DEGRADE), {BATTERY: 2_000}, HOME),
+        (Ref(FALLBACK_LINK, 2, DEGRADE), {BATTERY: 2_000, FIX: 2}, None),  # one does, and its target may not fly
+        (Ref(CONTINGENCY_LINK, -1, 0), {}, HOVER),
+        (Ref(CONTINGENCY_LINK, -1, 0), {FIX: 2}, None),
+        (Ref(CONTINGENCY_LINK, -1, 2), {FIX: 2}, LAND),
+    ],
+)
+def test_a_link_flies_where_it_may(ref: Ref, values: dict[int, int | None], skill: int | None) -> None:
+    of = Asked()
+    for step in range(3):
+        of.step(step)
+    decision = of.link(ref, values)
+    if skill is None:
+        assert decision == LinkDecision(FALLBACK, Reason.STATE_VIOLATED, 6, None, AT_US)
+    else:
+        assert decision.link is not None
+        assert decision.link.skill == skill
+        assert decision == LinkDecision(ALLOW, Reason.ADMITTED, 8, decision.link, AT_US + LINK_VALID_US)
+
+
+def test_where_neither_a_rule_nor_the_chain_has_a_link_there_is_no_target() -> None:
+    """The chain ends with a landing that needs nothing; without it, every link needs a fix."""
+    of = Asked()
+    of.in_force.invocations = tuple(with_fields(each, chain=each.chain[:2]) for each in of.in_force.invocations)
+    for step in range(3):
+        of.step(step)
+    assert of.link(Ref(FALLBACK_LINK, 2, DEGRADE), {FIX: 2}).outcome is FALLBACK
+
+
+@pytest.mark.parametrize(
+    "ref", [Ref(FALLBACK_LINK, 0, 0), Ref(FALLBACK_LINK, 0, DEGRADE), Ref(CONTINGENCY_LINK, -1, 0)]
+)
+@pytest.mark.parametrize("values", [{}, {FIX: 2}])
+def test_a_link_under_another_binding_is_denied(ref: Ref, values: dict[int, int | None]) -> None:
+    of = Asked()
+    of.step(0)
+    decision = of.link(ref, values, binding=bytes(32))
+    assert decision == LinkDecision(DENY, Reason.BINDING_MISMATCH, 1, None, AT_US)
+
+
+def test_the_binding_of_a_link_is_that_of_its_own_chain() -> None:
+    of = Asked()
+    of.step(0)
+    policy, step = of.in_force.bundle.policy_digest, of.in_force.invocations[0].invocation.binding
+    assert of.link(Ref(FALLBACK_LINK, 0, 0), binding=policy).outcome is DENY
+    assert of.link(Ref(CONTINGENCY_LINK, -1, 0), binding=step).outcome is DENY
+
+
+# ------------------------------------------------------------------------------------------- documents
+
+
+def confirmed(steps: int) -> tuple[Asked, Loaded]:
+    """A session in which so many steps of the low mission were asked for."""
+    of = documents.low()
+    asked = Asked(of)
+    for step in range(steps):
+        asked.step(step)
+    return asked, of
+
+
+def test_after_a_recall_it_is_no_steps_turn_and_links_may_fly() -> None:
+    asked, of = confirmed(1)
+    assert asked.session.take(documents.recall(of), NOW).accepted
+    assert asked.turns() == []
+    assert asked.link(Ref(FALLBACK_LINK, 0, 0)).outcome is ALLOW
+    assert asked.link(Ref(CONTINGENCY_LINK, -1, 0)).outcome is ALLOW
+
+
+@pytest.mark.parametrize("steps", [0, 1, 2, 3])
+def test_an_approval_of_a_step_that_still_waits_for_it(steps: int) -> None:
+    asked, of = confirmed(steps)
+    assert asked.session.take(documents.approval(of), NOW).accepted
+
+
+def test_an_approval_of_a_step_that_was_decided_comes_too_late() -> None:
+    asked, of = confirmed(2)
+    assert asked.session.take(documents.approval(of), NOW).accepted
+    assert asked.step(documents.ASKED, {flat.HEIGHT: documents.LOW}) is ALLOW
+    refused = documents.approval(of, now=later(S))
+    assert asked.session.take(refused, later(S)).slug == "already-decided"
+
+
+def later(us: int) -> Now:
+    return Now(NOW.monotonic_us + us, NOW.utc_us + us, NOW.utc_error_us)
+
+
+@pytest.mark.parametrize(
+    ("steps", "released", "slug"),
+    [
+        (0, 0, "accepted"),
+        (2, 0, "accepted"),
+        (3, 0, "already-released"),
+        (0, 2, "accepted"),
+        (2, 3, "already-released"),
+    ],
+)
+def test_a_replacement_keeps_what_was_released_or_asked_for(steps: int, released: int, slug: str) -> None:
+    asked, of = confirmed(steps)
+    assert asked.session.take(documents.replacement(of), NOW, released).slug == slug
+
+
+def test_a_replacement_brings_steps_that_were_never_used() -> None:
+    asked, of = confirmed(2)
+    assert asked.used() == [0, 1]
+    assert asked.session.take(documents.replacement(of), NOW).accepted
+    assert (asked.used(), asked.turns(), len(asked.in_force.invocations)) == ([0, 1], [0, 1, 2], 3)
+
+
+def test_a_document_that_is_none_changes_nothing() -> None:
+    asked, _ = confirmed(1)
+    assert not asked.session.take(b"", NOW, 9).accepted
+    assert (asked.turns(), asked.used()) == ([0, 1], [0])

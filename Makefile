@@ -5,7 +5,7 @@ JOBS ?= 4
 BIN := .venv/bin
 
 export PYTHON
-unexport PYTHONHOME PYTHONPATH
+unexport PYTHONHOME PYTHONPATH PYTHONDONTWRITEBYTECODE
 MAKEFLAGS += --no-print-directory
 
 .DEFAULT_GOAL := help

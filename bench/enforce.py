@@ -28,6 +28,7 @@ from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.queue import InvocationQueue
 from rtshcua.onboard.runtime.remaining import RemainingLatency
 from rtshcua.wire.duty import Duty
+from rtshcua.wire.request import Ref
 
 LIMIT_US, PUBLISHED_US = 100.0, 318.0
 BLOCKS, ROUNDS = 21, 200
@@ -47,9 +48,9 @@ def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:
     admission = Admission(of, journal, queue, RemainingLatency())
     state = flat.state()
     begin = perf_counter_ns()
-    answer = admission.ask(START, state, (0, 0, -1))
+    answer = admission.ask(START, state, Ref(0, 0, -1))
     decided = perf_counter_ns()
-    for action in journal.take():
+    for action in journal.take(START, ended=False):
         if isinstance(action, Append):
             file.append(action.line, min(action.durability, WRITTEN))
     appended = perf_counter_ns()

@@ -19,11 +19,13 @@ from time import perf_counter_ns
 
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.store.writing import sync_data
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST, WORDS, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.request import Ref
 
 RECORDS = 20_000
 SYNCED_RECORDS = 150
@@ -47,11 +49,8 @@ def now(number: int) -> Now:
 
 def decision(recorder: Recorder, at: Now, number: int, durability: int) -> bytes:
     """One decision of about 700 bytes."""
-    return recorder.decision(
-        at, kind=0, step=number & 7, link=-1, invocation=bytes(16), state=STATE, context=CONTEXT,
-        outcome=Outcome.ALLOW, reason=Reason.ADMITTED, rule_step=8, clause=None, clause_at=None, target=None,
-        target_link=-1, valid_until_us=7_000_000, durability=durability,
-    )  # fmt: skip
+    answer = RecordedAnswer.of(Outcome.ALLOW, Reason.ADMITTED, 8, 7_000_000)
+    return recorder.decision(at, Ref(0, number & 7, -1), bytes(16), STATE, CONTEXT, answer, durability)
 
 
 def begin(path: Path) -> tuple[Recorder, EvidenceFile]:

@@ -27,6 +27,7 @@ from rtshcua.adapters.files.verification import Asked, verify_carefully, verify_
 from rtshcua.decision.decide import decide
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit
@@ -34,6 +35,7 @@ from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.bundle import open_bundle
 from rtshcua.wire.keys import Duty
+from rtshcua.wire.request import STEP, Ref
 from virtual import case
 
 RECORDS = 262_144
@@ -72,24 +74,20 @@ def lines(records: int) -> Iterator[bytes]:
     answer = decide(invocation, state, policy, asked, now(0))
     assert answer.outcome is Outcome.DEFER
     assert answer.valid_until_us == now(0).monotonic_us
-    clause = answer.clause
-    of_decision = {
-        "kind": 0, "step": 0, "link": -1, "invocation": flat_invocation.invocation_id, "state": state,
-        "outcome": answer.outcome, "reason": answer.reason, "rule_step": answer.step,
-        "clause": None if clause is None else clause.text,
-        "clause_at": None if clause is None else (clause.source, clause.start, clause.end),
-        "target": None, "target_link": -1,
-        "durability": durability_of(flat_invocation.contract, answer.outcome, confirmed=False, kind=0),
-    }  # fmt: skip
+    ref, invocation_id = Ref(STEP, 0, -1), flat_invocation.invocation_id
+    durability = durability_of(flat_invocation.contract, answer.outcome, confirmed=False, kind=STEP)
     for number in range(1, records - 1):
         at = now(number)
         if recorder.due(at):
             yield recorder.seal(at)
         elif number & 1:
-            yield recorder.effect(at, "said", kind=0, step=0, token=1, detail="PreArm: " + "wind " * 20)
+            yield recorder.effect(at, "said", ref, token=1, detail="PreArm: " + "wind " * 20)
         else:
             context = replace(asked, released_us=at.monotonic_us - 1_000)
-            yield recorder.decision(at, context=context, valid_until_us=at.monotonic_us, **of_decision)
+            recorded = RecordedAnswer.of(
+                answer.outcome, answer.reason, answer.step, at.monotonic_us, clause=answer.clause
+            )
+            yield recorder.decision(at, ref, invocation_id, state, context, recorded, durability)
     yield recorder.close(now(records), ending="completed", tlog=None)
 
 

@@ -7,6 +7,7 @@ from base64 import b64encode
 from collections.abc import Callable
 from urllib.parse import quote
 
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.durability import SYNC_US, SYNCED, WRITTEN
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, EpochKey
 from rtshcua.evidence.heads import Head
@@ -23,14 +24,12 @@ from rtshcua.evidence.records import (
     Seal,
 )
 from rtshcua.model.flat.situation import Context, Now, State
-from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, key_id
+from rtshcua.wire.request import NOTHING, Ref
 
 #: How much later than `EPOCH_US` and `EPOCH_RECORDS` an epoch is sealed before anything else is recorded; a fifth.
 _LATE = 5
 _LATE_US, _LATE_RECORDS = EPOCH_US + EPOCH_US // _LATE, EPOCH_RECORDS + EPOCH_RECORDS // _LATE
-
-_OUTCOMES = tuple(outcome.name.lower() for outcome in Outcome)  # by number
 
 
 def origin_of(vehicle: str, boot: str) -> str:
@@ -130,32 +129,23 @@ class Recorder:
     def decision(
         self,
         now: Now,
-        *,
-        kind: int,
-        step: int,
-        link: int,
+        ref: Ref,
         invocation: bytes,
         state: State,
         context: Context,
-        outcome: Outcome,
-        reason: Reason,
-        rule_step: int,
-        clause: str | None,
-        clause_at: tuple[int, int, int] | None,
-        target: str | None,
-        target_link: int,
-        valid_until_us: int,
+        answer: RecordedAnswer,
         durability: int = SYNCED,
     ) -> bytes:
-        """The line of one decision, its inputs included; the fields are those of `Decision`."""
+        """The line of one decision, its inputs included. `invocation` is its id, empty for the contingency."""
         head = self._head
+        kind, step, link = ref
         return head.add(
             Decision(  # by position, in the order of definition: a third faster than by name
                 head.prev,
                 now.monotonic_us,
                 context.binding.hex(),
-                clause,
-                clause_at,
+                answer.clause,
+                answer.clause_at,
                 RecordedContext(
                     _approvals(context) if context.approvals else (),
                     context.consumed,
@@ -170,27 +160,34 @@ class Recorder:
                 kind,
                 link,
                 self._mode,
-                _OUTCOMES[outcome],
-                reason._value_,  # `value` is a property in Python, and slow
-                rule_step,
+                answer.outcome,
+                answer.reason,
+                answer.rule_step,
                 head.seq,
                 RecordedState(ages=state.ages, monitors=state.monitors, values=state.values),
                 step,
-                target,
-                target_link,
+                answer.target,
+                answer.target_link,
                 "decision",
                 now.utc_error_us,
                 now.utc_us,
-                valid_until_us,
+                answer.valid_until_us,
             )
         )
 
     def effect(
-        self, now: Now, event: str, *, kind: int = -1, step: int = -1, link: int = -1, token: int = -1,
-        detail: str = "", durability: int = WRITTEN,
-    ) -> bytes:  # fmt: skip
+        self,
+        now: Now,
+        event: str,
+        ref: Ref = NOTHING,
+        *,
+        token: int = -1,
+        detail: str = "",
+        durability: int = WRITTEN,
+    ) -> bytes:
         """The line of something that happened; `detail` is the world's own text, kept as it came."""
         head = self._head
+        kind, step, link = ref
         return head.add(
             Effect(  # by position, as above
                 head.prev,

@@ -16,6 +16,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from rtshcua.wire import names
+from rtshcua.wire.request import Ref
 
 FORMAT, VERSION = names.LOG.name, names.LOG.version
 
@@ -124,6 +125,11 @@ class Decision(Record, frozen=True):
     utc_us: Count
     valid_until_us: Integer
 
+    @property
+    def ref(self) -> Ref:
+        """What it decides on."""
+        return Ref(self.kind, self.step, self.link)
+
 
 class Effect(Record, frozen=True):
     """What then happened. `event` is a stable slug; `detail` is text of the world's own making, never to be trusted.
@@ -145,6 +151,11 @@ class Effect(Record, frozen=True):
     type: Literal["effect"]
     utc_error_us: Count
     utc_us: Count
+
+    @property
+    def ref(self) -> Ref:
+        """What it belongs to."""
+        return Ref(self.kind, self.step, self.link)
 
 
 class Seal(Record, frozen=True):

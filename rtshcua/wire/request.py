@@ -36,6 +36,10 @@ class Ref(NamedTuple):
     link: int
 
 
+#: what belongs to no step and no link
+NOTHING: Final = Ref(-1, -1, -1)
+
+
 #: the largest request in octets
 MAX_SIZE: Final = 1023
 #: Ages saturate here; no signal may have a longer time to stale.

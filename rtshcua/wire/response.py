@@ -24,6 +24,8 @@ NO_TARGET: Final = -(1 << 15) - 1
 NO_CLAUSE: Final = -1
 
 _OUTCOMES: Final = tuple(Outcome)
+#: by slug: an enumeration's own hash is slow
+_REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}
 _HEAD: Final = Struct(">BBBBiiqB")
 
 
@@ -72,7 +74,7 @@ def encode(answer: Answer) -> bytes:
     body = _HEAD.pack(
         _DECIDED,
         answer.outcome,
-        REASON_NUMBERS[answer.reason],
+        _REASONS[answer.reason._value_],
         answer.rule_step,
         answer.clause,
         answer.target,

@@ -10,6 +10,7 @@ from typing import Any
 
 from model.small import GRACE, LIMITS, UNIT
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.load import Loaded
@@ -30,7 +31,7 @@ from rtshcua.onboard.ports import (
     TakenOver,
 )
 from rtshcua.wire.permit import LINK_VALID_US, open_permit
-from rtshcua.wire.request import STEP
+from rtshcua.wire.request import NOTHING, STEP, Ref
 
 _OVER = ("succeeded", "failed", "violated", "time-over", "replaced", "landed", "released")
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
@@ -41,7 +42,7 @@ class Ear(Recorder):
 
     def __init__(self, of: Recorder) -> None:
         super().__init__(lambda text: b"", of._public, lambda: bytes(32))
-        self.heard: list[tuple[str, dict[str, Any]]] = []
+        self.heard: list[tuple[str, Ref, dict[str, Any]]] = []
         self.passed: list[Dispatch] = []
 
     def due(self, now: object) -> bool:
@@ -49,12 +50,13 @@ class Ear(Recorder):
 
     overdue = due
 
-    def effect(self, now: object, event: str, **fields: Any) -> bytes:  # type: ignore[override]
-        self.heard.append((event, fields))
+    def effect(self, now: object, event: str, ref: Ref = NOTHING, **fields: Any) -> bytes:  # type: ignore[override]
+        self.heard.append((event, ref, fields))
         return b""
 
-    def decision(self, now: object, **fields: Any) -> bytes:  # type: ignore[override]
-        self.heard.append(("decision", fields))
+    def decision(self, now: object, ref: Ref, *inputs: Any) -> bytes:  # type: ignore[override]
+        answer = next(each for each in inputs if isinstance(each, RecordedAnswer))
+        self.heard.append(("decision", ref, {"outcome": answer.outcome}))
         return b""
 
 
@@ -160,16 +162,15 @@ class Watch:
         order = iter(sent)
         if isinstance(event, Succeeded) and event.token == self.flying and self.command in _HOMEWARD:
             self.ours = False  # that is what its success means; who flies it next is somebody else
-        fresh: set[tuple[int, int, int]] = set()
-        for what, said in ear.heard:
-            key = (said.get("kind", -1), said.get("step", -1), said.get("link", -1))
+        fresh: set[Ref] = set()
+        for what, ref, said in ear.heard:
             if what == "decision":
-                if said["outcome"].name == "ALLOW":
-                    fresh.add((key[0], key[1], said["link"]))
-                    if key[0] == STEP:
-                        self.allowed.add(key[1])
+                if said["outcome"] == "allow":
+                    fresh.add(ref)
+                    if ref.kind == STEP:
+                        self.allowed.add(ref.step)
             elif what == "dispatched":
-                self._dispatched(of, next(order), key, said, fresh, now_us)
+                self._dispatched(of, next(order), ref, said, fresh, now_us)
             elif what in _OVER and said.get("token", -1) >= 0:
                 assert said["token"] == self.flying, "what ended did not fly"
                 self.flying = None
@@ -190,7 +191,7 @@ class Watch:
         """Nothing is judged while the link is down, nor on what was known before it was, while it may still come."""
         stale = self.now_us - self.heard_us > _STALE_US and self.heard_us <= self.lost_us
         waits = self.back_us is not None and self.now_us < self.back_us + LIMITS.flapping_us
-        for what, said in ear.heard:
+        for what, _, said in ear.heard:
             if what in ("fresh", "not-fresh"):
                 self.silent = False
             if what in _JUDGED:
@@ -212,10 +213,9 @@ class Watch:
         assert not self.unstopped or waits, "left flying after a stop that failed"
 
     def _dispatched(
-        self, of: Loaded, dispatch: Dispatch, key: tuple[int, int, int], said: dict[str, Any],
-        fresh: set[tuple[int, int, int]], now_us: int,
-    ) -> None:  # fmt: skip
-        command, (kind, step, link) = dispatch.command, key
+        self, of: Loaded, dispatch: Dispatch, ref: Ref, said: dict[str, Any], fresh: set[Ref], now_us: int
+    ) -> None:
+        command, (kind, step, link) = dispatch.command, ref
         assert not self.released, "sent after standing down"
         assert self.flying is None, "two commands at once"
         assert command.token == said["token"]
@@ -224,7 +224,7 @@ class Watch:
         if kind == STEP:
             assert not self.resumed, "a step of a run that broke off before"
             assert not self.unstopped, "a step after a hold that failed"
-            assert key in fresh, "a step without its decision"
+            assert ref in fresh, "a step without its decision"
             assert not self.homeward, "a step after a return or a landing began"
             assert not self.recalled, "a step after a recall"
             assert step > self.step, "a step again, or behind one that was sent"
@@ -236,12 +236,12 @@ class Watch:
             assert dispatch.not_after_us <= now_us + contract.deadline_us
             self.step = step
         else:
-            assert key in fresh or self.allowed, "a link that nothing stands for"
-            assert kind == 2 or step in self.allowed or key in fresh
+            assert ref in fresh or self.allowed, "a link that nothing stands for"
+            assert kind == 2 or step in self.allowed or ref in fresh
             chain = policy.contingency if kind == 2 else of.bundle.mission.invocations[step].contract.fallback
             targets = [rule.target.skill for rule in policy.rules if rule.target is not None]  # no policy here has two
             contract = policy.contracts[chain[link].skill if link >= 0 else targets[0]]
-            assert dispatch.not_after_us <= now_us + LINK_VALID_US or key not in fresh
+            assert dispatch.not_after_us <= now_us + LINK_VALID_US or ref not in fresh
             self.homeward = self.homeward or contract.motion.kind in _HOMEWARD
         assert (command.skill, command.kind) == (contract.name, contract.motion.kind), "another skill"
         self.ours = True

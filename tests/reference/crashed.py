@@ -5,12 +5,14 @@ from pathlib import Path
 from random import Random
 
 from rtshcua.adapters.files.recovery import Signer
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.request import Ref
 
 LOG_KEY = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
 UTC_US = 1_750_000_000_000_000
@@ -58,11 +60,8 @@ def writes(chance: Random, *, seals: int = 40) -> Iterator[tuple[bytes, int]]:
 
 def _decision(recorder: Recorder, now: Now, durability: int) -> bytes:
     context = Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),))
-    return recorder.decision(
-        now, kind=0, step=0, link=-1, invocation=bytes(60), state=_STATE, context=context, outcome=Outcome.ALLOW,
-        reason=Reason.ADMITTED, rule_step=8, clause=None, clause_at=None, target=None, target_link=-1,
-        valid_until_us=6_000_000, durability=durability,
-    )  # fmt: skip
+    answer = RecordedAnswer.of(Outcome.ALLOW, Reason.ADMITTED, 8, 6_000_000)
+    return recorder.decision(now, Ref(0, 0, -1), bytes(60), _STATE, context, answer, durability)
 
 
 def unverified(path: Path, lines: list[bytes], acknowledged: int) -> str:

@@ -13,10 +13,12 @@ from random import Random
 from msgspec.structs import replace
 
 from reference import flat_case as flat
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty
+from rtshcua.wire.request import Ref
 from virtual import case
 
 ROOT_KEY = case.KEYS[Duty.ROOT].public
@@ -90,15 +92,14 @@ def lines(
         turn += 1
         step = turn % steps
         _, outcome, reason, rule_step, clause = answers[turn % 997]
-        yield recorder.decision(
-            now, kind=0, step=step, link=-1, invocation=invocation, state=STATE, context=context,
-            outcome=outcome, reason=reason, rule_step=rule_step, clause=clause,
-            clause_at=None if clause is None else (0, 120, 160), target=None, target_link=-1,
-            valid_until_us=at_us + 500_000,
-        )  # fmt: skip
+        answer = RecordedAnswer.of(outcome, reason, rule_step, at_us + 500_000)
+        if clause is not None:
+            answer = replace(answer, clause=clause, clause_at=(0, 120, 160))
+        ref = Ref(0, step, -1)
+        yield recorder.decision(now, ref, invocation, STATE, context, answer)
         if outcome is Outcome.ALLOW and turn & 1:
             token += 1
-            yield recorder.effect(now, "dispatched", kind=0, step=step, token=token, detail="FLY")
+            yield recorder.effect(now, "dispatched", ref, token=token, detail="FLY")
     if ending is not None:
         at_us += _STEP_US
         yield recorder.close(Now(at_us, at_us + apart_us, 1_000), ending=ending, tlog=None)

@@ -5,12 +5,13 @@ from hashlib import sha256
 from typing import NamedTuple
 
 from reference.seeds import epoch_seeds
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.model.flat.situation import Context, Now, State
-from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty
+from rtshcua.wire.request import Ref
 from virtual import case
 
 SECRET = bytes(range(32))
@@ -88,10 +89,7 @@ def resumed(lines: list[bytes], draw: object) -> Recorder:
 
 def _ordinary(recorder: Recorder, number: int) -> bytes:
     if number % 2:
-        return recorder.effect(now(number), "dispatched", kind=0, step=0, token=number, detail=f'goto {number} "ß"')
-    return recorder.decision(
-        now(number), kind=0, step=number & 7, link=-1, invocation=bytes(16), state=_STATE,
-        context=Context(bytes(32), VEHICLE, 7, 0, 5_000_000, 1, 12_000, ()), outcome=Outcome.DENY,
-        reason=Reason.ADMITTED, rule_step=8, clause="battery > 35 %", clause_at=(0, 1, 9), target=None, target_link=-1,
-        valid_until_us=6_000_000, durability=2,
-    )  # fmt: skip
+        return recorder.effect(now(number), "dispatched", Ref(0, 0, -1), token=number, detail=f'goto {number} "ß"')
+    context = Context(bytes(32), VEHICLE, 7, 0, 5_000_000, 1, 12_000, ())
+    answer = RecordedAnswer("deny", "admitted", 8, "battery > 35 %", (0, 1, 9), None, -1, 6_000_000)
+    return recorder.decision(now(number), Ref(0, number & 7, -1), bytes(16), _STATE, context, answer, 2)

@@ -17,7 +17,7 @@ from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
-from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.untrusted import Untrusted
 
 _ASKED = {STEP: "to begin a step", FALLBACK_LINK: "to fall back", CONTINGENCY_LINK: "to fly the contingency"}
@@ -41,7 +41,7 @@ class Told:
         self.simulated = ""  # what the log says of a vehicle that was
         self._number = number
         self._names = Names(None)
-        self._allowed: dict[tuple[int, int, int], Decision] = {}
+        self._allowed: dict[Ref, Decision] = {}
 
     def take(self, record: AnyRecord) -> None:
         """Takes the next record."""
@@ -51,9 +51,9 @@ class Told:
         if record.seq == self._number:
             self.record, self.what = record, self._names.tell(record)
             if isinstance(record, Effect):
-                self.permit = self._allowed.get((record.kind, record.step, record.link))
+                self.permit = self._allowed.get(record.ref)
         if isinstance(record, Decision) and record.outcome == "allow" and record.seq < self._number:
-            self._allowed[record.kind, record.step, record.link] = record
+            self._allowed[record.ref] = record
         if isinstance(record, Effect):
             self._follow(record)
         elif not isinstance(record, Decision):
@@ -65,7 +65,7 @@ class Told:
             self.simulated = record.detail
         if self.sent is not None or not isinstance(asked, Decision) or record.event != "dispatched":
             return
-        if (asked.kind, asked.step, asked.link) == (record.kind, record.step, record.link):
+        if asked.ref == record.ref:
             self.sent = record
 
     def _signed(self, record: Genesis | Sealing) -> None:

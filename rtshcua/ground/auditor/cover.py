@@ -2,7 +2,7 @@
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Decision, Effect
-from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
 
 DISPATCHED = "dispatched"
 
@@ -17,12 +17,12 @@ class Cover:
     def __init__(self) -> None:
         self.recalled = False  # no step may be sent any more
         self.dispatches = 0
-        self._until_us: dict[tuple[int, int, int], int] = {}
+        self._until_us: dict[Ref, int] = {}
         self._standing: set[int] = set()
 
     def decided(self, record: Decision) -> None:
         """Takes note of a decision that was derived again."""
-        key = (record.kind, record.step, record.link)
+        key = record.ref
         if record.outcome != "allow":
             self._until_us.pop(key, None)
             return
@@ -37,7 +37,7 @@ class Cover:
         self.dispatches += 1
         if self.recalled and record.kind == STEP:
             return Flaw("dispatch/recalled", "a step was sent after the mission was recalled", f"step {record.step}")
-        until_us = self._until_us.pop((record.kind, record.step, record.link), None)
+        until_us = self._until_us.pop(record.ref, None)
         if until_us is not None:
             if record.at_us <= until_us or self._stands(record):
                 return None

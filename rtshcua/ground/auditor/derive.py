@@ -1,37 +1,20 @@
 """Each decision once more: from the inputs that its record holds, by the same rules that decided on board."""
 
-from typing import NamedTuple
-
 from rtshcua.decision.case import SINGLE
 from rtshcua.decision.durability import durability_of
-from rtshcua.decision.links import DEGRADE
 from rtshcua.decision.session import Session
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Decision
 from rtshcua.ground.auditor.observed import Observed
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.durability import WORDS, WRITTEN
-from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP, Ref
 from rtshcua.wire.response import Status
 
-
-class Answer(NamedTuple):
-    """What a decision record answers, field by field as it is written there."""
-
-    outcome: str
-    reason: str
-    rule_step: int
-    clause: str | None
-    clause_at: tuple[int, int, int] | None
-    target: str | None
-    target_link: int
-    valid_until_us: int
-
-
+#: what a record answers, in words
 _WHAT = {
     "outcome": "outcome",
     "reason": "reason",
@@ -57,10 +40,10 @@ class Deriver:
         answer = self._derived(record)
         if isinstance(answer, Flaw):
             return answer
-        for field, expected in zip(Answer._fields, answer, strict=True):
-            found = getattr(record, field)
+        for field, what in _WHAT.items():
+            found, expected = getattr(record, field), getattr(answer, field)
             if found != expected:
-                text = f"derived again from the inputs that it records, this decision has another {_WHAT[field]}"
+                text = f"derived again from the inputs that it records, this decision has another {what}"
                 return Flaw(f"decision/{field.replace('_', '-')}", text, str(found), str(expected))
         return self._durable(record)
 
@@ -77,10 +60,10 @@ class Deriver:
         text = "its record was not as durable as the contract and the risk ask, or more"
         return Flaw("decision/durability", text, _class(record.durability), _class(asked))
 
-    def _derived(self, record: Decision) -> Answer | Flaw:
+    def _derived(self, record: Decision) -> RecordedAnswer | Flaw:
         state = State(record.state.values, record.state.ages, record.state.monitors)
         now = Now(record.at_us, record.utc_us, record.utc_error_us)
-        ref = Ref(record.kind, record.step, record.link)
+        ref = record.ref
         flaw = self._inputs(record, state, now) or self._turn(record, ref)
         if flaw is not None:
             return flaw
@@ -125,7 +108,7 @@ class Deriver:
         current = f"step {self._session.current} or the next"
         return Flaw("decision/not-current", text, f"step {ref.step}", current)
 
-    def _step(self, record: Decision, state: State, now: Now) -> Answer | Flaw:
+    def _step(self, record: Decision, state: State, now: Now) -> RecordedAnswer | Flaw:
         given = record.context
         approvals = self._basis.in_force.approvals(self._basis.invocations[record.step].invocation, now)
         if given.approvals != tuple((each.rule, each.role, each.granted, each.monotonic_us) for each in approvals):
@@ -145,22 +128,20 @@ class Deriver:
             approvals,
         )
         decision = self._session.decide_step(record.step, state, context, now)
-        target, link = decision.target, decision.link
-        return Answer(
-            decision.outcome.name.lower(),
-            decision.reason.value,
+        return RecordedAnswer.of(
+            decision.outcome,
+            decision.reason,
             decision.step,
-            *_place(decision.clause),
-            None if target is None else target.text,
-            -1 if link is None or link == DEGRADE else link,
             decision.valid_until_us,
+            clause=decision.clause,
+            target=decision.target,
+            target_link=-1 if decision.link is None else max(decision.link, -1),
         )
 
-    def _link(self, record: Decision, ref: Ref, state: State, now: Now) -> Answer:
+    def _link(self, record: Decision, ref: Ref, state: State, now: Now) -> RecordedAnswer:
         binding = _octets(record.binding) or b""  # what is no binding at all is not the right one
         decision = self._session.decide_link(ref, binding, state, now)
-        outcome = decision.outcome.name.lower()
-        return Answer(outcome, decision.reason.value, decision.step, None, None, None, -1, decision.valid_until_us)
+        return RecordedAnswer.of(decision.outcome, decision.reason, decision.step, decision.valid_until_us)
 
 
 def _class(durability: int) -> str:
@@ -173,7 +154,3 @@ def _octets(text: str) -> bytes | None:
     except ValueError:
         return None
     return data if data.hex() == text else None
-
-
-def _place(clause: Clause | Rule | Airspace | None) -> tuple[str | None, tuple[int, int, int] | None]:
-    return (None, None) if clause is None else (clause.text, (clause.source, clause.start, clause.end))

@@ -164,10 +164,10 @@ class SoftwareBoundary:
         decision = self._session.decide_link(ref, asked.binding, asked.state, asked.now)
         until_us, permit = decision.valid_until_us, b""
         if decision.link is not None:
-            kind, step, number = ref
-            if number == DEGRADE:
-                number = self._numbers.degrade(self._in_force.invocations[step], decision.link)
-            permit = self._mint.link(kind, step, number, until_us)
+            if ref.link == DEGRADE:
+                prepared = self._in_force.invocations[ref.step]
+                ref = Ref(ref.kind, ref.step, self._numbers.degrade(prepared, decision.link))
+            permit = self._mint.link(ref, until_us)
         return Answer(decision.outcome, decision.reason, decision.step, NO_CLAUSE, NO_TARGET, until_us, 0, permit)
 
 

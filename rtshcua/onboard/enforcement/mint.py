@@ -3,7 +3,7 @@
 from typing import Final
 
 from rtshcua.wire.permit import Permit, seal
-from rtshcua.wire.request import STEP
+from rtshcua.wire.request import STEP, Ref
 
 #: how often a standing permit lets the last link of the contingency be sent again: landing twice harms nothing, and
 #: nothing else is left to a vehicle whose boundary does not answer any more
@@ -23,8 +23,9 @@ class Mint:
         self._serial += 1 + fallbacks + contingencies + AGAIN
         return seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us), self._key)
 
-    def link(self, kind: int, step: int, link: int, not_after_us: int) -> bytes:
-        """A permit for a link that was just decided."""
+    def link(self, ref: Ref, not_after_us: int) -> bytes:
+        """A permit for a link that was just decided; the `link` of a degrade rule's target is `-1 - rule`."""
+        kind, step, number = ref
         serial = self._serial
         self._serial += 1
-        return seal(Permit(kind, step, link, serial, 0, 0, not_after_us), self._key)
+        return seal(Permit(kind, step, number, serial, 0, 0, not_after_us), self._key)

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from rtshcua.decision.durability import confirmed, durability_of
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
@@ -13,14 +14,13 @@ from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Announce, Show
-from rtshcua.onboard.runtime.flight import Key
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.queue import InvocationQueue
 from rtshcua.onboard.runtime.remaining import RemainingLatency
 from rtshcua.onboard.runtime.view import Decided
 from rtshcua.wire.approval import Answered, Approvals
 from rtshcua.wire.receipt import Receipt
-from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Request, encode
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref, Request, encode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, decode, own_clauses, shared_clauses
 
 #: how many decisions a display is shown
@@ -60,9 +60,9 @@ class Admission:
         """The steps from `first` on are others now."""
         self._approvals.forget(first)
 
-    def ask(self, now: Now, state: State, key: Key) -> Answer | None:
-        """The boundary's answer about a step or link (kind, step, link); None when it did not decide."""
-        kind, step, link = key
+    def ask(self, now: Now, state: State, ref: Ref) -> Answer | None:
+        """The boundary's answer about a step or link; None when it did not decide."""
+        kind, step, link = ref
         released_us = self._queue.released_us or 0  # 0: nothing was released yet, and only the contingency may fly
         phase, remaining_us = self._queue.phase, self._remaining.us
         binding, identity = self._bound(kind, step)
@@ -72,7 +72,7 @@ class Admission:
         answer = decode(data)
         if not isinstance(answer, Answer):
             text = answer.name.lower() if isinstance(answer, Status) else answer.text
-            self._journal.effect(now, "undecided", kind=kind, step=step, link=link, detail=text)
+            self._journal.effect(now, "undecided", ref, detail=text)
             return None
         if kind == STEP:
             last = (step, (answer.outcome, answer.reason, answer.clause, answer.target))
@@ -88,13 +88,13 @@ class Admission:
         if kind == STEP:
             contract = self._in_force.invocations[step].invocation.contract
             durability = durability_of(contract, answer.outcome, confirmed=confirmed(context), kind=kind)
-        self._journal.tell(partial(self._told, now, key, identity, state, context, answer, durability))
+        self._journal.tell(partial(self._told, now, ref, identity, state, context, answer, durability))
         return answer
 
     def flush(self, now: Now) -> None:
         """Record how often the last answer was given again."""
         if self._last is not None and self._repeated:
-            self._journal.effect(now, "repeated", kind=STEP, step=self._last[0], detail=str(self._repeated))
+            self._journal.effect(now, "repeated", Ref(STEP, self._last[0], -1), detail=str(self._repeated))
         self._last = None
         self._repeated = 0
 
@@ -108,43 +108,34 @@ class Admission:
         return own[answer.clause - len(self._shared)]
 
     def _told(
-        self, now: Now, key: Key, identity: bytes, state: State, context: Context, answer: Answer, durability: int
+        self, now: Now, ref: Ref, identity: bytes, state: State, context: Context, answer: Answer, durability: int
     ) -> Iterable[Action]:
         """An answer as it is shown, announced and recorded."""
-        kind, step, link = key
-        clause, target = self._clause(step, answer), self._target(step, answer)
-        yield from self._shown(now, key, answer, "" if clause is None else clause.text)
-        line = partial(
-            self._journal.recorder.decision,
-            now,
-            kind=kind,
-            step=step,
-            link=link,
-            invocation=identity,
-            state=state,
-            context=context,
-            outcome=answer.outcome,
-            reason=answer.reason,
-            rule_step=answer.rule_step,
-            clause=None if clause is None else clause.text,
-            clause_at=None if clause is None else (clause.source, clause.start, clause.end),
-            target=None if target is None else target.text,
+        clause, target = self._clause(ref.step, answer), self._target(ref.step, answer)
+        yield from self._shown(now, ref, answer, "" if clause is None else clause.text)
+        recorded = RecordedAnswer.of(
+            answer.outcome,
+            answer.reason,
+            answer.rule_step,
+            answer.valid_until_us,
+            clause=clause,
+            target=target,
             target_link=max(answer.target, -1),
-            valid_until_us=answer.valid_until_us,
-            durability=durability,
         )
+        line = partial(self._journal.recorder.decision, now, ref, identity, state, context, recorded, durability)
         yield from self._journal.record(line, now, durability, awaited=True)
 
-    def _shown(self, now: Now, key: Key, answer: Answer, clause: str) -> Iterable[Action]:
-        subject = self._subject(*key)
+    def _shown(self, now: Now, ref: Ref, answer: Answer, clause: str) -> Iterable[Action]:
+        subject = self._subject(ref)
         outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
         text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
-        yield Show("decision", text, key[1])
+        yield Show("decision", text, ref.step)
         why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
         yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
 
-    def _subject(self, kind: int, step: int, link: int) -> str:
+    def _subject(self, ref: Ref) -> str:
+        kind, step, link = ref
         if kind == STEP:
             return self._in_force.invocations[step].invocation.text
         if link == DEGRADE:

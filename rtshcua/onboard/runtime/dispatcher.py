@@ -4,10 +4,10 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.ports import Dispatch, Release
-from rtshcua.onboard.runtime.flight import Active, Key
+from rtshcua.onboard.runtime.flight import Active
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.remaining import RemainingLatency
-from rtshcua.wire.request import FALLBACK_LINK, STEP
+from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
 
 class Dispatcher:
@@ -21,36 +21,34 @@ class Dispatcher:
         self.dispatched = False  # something was sent in this flight
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
 
-    def fly(self, now: Now, permit: bytes, key: Key, lasting_us: int | None) -> bool:
+    def fly(self, now: Now, permit: bytes, ref: Ref, lasting_us: int | None) -> bool:
         """Dispatch what the permit is for, for at most `lasting_us` (None: until it succeeds or fails).
 
         False if the executor refused, and then nothing is sent.
         """
-        sent = self._send(now, self._executor.dispatch(permit, now.monotonic_us), key, lasting_us)
-        if sent and key[0] == STEP:
-            self._standing = (key[1], permit)
+        sent = self._send(now, self._executor.dispatch(permit, now.monotonic_us), ref, lasting_us)
+        if sent and ref.kind == STEP:
+            self._standing = (ref.step, permit)
         return sent
 
-    def stand_in(self, now: Now, key: Key, lasting_us: int) -> bool:
+    def stand_in(self, now: Now, ref: Ref, lasting_us: int) -> bool:
         """As `fly`, for a link, by the permit of the last step that was sent, which stands for it."""
-        kind, step, link = key
-        if self._standing is None or (kind == FALLBACK_LINK and self._standing[0] != step):
+        if self._standing is None or (ref.kind == FALLBACK_LINK and self._standing[0] != ref.step):
             return False
         permit = self._standing[1]
-        return self._send(now, self._executor.stand_in(permit, kind, link, now.monotonic_us), key, lasting_us)
+        return self._send(now, self._executor.stand_in(permit, ref.kind, ref.link, now.monotonic_us), ref, lasting_us)
 
-    def _send(self, now: Now, dispatch: Dispatch | Refusal, key: Key, lasting_us: int | None) -> bool:
-        kind, step, link = key
+    def _send(self, now: Now, dispatch: Dispatch | Refusal, ref: Ref, lasting_us: int | None) -> bool:
         if isinstance(dispatch, Refusal):
-            self._journal.effect(now, "refused", kind=kind, step=step, link=link, detail=dispatch.slug)
+            self._journal.effect(now, "refused", ref, detail=dispatch.slug)
             return False
         at_us, command = now.monotonic_us, dispatch.command
         self.end(now, "replaced")
         self._journal.add(dispatch)
-        self.active = Active(kind, step, link, command, at_us, None if lasting_us is None else at_us + lasting_us)
+        self.active = Active(ref, command, at_us, None if lasting_us is None else at_us + lasting_us)
         self.dispatched = True
         token, skill = command.token, command.skill
-        self._journal.effect(now, "dispatched", kind=kind, step=step, link=link, token=token, detail=skill)
+        self._journal.effect(now, "dispatched", ref, token=token, detail=skill)
         return True
 
     def sent(self, token: int, at_us: int) -> None:
@@ -72,15 +70,7 @@ class Dispatcher:
         active = self.active
         if active is None:
             return
-        self._journal.effect(
-            now,
-            event,
-            kind=active.kind,
-            step=active.step,
-            link=active.link,
-            token=active.command.token,
-            detail=detail,
-        )
+        self._journal.effect(now, event, active.ref, token=active.command.token, detail=detail)
         self._executor.ended(active.command.token)
         self.active = None
 

@@ -9,7 +9,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.runtime.admission import Admission
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
 from rtshcua.onboard.runtime.flight import Chain, Limits, link_us
-from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, Ref
 
 
 class Progress(Enum):
@@ -48,16 +48,16 @@ class Fallback:
         policy = self._loaded.bundle.policy
         for index, link in enumerate(policy.contingency):
             if self._motion(link) == MotionKind.HOLD:
-                key = (CONTINGENCY_LINK, -1, index)
-                answer = self._admission.ask(now, state, key)
+                ref = Ref(CONTINGENCY_LINK, -1, index)
+                answer = self._admission.ask(now, state, ref)
                 if answer is not None and answer.permit:
-                    self._dispatcher.fly(now, answer.permit, key, None)
+                    self._dispatcher.fly(now, answer.permit, ref, None)
                 return
 
     def turn(self, now: Now, state: State) -> Progress:
         """Fly the next link, unless one flies whose time is not over."""
         active, chain = self._dispatcher.active, self._chain
-        if active is not None and active.key == (chain.kind, chain.step, chain.after):
+        if active is not None and active.ref == chain.ref(chain.after):
             if active.until_us is None or now.monotonic_us < active.until_us:
                 return Progress.ON_ITS_WAY
             self._dispatcher.end(now, "time-over")
@@ -97,10 +97,10 @@ class Fallback:
 
     def _fly(self, now: Now, state: State, index: int, link: Link, *, insist: bool) -> bool:
         """Ask for a link and fly it. `insist` flies it by its standing permit even if it was not admitted."""
-        key = (self._chain.kind, self._chain.step, index)
+        ref = self._chain.ref(index)
         policy = self._loaded.bundle.policy
         lasting_us = link_us(link, policy.contracts[link.skill], policy.vehicle.endurance_us)
-        answer = self._admission.ask(now, state, key)
-        if answer is not None and answer.permit and self._dispatcher.fly(now, answer.permit, key, lasting_us):
+        answer = self._admission.ask(now, state, ref)
+        if answer is not None and answer.permit and self._dispatcher.fly(now, answer.permit, ref, lasting_us):
             return True
-        return (answer is None or insist) and self._dispatcher.stand_in(now, key, lasting_us)
+        return (answer is None or insist) and self._dispatcher.stand_in(now, ref, lasting_us)

@@ -1,12 +1,12 @@
 """What flies now, and where a chain of fallbacks stands."""
 
 from enum import StrEnum
-from typing import TypeAlias
 
 import msgspec
 
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.onboard.ports import Command, Frozen
+from rtshcua.wire.request import Ref
 
 
 class Stage(StrEnum):
@@ -40,24 +40,15 @@ class Limits(Frozen):
     again_us: int = 100_000
 
 
-#: kind, step and link, as in requests, permits and the log
-Key: TypeAlias = tuple[int, int, int]
-
-
 class Active(Frozen):
-    """A command that was dispatched and has not ended. A link's time is over at `until_us`; a step has None."""
+    """A command that was dispatched and has not ended; `ref` is what its permit is for. A link's time is over at
+    `until_us`; a step has None.
+    """
 
-    kind: int
-    step: int
-    link: int
+    ref: Ref
     command: Command
     since_us: int
     until_us: int | None
-
-    @property
-    def key(self) -> Key:
-        """The (kind, step, link) of the permit that it flies under."""
-        return self.kind, self.step, self.link
 
     @property
     def homeward(self) -> bool:
@@ -73,6 +64,10 @@ class Chain(msgspec.Struct):
     after: int
     tried: int = 0
     wait_until_us: int = 0
+
+    def ref(self, index: int) -> Ref:
+        """The link of this index."""
+        return Ref(self.kind, self.step, index)
 
 
 def link_us(link: Link, contract: Contract, endurance_us: int) -> int:

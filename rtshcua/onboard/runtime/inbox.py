@@ -16,7 +16,7 @@ from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.wire import names
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.receipt import APPROVAL, RECALL, UNKNOWN, Receipt, decode
-from rtshcua.wire.request import STEP
+from rtshcua.wire.request import STEP, Ref
 from rtshcua.wire.untrusted import Untrusted
 
 #: how often a refused document leaves a record, in us: whoever floods the vehicle must not fill its disk
@@ -53,13 +53,13 @@ class Inbox:
         conduct.fresh = True
         envelope = b64encode(document).decode()
         if receipt.kind == APPROVAL:
-            self._journal.effect(now, "approval", kind=STEP, step=receipt.step, detail=envelope)
+            self._journal.effect(now, "approval", Ref(STEP, receipt.step, -1), detail=envelope)
             conduct.admission.answered(receipt, now)
         elif receipt.kind == RECALL:
             self._journal.effect(now, "recall", detail=envelope)
             conduct.call_back(now, Ending.RECALLED)
         else:
-            self._journal.effect(now, "replacement", kind=STEP, step=receipt.step, detail=envelope)
+            self._journal.effect(now, "replacement", Ref(STEP, receipt.step, -1), detail=envelope)
             conduct.replaced(receipt.step)
 
     def _refused(self, now: Now, receipt: Receipt) -> None:

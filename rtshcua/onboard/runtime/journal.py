@@ -8,6 +8,7 @@ from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Dispatch, Show
+from rtshcua.wire.request import NOTHING, Ref
 
 #: makes what tells of something: its line, and what is shown of it
 Telling = Callable[[], Iterable[Action]]
@@ -50,15 +51,18 @@ class Journal:
         yield Append(line(), durability, awaited)
 
     def effect(
-        self, now: Now, event: str, *, kind: int = -1, step: int = -1, link: int = -1, token: int = -1,
-        detail: str = "", durability: int = WRITTEN,
-    ) -> None:  # fmt: skip
+        self,
+        now: Now,
+        event: str,
+        ref: Ref = NOTHING,
+        *,
+        token: int = -1,
+        detail: str = "",
+        durability: int = WRITTEN,
+    ) -> None:
         """Record something that happened, and show it. `detail` may be the world's own text."""
-        line = partial(
-            self.recorder.effect,
-            now, event, kind=kind, step=step, link=link, token=token, detail=detail, durability=durability,
-        )  # fmt: skip
-        self._entries.append(partial(self._shown, line, now, durability, Show(event, detail, step)))
+        line = partial(self.recorder.effect, now, event, ref, token=token, detail=detail, durability=durability)
+        self._entries.append(partial(self._shown, line, now, durability, Show(event, detail, ref.step)))
 
     def anchor(self, now: Now, note: str) -> None:
         """Record what a witness cosigned. It is for verifiers, and shown to nobody."""

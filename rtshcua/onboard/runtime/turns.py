@@ -18,7 +18,7 @@ from rtshcua.onboard.runtime.fallback import Progress
 from rtshcua.onboard.runtime.flight import Stage
 from rtshcua.onboard.runtime.link import Silence
 from rtshcua.onboard.runtime.supervisor import Supervisor
-from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Answer
 
 
@@ -135,7 +135,7 @@ class Turns:
             if now.monotonic_us < released_us + invocation.contract.deadline_us:
                 return self._bide(now, invocation, state)
             return conduct.come_down(now, cause=Ending.EVIDENCE_LOST)
-        answer = conduct.admission.ask(now, state, (STEP, invocation.step, -1))
+        answer = conduct.admission.ask(now, state, Ref(STEP, invocation.step, -1))
         if answer is None or (answer.outcome is Outcome.DENY and not answer.permit):
             return conduct.come_down(now)
         if answer.permit:
@@ -168,7 +168,7 @@ class Turns:
 
     def _start(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
         conduct, loaded = self._conduct, self._conduct.loaded
-        if not conduct.dispatcher.fly(now, answer.permit, (STEP, invocation.step, -1), None):
+        if not conduct.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
             return self._inadmissible(now, invocation)
         conduct.supervisor = Supervisor(loaded.invocations[invocation.step], loaded.policy, now.monotonic_us)
         conduct.stage = Stage.RUNNING
@@ -177,7 +177,7 @@ class Turns:
     def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
         conduct = self._conduct
         if invocation.on_inadmissible == OnInadmissible.SKIP:
-            conduct.journal.effect(now, "skipped", kind=STEP, step=invocation.step)
+            conduct.journal.effect(now, "skipped", Ref(STEP, invocation.step, -1))
             conduct.advance(now)
             return True
         return conduct.come_down(now, FALLBACK_LINK)

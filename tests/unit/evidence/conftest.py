@@ -4,10 +4,12 @@ from collections.abc import Callable
 
 import pytest
 
+from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.request import Ref
 
 BOOT = bytes(range(16))
 
@@ -42,20 +44,11 @@ def decide(recorder: Recorder, now: Callable[[int], Now]) -> Callable[..., bytes
 
     def decide(ms: int, **fields: object) -> bytes:
         given: dict[str, object] = {
-            "kind": 0,
-            "step": 0,
-            "link": -1,
+            "ref": Ref(0, 0, -1),
             "invocation": bytes(16),
             "state": State((35_000, None, -3), (1_200, 0, 50)),
             "context": Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),)),
-            "outcome": Outcome.ALLOW,
-            "reason": Reason.ADMITTED,
-            "rule_step": 8,
-            "clause": None,
-            "clause_at": None,
-            "target": None,
-            "target_link": -1,
-            "valid_until_us": 6_000_000,
+            "answer": RecordedAnswer.of(Outcome.ALLOW, Reason.ADMITTED, 8, 6_000_000),
         }
         return recorder.decision(now(ms), **(given | fields))  # type: ignore[arg-type]
 
@@ -67,22 +60,15 @@ def log(
     recorder: Recorder, begin: Callable[[], bytes], decide: Callable[..., bytes], now: Callable[[int], Now]
 ) -> list[bytes]:
     """Genesis, two decisions, two effects, a seal, an empty epoch's seal, an effect, close."""
-    refused = {
-        "step": 1,
-        "outcome": Outcome.FALLBACK,
-        "reason": Reason.STATE_VIOLATED,
-        "rule_step": 6,
-        "clause": 'battery > 35 % "ß"',
-        "clause_at": (0, 10, 24),
-        "target": "hover for 20 s",
-        "target_link": 0,
-    }
+    refused = RecordedAnswer(
+        "fallback", "state/violated", 6, 'battery > 35 % "ß"', (0, 10, 24), "hover for 20 s", 0, 6_000_000
+    )
     return [
         begin(),
         decide(10),
-        recorder.effect(now(11), "dispatched", kind=0, step=0, token=1),
-        decide(12, **refused),
-        recorder.effect(now(13), "failed", kind=0, step=0, token=1, detail="PreArm: \ud800 \x1b[31m\n"),
+        recorder.effect(now(11), "dispatched", Ref(0, 0, -1), token=1),
+        decide(12, ref=Ref(0, 1, -1), answer=refused),
+        recorder.effect(now(13), "failed", Ref(0, 0, -1), token=1, detail="PreArm: \ud800 \x1b[31m\n"),
         recorder.seal(now(14)),
         recorder.seal(now(15)),
         recorder.effect(now(16), "landed", durability=2),

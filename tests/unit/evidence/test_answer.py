@@ -1,0 +1,40 @@
+"""Decisions in the words of a log, and what a record is about."""
+
+from collections.abc import Callable
+
+import pytest
+
+from reference import flat_case as flat
+from rtshcua.evidence.answer import RecordedAnswer
+from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import Decision, Effect
+from rtshcua.model.flat.situation import Now
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.wire.request import NOTHING, Ref
+
+
+@pytest.mark.parametrize("outcome", Outcome)
+def test_an_answer_without_clause_and_target(outcome: Outcome) -> None:
+    words = outcome.name.lower()
+    answer = RecordedAnswer.of(outcome, Reason.ADMITTED, 8, 9)
+    assert answer == RecordedAnswer(words, "admitted", 8, None, None, None, -1, 9)
+
+
+def test_an_answer_names_its_clause_and_its_target() -> None:
+    clause, target = flat.RULES[0], flat.POLICY.contingency[1]
+    place = (clause.source, clause.start, clause.end)
+    answer = RecordedAnswer.of(Outcome.FALLBACK, Reason.NO_SLACK, 5, 9, clause=clause, target=target, target_link=1)
+    assert answer == RecordedAnswer("fallback", Reason.NO_SLACK.value, 5, clause.text, place, target.text, 1, 9)
+
+
+def test_a_record_says_what_it_is_about(
+    recorder: Recorder, begin: Callable[[], bytes], decide: Callable[..., bytes], now: Callable[[int], Now]
+) -> None:
+    begin()
+    decision = read(decide(1, ref=Ref(1, 2, 3)))
+    effect, other = read(recorder.effect(now(2), "sent", Ref(2, -1, 1))), read(recorder.effect(now(3), "ready"))
+    assert isinstance(decision, Decision)
+    assert isinstance(effect, Effect)
+    assert isinstance(other, Effect)
+    assert (decision.ref, effect.ref, other.ref) == (Ref(1, 2, 3), Ref(2, -1, 1), NOTHING)

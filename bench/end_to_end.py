@@ -30,10 +30,10 @@ from rtshcua.adapters.loop import HELD_WAIT_US, Loop
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.onboard.ports import Command, Ending, Event, Succeeded
+from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual import case
 from virtual.flight import Flight
 from virtual.shipped import shipped
-from virtual.vehicle import VirtualVehicle
 
 LIMIT_MS = 5.0
 PUBLISHED_MS = {"short": 55.7, "extended": 135.0}

@@ -236,7 +236,7 @@ def _listen(order: Launch, driver: Driver, clock: LinkClock, tape: Tape) -> UdpV
 
 
 def _simulate(order: Launch, loaded: Loaded, port: int) -> Simulator:
-    words = [*simulated.fitting(loaded.bundle.policy), *order.simulator]
+    words = [*simulated.of_policy(loaded.bundle.policy), *order.simulator]
     if order.signing_key is not None:
         words += ["--signing-key", str(order.signing_key)]
     try:

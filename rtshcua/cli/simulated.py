@@ -6,14 +6,12 @@ from typing import Annotated
 import typer
 
 from rtshcua.model.flat.policy import Policy
-from rtshcua.simulation.config import HOME, Kind
+from rtshcua.simulation.config import Kind
 from rtshcua.simulation.fault_text import KINDS, parse_fault
+from rtshcua.virtual.fitting import fitting
 
 _WIND = re.compile(r"\d+(\.\d+)?,\d+(\.\d+)?(,\d+(\.\d+)?)?", re.ASCII)
 _HOME = re.compile(r"-?\d+(\.\d+)?,-?\d+(\.\d+)?,-?\d+(\.\d+)?", re.ASCII)
-_AMSL_M = HOME.amsl_mm // 1_000
-_CRUISE_MM_S = 5_000
-_FASTEST_MM_S = 12_000
 
 
 def _wind(text: str | None) -> str | None:
@@ -74,14 +72,13 @@ def arguments(
     return words
 
 
-def fitting(policy: Policy) -> list[str]:
+def of_policy(policy: Policy) -> list[str]:
     """Options that make it the vehicle of a policy: its home, its endurance, its return, and no faster than it."""
-    latitude, longitude = policy.projection.latitude / 10_000_000, policy.projection.longitude / 10_000_000
-    cruise = min(_CRUISE_MM_S, policy.vehicle.speed or _FASTEST_MM_S) / 1_000
-    returns = [f"--return-at={policy.vehicle.return_altitude / 1_000:g}"] if policy.vehicle.return_altitude else []
+    fits = fitting(policy)
+    home = fits.home
     return [
-        *returns,
-        f"--home={latitude:.7f},{longitude:.7f},{_AMSL_M}",
-        f"--hover={policy.vehicle.endurance_us / 60_000_000:.3f}",
-        f"--cruise={cruise:.3f}",
+        f"--return-at={fits.return_mm / 1_000:g}",
+        f"--home={home.latitude / 1e7:.7f},{home.longitude / 1e7:.7f},{home.amsl_mm // 1_000}",
+        f"--hover={fits.hover_us / 60_000_000:.3f}",
+        f"--cruise={fits.cruise_mm_s / 1_000:.3f}",
     ]

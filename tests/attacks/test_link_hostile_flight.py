@@ -9,26 +9,25 @@ from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Ending
+from rtshcua.virtual.vehicle import START, VirtualClock, VirtualVehicle
 from virtual import case
-from virtual.flight import MONOTONIC_US, Flight, Flown
-from virtual.vehicle import VirtualClock, VirtualVehicle
+from virtual.flight import UTC_US, Flight, Flown
 
 KEY = bytes(range(1, 33))
-UTC_US = case.flat.ISSUED + 60 * case.S
 MOST = 500  # frames overheard that are replayed
 EVERY = 15  # datagrams of the vehicle
 
 
 def fly(flavour: str, *, hostile: bool, theirs: bytes = KEY, most_s: int = 600) -> Flown:
     """Up, one leg, home; with a key at both ends."""
-    link = SignedLink(KEY, State(0, {}), UTC_US, MONOTONIC_US)
+    link = SignedLink(KEY, State(0, {}), UTC_US, START.monotonic_us)
     frames = FrameSession()
     frames.sign_with(link)
     config = case.simulated(flavour, signing_key=theirs, utc_us=UTC_US)
-    clock = VirtualClock(Now(MONOTONIC_US, UTC_US, 1_000))
+    clock = VirtualClock(Now(START.monotonic_us, UTC_US, 1_000))
     vehicle = VirtualVehicle(case.policy(), config, clock, frames, link)
     overheard: list[bytes] = []
-    radio = SignedLink(theirs, State(0, {}), UTC_US, MONOTONIC_US, link=2)
+    radio = SignedLink(theirs, State(0, {}), UTC_US, START.monotonic_us, link=2)
 
     def through_the_air(datagram: bytes) -> list[bytes]:
         if message_id(datagram, 0) == RADIO_STATUS:  # this one's radio has the key, too

@@ -4,10 +4,10 @@ import pytest
 
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import Boot
+from rtshcua.virtual.vehicle import SECOND, START
 from virtual import case
 from virtual.flight import Flight
 from virtual.shipped import shipped
-from virtual.vehicle import SECOND, START
 
 
 @pytest.mark.parametrize(("flavour", "earliest_s", "latest_s"), [("px4", 5, 8), ("ardupilot", 41.6, 45)])

@@ -7,7 +7,7 @@ from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.keeper import Keeper
 from rtshcua.adapters.files.lateness import Lateness
 from rtshcua.adapters.files.writer import SYNC_S
-from virtual.vehicle import VirtualClock
+from rtshcua.virtual.vehicle import VirtualClock
 
 
 class DiskSink:

@@ -18,8 +18,8 @@ from rtshcua.onboard.unheard import unheard
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.faults import GpsLoss, LinkLoss
 from rtshcua.simulation.place import Home
+from rtshcua.virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 from virtual import case
-from virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 
 KEY = bytes(range(32))
 MISSION = case.mission(case.short_steps())

@@ -9,9 +9,9 @@ import pytest
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Readings, Ready, Succeeded, TakenOver
 from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from virtual.copying import copied
 from virtual.policy import POLICY, geo
-from virtual.vehicle import SECOND, VirtualVehicle
 
 
 class Flyer:

@@ -12,9 +12,9 @@ from rtshcua.onboard.ports import Readings, Ready
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.faults import LinkDelay
+from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from virtual.copying import copied
 from virtual.policy import POLICY
-from virtual.vehicle import SECOND, VirtualVehicle
 
 STALE_US = 2 * SECOND
 LATE = replace(POLICY, signals=tuple(replace(signal, stale_us=STALE_US) for signal in POLICY.signals))

@@ -1,8 +1,9 @@
 """The simulated vehicle behind its real driver, in one process and explicit time: the `Vehicle` and `Clock` ports."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.flavour import Stages
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
@@ -18,7 +19,7 @@ START = Now(7_000_000, 1_767_225_600_000_000, 1_000)
 
 
 class VirtualClock:
-    """Time that only moves when it is told to."""
+    """Time that only moves when it is told to: `elapsed_us` since `start`."""
 
     def __init__(self, start: Now = START) -> None:
         self.elapsed_us = 0
@@ -26,9 +27,11 @@ class VirtualClock:
 
     @property
     def monotonic_us(self) -> int:
+        """The monotonic time."""
         return self._start.monotonic_us + self.elapsed_us
 
     def now(self) -> Now:
+        """The present moment."""
         start = self._start
         return Now(start.monotonic_us + self.elapsed_us, start.utc_us + self.elapsed_us, start.utc_error_us)
 
@@ -38,21 +41,22 @@ class VirtualVehicle:
 
     `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives
     the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
-    permitted.
+    permitted. `verifier`, `fence` and `manoeuvres` are the driver's.
     """
 
     def __init__(
         self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None,
         frames: FrameSession | None = None, verifier: Verifier | None = None, *, fence: bool = True,
+        manoeuvres: Mapping[str, Stages] | None = None,
     ) -> None:  # fmt: skip
         self.simulation = Simulation(config)
         self.frames = FrameSession() if frames is None else frames
         self._free = frames is None
-        self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier)
+        self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier, manoeuvres=manoeuvres)
         self.clock = clock or VirtualClock()
         self.received = self.sent = 0
-        self.lose = lambda frame: False
-        self.hurt = lambda datagram: [datagram]
+        self.lose: Callable[[bytes], bool] = lambda frame: False
+        self.hurt: Callable[[bytes], Sequence[bytes]] = lambda datagram: [datagram]
         self._pending: list[Event] = []
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
@@ -69,6 +73,7 @@ class VirtualVehicle:
             self._take(self.simulation.advance(self.clock.elapsed_us), events)
 
     def begin(self, command: Command, now_us: int) -> None:
+        """Start a command."""
         if self._free:
             self.frames.open(command, now_us + 10 * SECOND)
         events, frames = self.driver.begin(command, now_us)
@@ -76,9 +81,11 @@ class VirtualVehicle:
         self._pending += events
 
     def release(self) -> None:
+        """Let go of the vehicle: nothing more is sent for a command."""
         self.driver.release()
 
     def announce(self, severity: int, text: str) -> None:
+        """Send a STATUSTEXT."""
         self.driver.announce(severity, text)
 
     def _send(self, frames: Sequence[bytes], events: list[Event]) -> None:

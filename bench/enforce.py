@@ -23,10 +23,9 @@ from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Append, Dispatch
-from rtshcua.onboard.runtime.admission import Admission
+from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
+from rtshcua.onboard.runtime.dispatcher import RemainingLatency
 from rtshcua.onboard.runtime.journal import Journal
-from rtshcua.onboard.runtime.queue import InvocationQueue
-from rtshcua.onboard.runtime.remaining import RemainingLatency
 from rtshcua.wire.duty import Duty
 from rtshcua.wire.request import Ref
 

@@ -40,7 +40,7 @@ from rtshcua.cli.live.telling import Teller
 from rtshcua.cli.live.watching import Watching
 from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.runtime.view import Stage
 from virtual import case
 from virtual.flight import Flight
 from virtual.shipped import shipped

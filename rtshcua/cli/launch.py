@@ -39,7 +39,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
-from rtshcua.onboard.unheard import stranded
+from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
 from rtshcua.wire.keys import Duty, SigningKey

@@ -8,7 +8,7 @@ from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.unheard import unheard
+from rtshcua.onboard.rehearsal import unheard
 
 _RADIO = "the policy reads RADIO_STATUS, which radios do not sign: it is not known without `--unsigned-radio`"
 #: messages that nobody signs

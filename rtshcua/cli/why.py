@@ -25,7 +25,7 @@ from rtshcua.ground.why.given import given
 from rtshcua.ground.why.nominal import lasting, nominal
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.situation import Context, Now
-from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import MAX_BUNDLE, policy_digest, policy_payload
 

@@ -6,58 +6,61 @@ times are in us; `at_us` is monotonic.
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Final, Protocol
+from typing import Final, Protocol, dataclass_transform
+
+import msgspec
 
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.frozen import Frozen as Frozen
-from rtshcua.onboard.stores import EvidenceFailed as EvidenceFailed
-from rtshcua.onboard.stores import EvidenceKept as EvidenceKept
-from rtshcua.onboard.stores import EvidenceSink as EvidenceSink
-from rtshcua.onboard.stores import Opening as Opening
-from rtshcua.onboard.stores import ReplayStore as ReplayStore
+
+
+@dataclass_transform(frozen_default=True)
+class Frozen(msgspec.Struct, frozen=True):
+    """The base of events, actions and commands: they do not change."""
+
 
 # ---------------------------------------------------------------- events
 
 
-class Readings(Frozen, frozen=True):
+class Event(Frozen, frozen=True):
+    """Something that happened, and when."""
+
+    at_us: int
+
+
+class Readings(Event, frozen=True):
     """Signals that one frame carried: (state slot, canonical integer or None for "reported as not known").
 
     `at_us` is when the vehicle measured them, on our monotonic clock, as early as it may have been.
     """
 
-    at_us: int
     values: tuple[tuple[int, int | None], ...]
 
 
-class Ready(Frozen, frozen=True):
+class Ready(Event, frozen=True):
     """The vehicle is connected, its estimator has a position and it would accept arming, or it flies already.
 
     `others`: it flies, and in a way that nothing of ours makes it fly (the name of a mode, or `landing`).
     """
 
-    at_us: int
     others: str = ""
 
 
-class AirState(Frozen, frozen=True):
+class AirState(Event, frozen=True):
     """What the vehicle says of itself: armed, and in the air (EXTENDED_SYS_STATE, or the flavour's equivalent)."""
 
-    at_us: int
     armed: bool
     airborne: bool
 
 
-class Sent(Frozen, frozen=True):
+class Sent(Event, frozen=True):
     """The first frame of command `token` went out at `at_us`: what admission and dispatch took is measured with it."""
 
-    at_us: int
     token: int
 
 
-class Succeeded(Frozen, frozen=True):
+class Succeeded(Event, frozen=True):
     """The effect of command `token` was observed: arrived, climbed, landed and disarmed."""
 
-    at_us: int
     token: int
 
 
@@ -65,119 +68,96 @@ class Succeeded(Frozen, frozen=True):
 WITHHELD: Final = "withheld"
 
 
-class Failed(Frozen, frozen=True):
+class Failed(Event, frozen=True):
     """Command `token` was refused by the vehicle, or its effect did not come; or it was not sent (`late`, `withheld`).
 
     `text` is the vehicle's own, untrusted.
     """
 
-    at_us: int
     token: int
     reason: str
     text: str = ""
 
 
-class TakenOver(Frozen, frozen=True):
+class TakenOver(Event, frozen=True):
     """Someone else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They win.
 
     `how` says what showed it: the name of the mode, or another target, a landing or a disarming that nobody here
     commanded.
     """
 
-    at_us: int
     how: str
 
 
-class Crashed(Frozen, frozen=True):
+class Crashed(Event, frozen=True):
     """The vehicle came down as no landing does. `how` says what showed it."""
 
-    at_us: int
     how: str
 
 
-class LinkLost(Frozen, frozen=True):
+class LinkLost(Event, frozen=True):
     """Nothing came from the vehicle for longer than the link's limit; `heard_us` is when it was last heard.
 
     With 0 it was heard just now.
     """
 
-    at_us: int
     why: str = ""
     heard_us: int = 0
 
 
-class LinkBack(Frozen, frozen=True):
+class LinkBack(Event, frozen=True):
     """The vehicle is heard again, and answers, after `LinkLost`. Its state is not fresh yet."""
 
-    at_us: int
 
-
-class Interrupted(Frozen, frozen=True):
+class Interrupted(Event, frozen=True):
     """The operator asked this program to stop (SIGINT, SIGTERM): fall back first, then end."""
 
-    at_us: int
+
+class EvidenceFailed(Event, frozen=True):
+    """The evidence sink cannot take records any more (disk full, I/O error), or not in time."""
+
+    reason: str
 
 
-class ClockStepped(Frozen, frozen=True):
+class EvidenceKept(Event, frozen=True):
+    """After `EvidenceFailed`, the sink took everything again. All that was given to it is written, and what
+    was given up to the failure is on the disk.
+    """
+
+
+class ClockStepped(Event, frozen=True):
     """The machine's time of day was set, `by_us` ahead (or back). Records go on by the time of day they began with."""
 
-    at_us: int
     by_us: int
 
 
-class Said(Frozen, frozen=True):
+class Said(Event, frozen=True):
     """The vehicle said something to people (STATUSTEXT). `text` is its own, untrusted; `severity` is MAV_SEVERITY."""
 
-    at_us: int
     severity: int
     text: str
 
 
-class Presented(Frozen, frozen=True):
+class Presented(Event, frozen=True):
     """Somebody handed over a signed document, as yet unverified: an approval, a recall, a replacement.
 
     `sender` numbers who gets the answer.
     """
 
-    at_us: int
     document: bytes
     sender: int = 0
 
 
-class Anchored(Frozen, frozen=True):
+class Anchored(Event, frozen=True):
     """A witness cosigned a checkpoint of the log; `note` is the checkpoint with its signature, which was verified."""
 
-    at_us: int
     note: str
 
 
-class Noted(Frozen, frozen=True):
+class Noted(Event, frozen=True):
     """The vehicle's adapter found something that an operator should know; it decides nothing."""
 
-    at_us: int
     text: str
-
-
-Event = (
-    Readings
-    | Ready
-    | AirState
-    | Sent
-    | Succeeded
-    | Failed
-    | TakenOver
-    | Crashed
-    | LinkLost
-    | LinkBack
-    | Interrupted
-    | EvidenceFailed
-    | EvidenceKept
-    | ClockStepped
-    | Said
-    | Presented
-    | Anchored
-    | Noted
-)
 
 
 # ---------------------------------------------------------------- commands and actions
@@ -276,6 +256,9 @@ class End(Frozen, frozen=True):
 Action = Dispatch | Release | Append | Show | Announce | Reply | End
 
 
+# ---------------------------------------------------------------- the other side
+
+
 class Boundary(Protocol):
     """The enforcement boundary after `load`: bytes in, bytes out, the same in process, isolated, or in another
     world.
@@ -322,4 +305,55 @@ class Vehicle(Protocol):
 
     def announce(self, severity: int, text: str) -> None:
         """Tell any ground station, as STATUSTEXT; left out when the link is busy."""
+        ...
+
+
+class EvidenceSink(Protocol):
+    """Where evidence lines go, in their order. It takes them over and never makes the caller wait for the disk."""
+
+    @property
+    def kept(self) -> int:
+        """How many lines, from the first on, are written: they survive the death of this process."""
+        ...
+
+    @property
+    def synced(self) -> int:
+        """How many lines, from the first on, are on the disk: they survive a loss of power."""
+        ...
+
+    def append(self, line: bytes, durability: int) -> int:
+        """Take one line over, of a class of `evidence.durability`; it is written, or on the disk, once `kept`, or
+        `synced`, reaches the number that is given back.
+
+        Raises OSError when the line could not be written at once, or when more wait than may. It is not lost by that:
+        the chain needs it, and it is written as soon as the disk takes it.
+        """
+        ...
+
+    def trouble(self) -> str | None:
+        """Why lines that were taken over are not kept, each failure told once; None while nothing went wrong."""
+        ...
+
+    def late(self) -> str | None:
+        """That a line was not on the disk within the time promised for its class, told once; None while all are."""
+        ...
+
+    def close(self) -> None:
+        """Flush and close. Waits for the disk, but not for ever."""
+        ...
+
+
+class Opening(StrEnum):
+    """What became of opening a mission on a vehicle."""
+
+    OPENED = "opened"
+    REPLAYED = "replayed"  # opened before, also by a run that crashed; or it might have been
+    OLD_POLICY = "old-policy"  # a higher version of its policy was in force there
+
+
+class ReplayStore(Protocol):
+    """Which missions were opened on this vehicle, and the versions of their policies: on disk before any flies."""
+
+    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
+        """Open the mission of this digest, under a version of a policy."""
         ...

@@ -1,22 +1,28 @@
-"""The rehearsal: every step of a loaded bundle is decided against the present state, and nothing is sent or used up.
+"""What can be said of a mission before it flies. Nothing is sent or used up.
 
-The first step is decided as it would be now. A later one is decided as if those before it had flown: position and
-height are where their plans end, everything else is as it is now. Each is taken to be released at this moment, in its
-own phase, under the conservative `L_rem`, with no approval given.
+`rehearse` decides every step of a loaded bundle against the present state. The first step is decided as it would be
+now. A later one is decided as if those before it had flown: position and height are where their plans end, everything
+else is as it is now. Each is taken to be released at this moment, in its own phase, under the conservative `L_rem`,
+with no approval given.
+
+`unheard` are the signals that cannot come on a link, and `stranded` the steps that a mission would wait at for ever for
+want of them, or break off at.
 """
 
+from collections.abc import Container
 from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import Decision, decide
 from rtshcua.decision.nearest import Nearest, nearest
+from rtshcua.decision.reads import slots_read
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Plan
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.mission import Invocation, Mission, Plan
+from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle
+from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US
-from rtshcua.onboard.unheard import stranded
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 
 #: a deferral that ends by itself once the mission is under way,
 _COMES: Final = frozenset({Reason.AWAITING_APPROVAL, Reason.PHASE_NOT_REACHED})
@@ -84,3 +90,36 @@ def flown(state: State, plan: Plan, vehicle: Vehicle) -> State:
 def _at(vehicle: Vehicle, x: int, y: int, height: int) -> dict[int, int]:
     east = vehicle.position
     return {east: x, east + 1: y, vehicle.height: height} if east >= 0 else {vehicle.height: height}
+
+
+def unheard(policy: Policy, messages: Container[str]) -> frozenset[int]:
+    """The state slots of the signals that nothing but these messages carries."""
+    slots: set[int] = set()
+    for signal in policy.signals:
+        if signal.sources and all(source.message in messages for source in signal.sources):
+            slots.update(range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1)))
+    return frozenset(slots)
+
+
+def needed(policy: Policy, invocation: Invocation) -> frozenset[int]:
+    """The slots without which a step is held up: those of its contract, of the rules that it may meet, and those that
+    each permit asks about which may cover it.
+    """
+    contract = invocation.contract
+    clauses = [*contract.require, *contract.assume, *contract.maintain]
+    permits: list[set[int]] = []
+    for rule in policy.rules:
+        if rule.skills and invocation.skill not in rule.skills:
+            continue
+        if rule.kind == RuleKind.PERMIT:
+            read = () if rule.when is None else slots_read((rule.when,), policy.vehicle, policy.monitors)
+            permits.append(set(read))
+        elif rule.when is not None:
+            clauses.append(rule.when)
+    every = set.intersection(*permits) if permits else set[int]()
+    return frozenset({*contract.reads, *slots_read(clauses, policy.vehicle, policy.monitors), *every})
+
+
+def stranded(policy: Policy, mission: Mission, slots: frozenset[int]) -> tuple[Invocation, ...]:
+    """The steps of a mission that need a slot of these."""
+    return tuple(each for each in mission.invocations if slots and not slots.isdisjoint(needed(policy, each)))

@@ -24,6 +24,9 @@ SIZE = _BODY.size + _MAC
 
 #: How long a permit for a link that was just decided may be used, in us.
 LINK_VALID_US = 1_000_000
+#: How often a standing permit lets the last link of the contingency be sent again, each under a serial of its own:
+#: landing twice harms nothing, and nothing else is left to a vehicle whose boundary does not answer any more.
+AGAIN = 16
 
 
 class Permit(msgspec.Struct, frozen=True):
@@ -31,8 +34,9 @@ class Permit(msgspec.Struct, frozen=True):
 
     `kind`, `step` and `link` are those of the request, but for a degrade rule's target `link` is `-1 - rule`. `serial`
     is the command's token and never reused in a session. The next `fallbacks` serials stand for the links of the step's
-    chain until its skill ends, the `contingencies` after them for the links of the contingency until landing; a permit
-    for a link has none. `not_after_us` (monotonic) bounds the command itself, not what stands behind it.
+    chain until its skill ends, the `contingencies` after them for the links of the contingency until landing, and
+    `AGAIN` more for its last; a permit for a link has none. `not_after_us` (monotonic) bounds the command itself, not
+    what stands behind it.
     """
 
     kind: int

@@ -3,8 +3,7 @@
 from reference.world import START, Run, allowed, answer_to, loaded, request_for
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
-from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.executor import FORGED, USED, Executor
+from rtshcua.onboard.enforcement.executor import FORGED, USED, Commands, Executor
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.response import Answer
 

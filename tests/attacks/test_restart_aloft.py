@@ -6,7 +6,7 @@ from reference.documents import low, recall
 from reference.flat_case import S
 from reference.world import FakeVehicle, Run, assert_audited, renewed
 from rtshcua.onboard.ports import AirState, Ending, Event, EvidenceFailed, Interrupted, Presented
-from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.limits import Limits
 
 OF = low()
 

@@ -11,7 +11,7 @@ import pytest
 
 from rtshcua.evidence.report import Verdict
 from rtshcua.onboard.ports import Ending, Event
-from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.runtime.view import Stage
 from rtshcua.simulation.faults import LinkReorder, LinkSilence, Way, WindStep
 from virtual import case
 from virtual.flight import Flight, Flown

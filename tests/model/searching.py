@@ -39,8 +39,8 @@ from rtshcua.onboard.ports import (
     Succeeded,
     TakenOver,
 )
-from rtshcua.onboard.runtime.flight import Stage
 from rtshcua.onboard.runtime.runtime import Runtime
+from rtshcua.onboard.runtime.view import Stage
 from rtshcua.wire.keys import Duty
 
 START = Now(BEGIN_US, ISSUED + 60 * UNIT, 20_000)
@@ -182,7 +182,7 @@ class Search:
             parents.append((parent, event))
             found.edges.append([])
             found.next.append([])
-            found.falling.append(at.runtime._conduct.stage is Stage.FALLING)
+            found.falling.append(at.runtime._controller.stage is Stage.FALLING)
             if at.runtime.ending is not None:
                 _guarded(found, new, "(over)", _over, at)
             if ending is not None:
@@ -225,9 +225,9 @@ class Search:
         parts: object = _ending(at)  # when it is over, how it was is over too
         if parts is None:
             parts = (at.runtime, at.of, at.watch, at.profile, at.heard_us, at.restarted, at.handed)
-        conduct = at.runtime._conduct
-        standing = conduct.dispatcher._standing
-        return self._snapshots.canonical(parts, at.now_us, conduct.stage, None if standing is None else standing[1])
+        controller = at.runtime._controller
+        standing = controller.dispatcher._standing
+        return self._snapshots.canonical(parts, at.now_us, controller.stage, None if standing is None else standing[1])
 
     def _begin(self, *, resumed: bool) -> World:
         of = self._loaded()
@@ -238,7 +238,7 @@ class Search:
 
     def _loaded(self) -> Loaded:
         of = self._snapshots.restore(self._template)
-        of.boundary._mint._serial = SERIALS
+        of.boundary._issuer._serial = SERIALS
         return replace(of, executor=Gate(of.executor, SESSION_KEY, self._ear))
 
     def _restart(self, at: World) -> None:

@@ -14,7 +14,7 @@ from rtshcua.decision.checks.vehicle import MAX_SPEED
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind
-from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.limits import Limits
 
 UNIT = S
 GRACE = UNIT // 2  # shorter than a skill may last, or it would never be over first

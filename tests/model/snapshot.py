@@ -22,22 +22,17 @@ from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
-from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
+from rtshcua.onboard.enforcement.boundary import PermitIssuer, SoftwareBoundary
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.enforcement.mint import AGAIN, Mint
-from rtshcua.onboard.runtime.admission import Admission
-from rtshcua.onboard.runtime.conduct import Conduct
-from rtshcua.onboard.runtime.craft import Craft
+from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
+from rtshcua.onboard.runtime.controller import MissionController
+from rtshcua.onboard.runtime.events import EventHandler
 from rtshcua.onboard.runtime.fallback import Fallback
-from rtshcua.onboard.runtime.flight import Limits, Stage
-from rtshcua.onboard.runtime.happenings import Happenings
-from rtshcua.onboard.runtime.inbox import Inbox
-from rtshcua.onboard.runtime.monitor import StateMonitor
-from rtshcua.onboard.runtime.queue import InvocationQueue
-from rtshcua.onboard.runtime.turns import Turns
-from rtshcua.onboard.runtime.view import Decided
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
+from rtshcua.onboard.runtime.view import Decided, Stage
 from rtshcua.wire.bundle import Bundle
-from rtshcua.wire.permit import SIZE, open_permit
+from rtshcua.wire.permit import AGAIN, SIZE, open_permit
 from rtshcua.wire.trust import TrustRoot
 
 #: where monotonic and UTC time begin, in us: far from every other number, and from each other
@@ -54,23 +49,18 @@ _ONCE = (PreparedInvocation, PreparedPolicy, Recorder, Limits, Enum, type, Funct
 #: compared with time that goes back, and with nothing else; and what is kept so that it is not computed twice
 _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     Admission: ("_last", "_repeated", "recent"),
-    Inbox: ("_refused_us", "_unrecorded"),
-    Happenings: ("_gap",),
+    EventHandler: ("_gap", "_refused_us", "_unrecorded"),
     SoftwareBoundary: ("_now_us",),
     StateMonitor: ("_state", "_held"),
 }
 #: attributes that are read in these stages only, and are set anew whenever a run comes into them
 _READ_IN: dict[tuple[type, str], tuple[Stage, ...]] = {
-    (Conduct, "supervisor"): (Stage.RUNNING,),
-    (Conduct, "patience"): (Stage.DECIDING,),
-    (Conduct, "held"): (Stage.DECIDING,),
-    (Conduct, "fresh"): (Stage.DECIDING,),
-    (Conduct, "asked_us"): (Stage.DECIDING,),
-    (InvocationQueue, "_released_us"): (Stage.DECIDING,),
-    (Craft, "ready"): (Stage.WAITING,),
-    (Turns, "_began_us"): (Stage.WAITING,),
+    (MissionController, "_began_us"): (Stage.WAITING,),
+    (MissionController, "retry"): (Stage.DECIDING,),
+    (MissionController, "_supervisor"): (Stage.RUNNING,),
+    (VehicleStatus, "ready"): (Stage.WAITING,),
+    (InvocationQueue, "released_us"): (Stage.DECIDING,),
     (Fallback, "_chain"): (Stage.FALLING,),
-    (Fallback, "_holds"): (Stage.FALLING,),
 }
 
 
@@ -195,7 +185,7 @@ class _Comparison:
             return lambda thing: ("invocation", thing.invocation.binding)
         if issubclass(kind, Invocation):
             return lambda thing: ("invocation", thing.binding)
-        if issubclass(kind, (Mint, FrameSession)):
+        if issubclass(kind, (PermitIssuer, FrameSession)):
             return lambda thing: name  # the next serial is one that nobody has seen; no frame is sent in a search
         if issubclass(kind, type):
             return lambda thing: ("type", thing.__qualname__)

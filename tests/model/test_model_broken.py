@@ -13,13 +13,13 @@ from model.small import BACK, DOWN, HOLD, LINK, VEHICLE, WORST, Small, small
 from reference.flat_case import GOTO, HOME, TAKEOFF
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import AfterSilence
-from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Dispatch
-from rtshcua.onboard.runtime.conduct import Conduct
+from rtshcua.onboard.runtime.controller import MissionController
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
-from rtshcua.onboard.runtime.fallback import Fallback, Progress
-from rtshcua.onboard.runtime.happenings import Happenings
-from rtshcua.onboard.runtime.link import Link
+from rtshcua.onboard.runtime.events import EventHandler
+from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.link import LinkSupervision
 from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
 
 LITTLE = small("little", (TAKEOFF, HOME), ("good",), VEHICLE, contingency=(BACK, DOWN), chain=(HOLD,))
@@ -81,7 +81,7 @@ def past_the_executor(of: Any) -> Any:
 
 def ended_in_the_air(of: Any) -> Any:
     """Whoever interrupts it ends it, wherever the vehicle is."""
-    return lambda self, now, cause: self.end(now, cause)
+    return lambda self, now, cause, kind=0: self._end(now, cause)
 
 
 def without_release(of: Any) -> Any:
@@ -99,8 +99,8 @@ NEVER: dict[str, tuple[type, str, Callable[[Any], Any], str, str]] = {
     "higher": (Commands, "command", higher, "not what was permitted", "interrupted"),
     "another skill": (Commands, "command", another_skill, "another skill", "interrupted"),
     "past the executor": (Dispatcher, "_send", past_the_executor, "sent past the executor", "interrupted"),
-    "ended in the air": (Conduct, "break_off", ended_in_the_air, "it ended", "interrupted"),
-    "a landing ends nothing": (Conduct, "down", nothing_ends, "it ended in the air", "interrupted"),
+    "ended in the air": (MissionController, "break_off", ended_in_the_air, "it ended", "interrupted"),
+    "a landing ends nothing": (MissionController, "down", nothing_ends, "it ended in the air", "interrupted"),
     "without release": (Dispatcher, "release", without_release, "it went on after", "taken over"),
 }
 
@@ -139,14 +139,14 @@ def flies_on(of: Any) -> Any:
 
 
 AFTER: dict[str, tuple[type, str, Callable[[Any], Any], str, Small]] = {
-    "it goes on after a takeover": (Happenings, "_ended", goes_on, "it went on", with_events("taken over")),
-    "it goes on after a crash": (Happenings, "_ended", goes_on, "it went on", with_events(*WORST)),
+    "it goes on after a takeover": (EventHandler, "_ended", goes_on, "it went on", with_events("taken over")),
+    "it goes on after a crash": (EventHandler, "_ended", goes_on, "it went on", with_events(*WORST)),
     "stale state is judged": (
-        Link, "awaits", judges_at_once, "judged what was known before a silence", with_events(*LINK, "silence")),
+        LinkSupervision, "awaits", judges_at_once, "judged what was known before a silence", with_events(*LINK, "silence")),
     "grace runs through silence": (
         Grace, "stood", grace_runs, "its grace ran while the link was down",
         GOING_ON),
-    "a failed stop flies on": (Conduct, "fall_back", flies_on, "left flying after a stop that failed", HOLDING),
+    "a failed stop flies on": (MissionController, "fall_back", flies_on, "left flying after a stop that failed", HOLDING),
 }  # fmt: skip
 
 
@@ -166,8 +166,8 @@ def test_what_must_follow_a_silence_a_takeover_and_a_failed_stop_is_seen(
 def lasting_links(of: Any) -> Any:
     """A link's time is never over."""
 
-    def turn(self: Any, now: Any, state: Any) -> Progress:
-        return Progress.ON_ITS_WAY if self._dispatcher.active is not None else of(self, now, state)
+    def turn(self: Any, now: Any, state: Any) -> bool:
+        return True if self._dispatcher.active is not None else of(self, now, state)
 
     return turn
 
@@ -176,8 +176,8 @@ ENDLESS: dict[str, tuple[type, str, Callable[[Any], Any], str]] = {
     "steps last": (Supervisor, "violated", lambda of: lambda self, state, now: None, "interrupted"),
     "links last": (Fallback, "turn", lasting_links, "interrupted"),
     "nothing is insisted on": (
-        Fallback, "_insist", lambda of: lambda self, now, state: Progress.ON_ITS_WAY, "interrupted"),
-    "silence is waited out": (Conduct, "stand_down", lambda of: lambda self, now, ending: None, LINK[0]),
+        Fallback, "_insist", lambda of: lambda self, now, state: True, "interrupted"),
+    "silence is waited out": (MissionController, "stand_down", lambda of: lambda self, now, ending: None, LINK[0]),
 }  # fmt: skip
 
 

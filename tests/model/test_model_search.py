@@ -12,7 +12,7 @@ from model.graph import longest
 from model.searching import Found, Search
 from model.small import ALL, LIMITS, TINY, UNIT, Small
 from reference.flat_case import S
-from rtshcua.onboard.runtime.bounds import falling_us, run_us
+from rtshcua.onboard.runtime.limits import falling_us, run_us
 
 #: after every so many transitions, a state that counts as one with another is held against it
 DOUBLE_OF = 101

@@ -50,7 +50,7 @@ from rtshcua.onboard.ports import (
     Sent,
     Succeeded,
 )
-from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import Duty, SigningKey

@@ -8,7 +8,7 @@ from rtshcua.adapters.doctor.finding import Finding, Verdict
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION, Signal
-from rtshcua.onboard.unheard import needed
+from rtshcua.onboard.rehearsal import needed
 
 #: a message should come this often within the time to stale of what it carries
 _TIMES: Final = 2

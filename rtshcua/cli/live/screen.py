@@ -15,7 +15,7 @@ from rtshcua.cli.live.board import Board, line
 from rtshcua.cli.live.chart import chart
 from rtshcua.cli.live.lines import ending
 from rtshcua.cli.live.story import Message, duration, printable
-from rtshcua.onboard.runtime.flight import Stage
+from rtshcua.onboard.runtime.view import Stage
 
 _FRAME_S = 0.125
 _BAR = 24

@@ -9,8 +9,7 @@ from rtshcua.cli.live.story import Happened, Note, Plan, Snapshot
 from rtshcua.cli.live.telling import REPLACED, Teller
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Event
-from rtshcua.onboard.runtime.flight import Stage
-from rtshcua.onboard.runtime.view import View
+from rtshcua.onboard.runtime.view import Stage, View
 
 _SNAPSHOT_S = 0.1
 _WAITING_NOTE_S = 5.0

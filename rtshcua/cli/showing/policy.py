@@ -6,8 +6,7 @@ from rtshcua.cli.showing.contract import show_contract
 from rtshcua.cli.showing.page import Page
 from rtshcua.model.flat.policy import AfterSilence, Policy, WithoutEvidence
 from rtshcua.model.flat.signal import Signal
-from rtshcua.onboard.runtime.bounds import falling_us
-from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.limits import Limits, falling_us
 
 #: what `without evidence` says, and means
 _WITHOUT_EVIDENCE: dict[int, str] = {

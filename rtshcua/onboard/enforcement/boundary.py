@@ -1,4 +1,4 @@
-"""The enforcement boundary in this process: `enforce` decides one request and mints what the decision grants.
+"""The enforcement boundary in this process: `enforce` decides one request and issues what the decision grants.
 
 It holds what a runtime must not be trusted with: the verified bundle, the session (`decision.session`), and the key of
 the permits. Bytes go in and bytes come out, so that an isolated process or a trusted world can take its place.
@@ -17,9 +17,8 @@ from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
 from rtshcua.model.flat.situation import Context, Now
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.mint import Mint
-from rtshcua.wire.permit import LINK_VALID_US
+from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.wire.permit import AGAIN, LINK_VALID_US, Permit, seal
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import STEP, Ref, Request, decode
@@ -39,10 +38,30 @@ CLOCKS_PART_US: Final = 3_000_000
 _ALLOW: Final = Outcome.ALLOW  # an enumeration's attributes are slow to find
 
 
+class PermitIssuer:
+    """Seals permits under the session key, each with a serial of its own. Only a boundary has one."""
+
+    def __init__(self, key: bytes) -> None:
+        self._key = key
+        self._serial = 1
+
+    def step(self, step: int, not_after_us: int, fallbacks: int, contingencies: int) -> bytes:
+        """A step's permit, which stands for so many links of its chain and of the contingency too."""
+        serial = self._serial
+        self._serial += 1 + fallbacks + contingencies + AGAIN
+        return seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us), self._key)
+
+    def link(self, ref: Ref, not_after_us: int) -> bytes:
+        """A permit for a link that was just decided; the `link` of a degrade rule's target is `-1 - rule`."""
+        serial = self._serial
+        self._serial += 1
+        return seal(Permit(*ref, serial, 0, 0, not_after_us), self._key)
+
+
 class SoftwareBoundary:
     """`ports.Boundary` over a prepared bundle.
 
-    `enforced` false is mode `none`: it decides and answers as ever, and mints a step's permit whatever the decision.
+    `enforced` false is mode `none`: it decides and answers as ever, and issues a step's permit whatever the decision.
     """
 
     def __init__(
@@ -51,7 +70,7 @@ class SoftwareBoundary:
         in_force: InForce,
         commands: Commands,
         vehicle: str,
-        mint: Mint,
+        session_key: bytes,
         *,
         enforced: bool,
     ) -> None:
@@ -61,11 +80,11 @@ class SoftwareBoundary:
         self._commands = commands
         self._vehicle = vehicle
         self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
-        self._mint = mint
+        self._issuer = PermitIssuer(session_key)
         self._enforced = enforced
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
-        self._numbers = _Numbers(policy.policy, in_force.invocations)
+        self._numbers = _numbers(policy.policy, in_force.invocations)
         self._now_us = 0  # of the last request: time does not go back
         self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
 
@@ -75,9 +94,8 @@ class SoftwareBoundary:
         if isinstance(asked, Refusal):
             return encode_refusal(Status.MALFORMED)
         now_us = asked.now.monotonic_us
-        if not self._now_us <= now_us >= asked.released_us:  # a release to come would move the deadline
-            return encode_refusal(Status.MALFORMED)
-        if not self._keeps_time(asked.now):
+        # a release to come would move the deadline
+        if not self._now_us <= now_us >= asked.released_us or not self._keeps_time(asked.now):
             return encode_refusal(Status.MALFORMED)
         self._now_us = now_us
         ref = asked.ref
@@ -105,7 +123,7 @@ class SoftwareBoundary:
         self._commands.recalled = self._in_force.recalled
         if receipt.kind == REPLACEMENT and receipt.accepted:
             self._commands.replace(self._in_force.bundle.mission)
-            self._numbers = _Numbers(self._policy.policy, self._in_force.invocations)
+            self._numbers = _numbers(self._policy.policy, self._in_force.invocations)
         return encode_receipt(receipt)
 
     def _keeps_time(self, now: Now) -> bool:
@@ -138,7 +156,7 @@ class SoftwareBoundary:
             decision.outcome,
             decision.reason,
             decision.step,
-            NO_CLAUSE if decision.clause is None else self._numbers.clause(step, decision.clause),
+            NO_CLAUSE if decision.clause is None else self._numbers[step][decision.clause],
             self._target(prepared, decision),
             decision.valid_until_us,
             consumed,
@@ -148,7 +166,7 @@ class SoftwareBoundary:
     def _target(self, prepared: PreparedInvocation, decision: Decision) -> int:
         if decision.link is None:
             return NO_TARGET
-        return decision.link if decision.link != DEGRADE else self._numbers.degrade(prepared, decision.target)
+        return decision.link if decision.link != DEGRADE else self._degrade(prepared, decision.target)
 
     def _permit(self, prepared: PreparedInvocation, decision: Decision, now_us: int) -> bytes:
         not_after_us = decision.valid_until_us
@@ -158,7 +176,7 @@ class SoftwareBoundary:
             not_after_us = now_us + LINK_VALID_US
         invocation = prepared.invocation
         contingency = self._policy.policy.contingency
-        return self._mint.step(invocation.step, not_after_us, len(invocation.contract.fallback), len(contingency))
+        return self._issuer.step(invocation.step, not_after_us, len(invocation.contract.fallback), len(contingency))
 
     def _link(self, asked: Request, ref: Ref) -> Answer:
         decision = self._session.decide_link(ref, asked.binding, asked.state, asked.now)
@@ -166,31 +184,22 @@ class SoftwareBoundary:
         if decision.link is not None:
             if ref.link == DEGRADE:
                 prepared = self._in_force.invocations[ref.step]
-                ref = Ref(ref.kind, ref.step, self._numbers.degrade(prepared, decision.link))
-            permit = self._mint.link(ref, until_us)
+                ref = Ref(ref.kind, ref.step, self._degrade(prepared, decision.link))
+            permit = self._issuer.link(ref, until_us)
         return Answer(decision.outcome, decision.reason, decision.step, NO_CLAUSE, NO_TARGET, until_us, 0, permit)
 
-
-class _Numbers:
-    """The numbers of clauses and links in a response. The shared clauses are kept once; a rule has its index in the
-    policy.
-    """
-
-    def __init__(self, policy: Policy, invocations: tuple[PreparedInvocation, ...]) -> None:
-        shared = shared_clauses(policy)
-        self._shared: dict[Clause | Rule | Airspace, int] = {clause: number for number, clause in enumerate(shared)}
-        self._own: tuple[dict[Clause | Rule | Airspace, int], ...] = tuple(
-            {clause: len(shared) + number for number, clause in enumerate(own_clauses(prepared.invocation.contract))}
-            for prepared in invocations
-        )
-
-    def clause(self, step: int, clause: Clause | Rule | Airspace) -> int:
-        number = self._own[step].get(clause)
-        return self._shared[clause] if number is None else number
-
-    def degrade(self, prepared: PreparedInvocation, target: Link | None) -> int:
+    def _degrade(self, prepared: PreparedInvocation, target: Link | None) -> int:
         """`-1 - rule` for the target of a degrade rule."""
         for degrade in prepared.candidates.degrades:
             if degrade.rule.target == target:
-                return -1 - self._shared[degrade.rule]
+                return -1 - self._numbers[prepared.invocation.step][degrade.rule]
         raise LookupError("no degrade rule has this target")
+
+
+def _numbers(
+    policy: Policy, invocations: tuple[PreparedInvocation, ...]
+) -> tuple[dict[Clause | Rule | Airspace, int], ...]:
+    """By step, the numbers of the clauses in a response; a rule has its index in the policy."""
+    shared: dict[Clause | Rule | Airspace, int] = {clause: at for at, clause in enumerate(shared_clauses(policy))}
+    own = (own_clauses(prepared.invocation.contract) for prepared in invocations)
+    return tuple(shared | {clause: at for at, clause in enumerate(clauses, len(shared))} for clauses in own)

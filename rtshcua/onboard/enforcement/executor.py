@@ -1,22 +1,28 @@
 """The executor: the only place that turns a permit into something to send (design section 4.5, mediated dispatch).
 
-It checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
+What a permit's kind, step and link stand for is looked up in `Commands`, made from verified parts alone. The executor
+checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
 still the one that flies; that a step waits for its turn, and never follows a recall, or a return or a landing that a
 fallback began;
 and that chains go forward only. A standing permit is good for each of its links once, and for the contingency's last
 `AGAIN` times more.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.enforcement.mint import AGAIN
-from rtshcua.onboard.ports import Dispatch
-from rtshcua.wire.permit import Permit, open_permit
+from rtshcua.onboard.ports import Command, Dispatch
+from rtshcua.wire.permit import AGAIN, Permit, open_permit
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
+
+#: a command but for its token
+_Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int]
 
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 _UNTOUCHED = DEGRADE - 1
@@ -33,16 +39,74 @@ MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing bega
 BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
 
 
+class Commands:
+    """Looks up the command of a step or a link.
+
+    `recalled` says that no step may be sent any more. Only the boundary changes it, and the steps.
+    """
+
+    def __init__(self, policy: Policy, mission: Mission) -> None:
+        self.recalled = False
+        self._policy = policy
+        self._made: dict[tuple[int, int, int], _Made] = {}
+        self.replace(mission)
+
+    def replace(self, mission: Mission) -> None:
+        """From now on these are the steps. All commands are made now, for when a link must fly there is no time."""
+        contingency, rules = enumerate(self._policy.contingency), enumerate(self._policy.rules)
+        self._made = {(CONTINGENCY_LINK, -1, number): self._of_link(link) for number, link in contingency}
+        targets = {-1 - rule: self._of_link(each.target) for rule, each in rules if each.target is not None}
+        for step, invocation in enumerate(mission.invocations):
+            self._made[STEP, step, -1] = self._of_step(invocation)
+            links = {number: self._of_link(link) for number, link in enumerate(invocation.contract.fallback)}
+            for number, made in (links | targets).items():
+                self._made[FALLBACK_LINK, step, number] = made
+
+    def command(self, kind: int, step: int, link: int, token: int) -> Command:
+        """The command, under the token of its permit. A `link` of `-1 - rule` is the target of that degrade rule.
+
+        Raises `LookupError` for one that the bundle does not have.
+        """
+        if kind == STEP:
+            return Command(token, *self._made[STEP, step, -1])
+        return Command(token, *self._made[kind, step if kind == FALLBACK_LINK else -1, link])
+
+    def _of_step(self, invocation: Invocation) -> _Made:
+        plan, contract = invocation.plan, invocation.contract
+        held_us = _hold_us(contract, invocation.arguments)
+        return contract.name, plan.kind, plan.path, self._geo(plan.path), plan.altitude, plan.speed, held_us
+
+    def _of_link(self, link: Link) -> _Made:
+        contract = self._policy.contracts[link.skill]
+        motion = contract.motion
+        path: tuple[int, ...] = ()
+        if motion.kind == MotionKind.FLY:
+            cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
+            path = link.arguments[cell : cell + 2]
+        altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
+        held_us = 0 if link.limit_us else _hold_us(contract, link.arguments)  # the link's own time counts
+        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us
+
+    def _geo(self, path: Sequence[int]) -> tuple[int, ...]:
+        projection = self._policy.projection
+        return tuple([part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(projection, x, y)])
+
+
+def _hold_us(contract: Contract, arguments: tuple[int, ...]) -> int:
+    """How long a skill is to hold (`hold for time`), 0 where it does not say."""
+    return arguments[contract.motion.time] if contract.motion.time >= 0 else 0
+
+
 class Executor:
     """Checks permits under the session key and remembers what was sent.
 
     `frames` is the gate that the vehicle's adapter sends through: the frames of what was dispatched last may pass it.
     """
 
-    def __init__(self, key: bytes, commands: Commands, frames: FrameSession | None = None) -> None:
+    def __init__(self, key: bytes, commands: Commands) -> None:
         self._key = key
         self._commands = commands
-        self.frames = FrameSession() if frames is None else frames
+        self.frames = FrameSession()
         self._used: set[int] = set()
         self._step = -1  # the last step that was sent,
         self._serial = 0  # its permit,

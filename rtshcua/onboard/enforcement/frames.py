@@ -2,23 +2,23 @@
 
 Every frame that an adapter wants to send goes through `seal`, and only what `seal` gives back may be sent. A permit
 that the executor dispatches opens a session for its one command; until that command ends, frames that carry it out
-pass (`motion_frames`), no others. Housekeeping passes always (`housekeeping_frames`). Whatever is on neither list is
-refused. With a signer each frame that passes is signed; the key is the signer's, and nothing else can use it.
+pass, no others. Housekeeping passes always. Whatever is on neither list (`allow_list`) is refused. With a signer each
+frame that passes is signed; the key is the signer's, and nothing else can use it.
 
 A rule needs to know which autopilot it speaks to and how high its home lies. Both are read here from frames that came
 in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
 """
 
-from typing import Final, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Final, Protocol
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
 from rtshcua.mavlink.modes import KNOWN
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frame_shape import Frame, read_frame
-from rtshcua.onboard.enforcement.housekeeping_frames import Housekeeping, housekeeping
-from rtshcua.onboard.enforcement.motion_frames import carries_out, is_forced_arming, is_near, point_of
+from rtshcua.onboard.enforcement import allow_list
+from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
 from rtshcua.onboard.ports import Command
 
 #: who we are, in the vehicle's own system, and whom we speak to
@@ -66,11 +66,14 @@ class Gate(Protocol):
         ...
 
 
-class Session(NamedTuple):
-    """One permitted command, and how late (monotonic us) its first frame may leave."""
+@dataclass(slots=True)
+class _Session:
+    """One permitted command, how late (monotonic us) its first frame may leave, and how far it got."""
 
     command: Command
     not_after_us: int
+    begun: bool = False  # a frame of it left
+    leg: int = -1  # the last point of its path that was sent
 
 
 class FrameSession:
@@ -78,20 +81,13 @@ class FrameSession:
 
     def __init__(self) -> None:
         self._signer: Signer | None = None
-        self._session: Session | None = None
-        self._begun = False  # a frame of the session left
-        self._leg = -1  # the last point of its path that was sent
+        self._session: _Session | None = None
         self._here: tuple[int, int] | None = None  # 1e-7 degree
         self._started = False  # a session was opened: fences stay as they are
         self._system = 0
         self._autopilot = 0  # MAV_AUTOPILOT
         self._home_amsl: int | None = None  # mm
         self._settled_amsl: int | None = None  # the same, when the takeoff was permitted
-
-    @property
-    def token(self) -> int | None:
-        """The token of the command whose frames may leave."""
-        return None if self._session is None else self._session.command.token
 
     def sign_with(self, signer: Signer) -> None:
         """Sign what leaves from now on. Raises RuntimeError if it is signed already: a key is not taken away."""
@@ -101,7 +97,7 @@ class FrameSession:
 
     def open(self, command: Command, not_after_us: int) -> None:
         """Let out the frames of one command, in place of whatever was let out before."""
-        self._session, self._begun, self._leg, self._started = Session(command, not_after_us), False, -1, True
+        self._session, self._started = _Session(command, not_after_us), True
         if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
             self._settled_amsl = self._home_amsl
 
@@ -145,14 +141,13 @@ class FrameSession:
         if target is not None and target != (self._system, AUTOPILOT):
             return WRONG_TARGET
         # 2. never, whatever is permitted
-        if is_forced_arming(frame):
+        if allow_list.is_forced_arming(frame):
             return FORCED_ARMING
         # 3. always, or before the flight
-        match housekeeping(frame):
-            case Housekeeping.ALWAYS:
-                return None
-            case Housekeeping.BEFORE_FLIGHT:
-                return AFTER_START if self._started else None
+        if allow_list.is_housekeeping(frame):
+            return None
+        if allow_list.is_of_fence(frame):
+            return AFTER_START if self._started else None
         # 4. what is permitted now
         return self._refuse_motion(frame, now_us)
 
@@ -160,18 +155,18 @@ class FrameSession:
         session = self._session
         if session is None:
             return NO_SESSION
-        if not carries_out(frame, session.command, self._autopilot, self._home_amsl):
+        if not allow_list.carries_out(frame, session.command, self._autopilot, self._home_amsl):
             return NOT_COVERED
-        if not self._begun and now_us > session.not_after_us:
+        if not session.begun and now_us > session.not_after_us:
             return LATE
-        point = point_of(frame)
+        point = allow_list.point_of(frame)
         if point is not None:
             path = tuple(zip(session.command.geo[::2], session.command.geo[1::2], strict=True))
-            there = self._leg < 0 or is_near(self._here, path[self._leg])  # else it would cut the corner
-            legs = (self._leg, self._leg + 1) if there else (self._leg,)
+            there = session.leg < 0 or allow_list.is_near(self._here, path[session.leg])  # else it would cut the corner
+            legs = (session.leg, session.leg + 1) if there else (session.leg,)
             turn = [leg for leg in legs if 0 <= leg < len(path) and path[leg] == point]
             if not turn:
                 return OUT_OF_ORDER
-            self._leg = turn[0]
-        self._begun = True
+            session.leg = turn[0]
+        session.begun = True
         return None

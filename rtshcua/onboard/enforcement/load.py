@@ -16,9 +16,7 @@ from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
-from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.executor import Executor
-from rtshcua.onboard.enforcement.mint import Mint
+from rtshcua.onboard.enforcement.executor import Commands, Executor
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.bundle import Bundle, open_bundle
 from rtshcua.wire.trust import TrustRoot
@@ -111,5 +109,5 @@ def session(
     in_force = InForce(bundle, policy, invocations, root, vehicle)
     commands = Commands(bundle.policy, bundle.mission)
     enforced = mode is not Mode.NONE
-    boundary = SoftwareBoundary(policy, in_force, commands, vehicle, Mint(session_key), enforced=enforced)
+    boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, enforced=enforced)
     return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode)

@@ -1,4 +1,4 @@
-"""Admission: asks the boundary, and records each answer before anyone acts on it."""
+"""Admission: which step's turn it is, what the boundary answers, and the record of that before anyone acts on it."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -8,19 +8,17 @@ from rtshcua.decision.durability import confirmed, durability_of
 from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.contract import Contract, Link
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Announce, Show
+from rtshcua.onboard.runtime.dispatcher import RemainingLatency
 from rtshcua.onboard.runtime.journal import Journal
-from rtshcua.onboard.runtime.queue import InvocationQueue
-from rtshcua.onboard.runtime.remaining import RemainingLatency
 from rtshcua.onboard.runtime.view import Decided
-from rtshcua.wire.approval import Answered, Approvals
-from rtshcua.wire.receipt import Receipt
-from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref, Request, encode
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP, Ref, Request, encode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, decode, own_clauses, shared_clauses
 
 #: how many decisions a display is shown
@@ -28,6 +26,53 @@ SHOWN = 6
 _OUTCOMES = {outcome: outcome.name.lower() for outcome in Outcome}
 #: MAV_SEVERITY of what ground stations are told of a decision: info, warning, notice, warning
 _SEVERITIES = {Outcome.ALLOW: 6, Outcome.DENY: 4, Outcome.DEFER: 5, Outcome.FALLBACK: 4}
+
+
+class InvocationQueue:
+    """`Q_onboard`, paper symbol: the mission's invocations, released one after the other, phase by phase.
+
+    Release (section 4.3): for the first step the moment the vehicle is ready, later the end of the predecessor. Times
+    are monotonic, in us.
+    """
+
+    def __init__(self, mission: Mission) -> None:
+        self._steps = mission.invocations
+        self._index = 0
+        self.released_us: int | None = None  # when the current step was released; None before the vehicle was ready
+
+    @property
+    def current(self) -> Invocation | None:
+        """The step that is to be admitted or is running; None once all are done."""
+        return self._steps[self._index] if self._index < len(self._steps) else None
+
+    @property
+    def at_last(self) -> bool:
+        """Whether no step follows the current one."""
+        return self._index + 1 >= len(self._steps)
+
+    @property
+    def released(self) -> int:
+        """How many steps were released; what they say does not change any more."""
+        return 0 if self.released_us is None else min(self._index + 1, len(self._steps))
+
+    @property
+    def phase(self) -> int:
+        """The index of the current mission phase; the last step's once all are done."""
+        return self._steps[min(self._index, len(self._steps) - 1)].phase
+
+    def release(self, now_us: int) -> None:
+        """Release the first step. A later call changes nothing: a vehicle is ready once."""
+        if self.released_us is None:
+            self.released_us = now_us
+
+    def replace(self, mission: Mission) -> None:
+        """From now on these are the steps; those that were released are the same ones."""
+        self._steps = mission.invocations
+
+    def advance(self, now_us: int) -> None:
+        """The current step ended, or is skipped: release the next."""
+        self._index += 1
+        self.released_us = now_us
 
 
 class Admission:
@@ -40,32 +85,22 @@ class Admission:
     def __init__(self, loaded: Loaded, journal: Journal, queue: InvocationQueue, remaining: RemainingLatency) -> None:
         self._loaded = loaded
         self._in_force = loaded.in_force
+        self._policy = loaded.bundle.policy
+        self._shared = shared_clauses(self._policy)
         self._journal = journal
         self._queue = queue
         self._remaining = remaining
         self.recent: deque[Decided] = deque(maxlen=SHOWN)
-        self._policy = loaded.bundle.policy
-        self._shared = shared_clauses(self._policy)
-        self._approvals = Approvals(self._policy)
         self._last: tuple[int, tuple[object, ...]] | None = None
         self._repeated = 0
-
-    def answered(self, receipt: Receipt, now: Now) -> None:
-        """The boundary accepted an approval: it tells later decisions of it, and so do their records."""
-        self._approvals.add(
-            Answered(receipt.step, receipt.role, receipt.granted, now.monotonic_us, receipt.expires_us), now
-        )
-
-    def replaced(self, first: int) -> None:
-        """The steps from `first` on are others now."""
-        self._approvals.forget(first)
 
     def ask(self, now: Now, state: State, ref: Ref) -> Answer | None:
         """The boundary's answer about a step or link; None when it did not decide."""
         kind, step, link = ref
         released_us = self._queue.released_us or 0  # 0: nothing was released yet, and only the contingency may fly
         phase, remaining_us = self._queue.phase, self._remaining.us
-        binding, identity = self._bound(kind, step)
+        invocation = None if kind == CONTINGENCY_LINK else self._in_force.invocations[step].invocation
+        binding = self._in_force.bundle.policy_digest if invocation is None else invocation.binding
         data = self._loaded.boundary.enforce(
             encode(Request(kind, step, link, binding, now, state, released_us, phase, remaining_us))
         )
@@ -74,21 +109,21 @@ class Admission:
             text = answer.name.lower() if isinstance(answer, Status) else answer.text
             self._journal.effect(now, "undecided", ref, detail=text)
             return None
-        if kind == STEP:
+        asked = invocation if kind == STEP else None
+        if asked is not None:
             last = (step, (answer.outcome, answer.reason, answer.clause, answer.target))
             if last == self._last and not answer.permit:
                 self._repeated += 1
                 return answer
             self.flush(now)
             self._last = last
-        approvals = self._approvals.about(self._in_force.invocations[step].invocation, now) if kind == STEP else ()
+        approvals = () if asked is None else self._in_force.approvals(asked, now)
         vehicle, version = self._loaded.vehicle, self._policy.version
         context = Context(binding, vehicle, version, answer.consumed, released_us, phase, remaining_us, approvals)
         durability = WRITTEN
-        if kind == STEP:
-            contract = self._in_force.invocations[step].invocation.contract
-            durability = durability_of(contract, answer.outcome, confirmed=confirmed(context), kind=kind)
-        self._journal.tell(partial(self._told, now, ref, identity, state, context, answer, durability))
+        if asked is not None:
+            durability = durability_of(asked.contract, answer.outcome, confirmed=confirmed(context), kind=kind)
+        self._journal.tell(partial(self._told, now, ref, invocation, state, context, answer, durability))
         return answer
 
     def flush(self, now: Now) -> None:
@@ -98,35 +133,28 @@ class Admission:
         self._last = None
         self._repeated = 0
 
-    def _clause(self, step: int, answer: Answer) -> Clause | Rule | Airspace | None:
-        """The clause that decided, found by its number."""
-        if answer.clause == NO_CLAUSE:
-            return None
-        if answer.clause < len(self._shared):
-            return self._shared[answer.clause]
-        own = own_clauses(self._in_force.invocations[step].invocation.contract)
-        return own[answer.clause - len(self._shared)]
-
     def _told(
-        self, now: Now, ref: Ref, identity: bytes, state: State, context: Context, answer: Answer, durability: int
+        self, now: Now, ref: Ref, of: Invocation | None, state: State, context: Context, answer: Answer, durability: int
     ) -> Iterable[Action]:
-        """An answer as it is shown, announced and recorded."""
-        clause, target = self._clause(ref.step, answer), self._target(ref.step, answer)
-        yield from self._shown(now, ref, answer, "" if clause is None else clause.text)
+        """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
+        contract = None if of is None else of.contract
+        clause = self._clause(contract, answer.clause)
+        yield from self._shown(now, ref, of, answer, "" if clause is None else clause.text)
         recorded = RecordedAnswer.of(
             answer.outcome,
             answer.reason,
             answer.rule_step,
             answer.valid_until_us,
             clause=clause,
-            target=target,
+            target=self._target(contract, answer.target),
             target_link=max(answer.target, -1),
         )
+        identity = b"" if of is None else of.invocation_id
         line = partial(self._journal.recorder.decision, now, ref, identity, state, context, recorded, durability)
         yield from self._journal.record(line, now, durability, awaited=True)
 
-    def _shown(self, now: Now, ref: Ref, answer: Answer, clause: str) -> Iterable[Action]:
-        subject = self._subject(ref)
+    def _shown(self, now: Now, ref: Ref, of: Invocation | None, answer: Answer, clause: str) -> Iterable[Action]:
+        subject = self._subject(ref, of)
         outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
         text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
@@ -134,26 +162,23 @@ class Admission:
         why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
         yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
 
-    def _subject(self, ref: Ref) -> str:
-        kind, step, link = ref
-        if kind == STEP:
-            return self._in_force.invocations[step].invocation.text
-        if link == DEGRADE:
-            return "the target of a degrade rule"
-        chain = self._policy.contingency
-        if kind == FALLBACK_LINK:
-            chain = self._in_force.invocations[step].invocation.contract.fallback
-        return chain[link].text
+    def _subject(self, ref: Ref, of: Invocation | None) -> str:
+        if of is None:
+            return self._policy.contingency[ref.link].text
+        if ref.kind == STEP:
+            return of.text
+        return "the target of a degrade rule" if ref.link == DEGRADE else of.contract.fallback[ref.link].text
 
-    def _bound(self, kind: int, step: int) -> tuple[bytes, bytes]:
-        if kind == CONTINGENCY_LINK:
-            return self._loaded.bundle.policy_digest, b""
-        invocation = self._in_force.invocations[step].invocation
-        return invocation.binding, invocation.invocation_id
-
-    def _target(self, step: int, answer: Answer) -> Link | None:
-        if answer.target == NO_TARGET:
+    def _clause(self, contract: Contract | None, number: int) -> Clause | Rule | Airspace | None:
+        """The clause that decided, found by its number."""
+        if number == NO_CLAUSE:
             return None
-        if answer.target >= 0:
-            return self._in_force.invocations[step].invocation.contract.fallback[answer.target]
-        return self._policy.rules[-1 - answer.target].target
+        shared = self._shared
+        if number < len(shared):
+            return shared[number]
+        return None if contract is None else own_clauses(contract)[number - len(shared)]
+
+    def _target(self, contract: Contract | None, number: int) -> Link | None:
+        if NO_TARGET < number < 0:
+            return self._policy.rules[-1 - number].target
+        return None if contract is None or number == NO_TARGET else contract.fallback[number]

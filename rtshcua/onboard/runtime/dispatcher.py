@@ -1,13 +1,54 @@
-"""The dispatcher: hands permits to the executor, and keeps the one command that flies."""
+"""The dispatcher: hands permits to the executor, keeps the one command that flies, and measures how long that takes."""
+
+from collections import deque
 
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Executor
-from rtshcua.onboard.ports import Dispatch, Release
-from rtshcua.onboard.runtime.flight import Active
+from rtshcua.onboard.ports import Command, Dispatch, Frozen, Release
 from rtshcua.onboard.runtime.journal import Journal
-from rtshcua.onboard.runtime.remaining import RemainingLatency
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
+
+#: Assumed until enough was measured, in us: an order above anything seen on the machines this was built on.
+CONSERVATIVE_US = 20_000
+WINDOW = 128
+_ENOUGH = 8
+
+
+class RemainingLatency:
+    """`L_rem`, paper symbol: what validation and dispatch still take, as a measured high quantile.
+
+    The 99th percentile of the last `WINDOW` measurements, integers only; conservative until there are a few. The
+    quantile is the nearest rank, so with few measurements it is their maximum. `us` is the latency to count with now.
+    """
+
+    def __init__(self) -> None:
+        self._latest: deque[int] = deque(maxlen=WINDOW)
+        self.us = CONSERVATIVE_US
+
+    def measured(self, took_us: int) -> None:
+        """Note how long one admission took, from the moment it was decided at to the moment its command was sent."""
+        self._latest.append(max(took_us, 0))
+        ordered = sorted(self._latest)
+        high = ordered[-(-len(ordered) * 99 // 100) - 1]
+        self.us = high if len(ordered) >= _ENOUGH else max(high, CONSERVATIVE_US)
+
+
+class Active(Frozen):
+    """A command that was dispatched and has not ended; `ref` is what its permit is for. A link's time is over at
+    `until_us`; a step has None.
+    """
+
+    ref: Ref
+    command: Command
+    since_us: int
+    until_us: int | None
+
+    @property
+    def homeward(self) -> bool:
+        """Whether its success is a landing."""
+        return self.command.kind in (MotionKind.HOME, MotionKind.LAND)
 
 
 class Dispatcher:
@@ -53,12 +94,13 @@ class Dispatcher:
 
     def sent(self, token: int, at_us: int) -> None:
         """The first frame of a command went out: one measurement of `L_rem`."""
-        if self.active is not None and self.active.command.token == token:
-            self._remaining.measured(at_us - self.active.since_us)
+        active = self.flying(token)
+        if active is not None:
+            self._remaining.measured(at_us - active.since_us)
 
-    def flies(self, token: int) -> bool:
-        """Whether this is the command that flies; a late word about another one means nothing any more."""
-        return self.active is not None and self.active.command.token == token
+    def flying(self, token: int) -> Active | None:
+        """The command that flies, if it is this one: a late word about another one means nothing any more."""
+        return self.active if self.active is not None and self.active.command.token == token else None
 
     @property
     def homeward(self) -> bool:

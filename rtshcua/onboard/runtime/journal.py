@@ -50,19 +50,10 @@ class Journal:
             yield self._seal(now)
         yield Append(line(), durability, awaited)
 
-    def effect(
-        self,
-        now: Now,
-        event: str,
-        ref: Ref = NOTHING,
-        *,
-        token: int = -1,
-        detail: str = "",
-        durability: int = WRITTEN,
-    ) -> None:
+    def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: str = "") -> None:
         """Record something that happened, and show it. `detail` may be the world's own text."""
-        line = partial(self.recorder.effect, now, event, ref, token=token, detail=detail, durability=durability)
-        self._entries.append(partial(self._shown, line, now, durability, Show(event, detail, ref.step)))
+        line = partial(self.recorder.effect, now, event, ref, token=token, detail=detail)
+        self._entries.append(partial(self._shown, line, now, Show(event, detail, ref.step)))
 
     def anchor(self, now: Now, note: str) -> None:
         """Record what a witness cosigned. It is for verifiers, and shown to nobody."""
@@ -84,8 +75,8 @@ class Journal:
             actions.append(self._seal(now))
         return actions
 
-    def _shown(self, line: Callable[[], bytes], now: Now, durability: int, show: Show) -> Iterable[Action]:
-        yield from self.record(line, now, durability, awaited=False)
+    def _shown(self, line: Callable[[], bytes], now: Now, show: Show) -> Iterable[Action]:
+        yield from self.record(line, now, WRITTEN, awaited=False)
         yield show
 
     def _seal(self, now: Now) -> Append:

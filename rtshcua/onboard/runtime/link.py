@@ -1,14 +1,21 @@
-"""The link to the vehicle: while it is down nothing is judged, and when it is back fresh state is awaited first.
+"""Supervision of the link: while it is down nothing is judged, and when it is back fresh state is awaited first.
+
+            lost                      back
+      UP ---------> DOWN ---------------------> AWAITING ----> UP   all was reported again, or the time for it is over
+                      ^-------------------------- |
+                                 lost again
 
 What is known of a vehicle that was silent is old. What was current when the link was lost, and is stale when it is
 back, has to be reported again, measured after the loss, before anything is decided on it; for a bounded time, for it
 may never be. Signals that were stale or missing before are not waited for: their absence is no news.
 """
 
+from enum import Enum, auto
+
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.onboard.ports import Frozen
-from rtshcua.onboard.runtime.flight import Limits
+from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
 #: what stands for the vehicle's word on whether it flies, among the names of signals
@@ -25,7 +32,18 @@ class Silence(Frozen):
     missing: tuple[str, ...]
 
 
-class Link:
+class LinkState(Enum):
+    """Whether the vehicle is heard, and if so, whether fresh state may still be awaited."""
+
+    UP = auto()
+    DOWN = auto()
+    AWAITING = auto()
+
+
+_DOWN = LinkState.DOWN  # an enumeration's attributes are slow to find
+
+
+class LinkSupervision:
     """Whether the vehicle is heard, and whether what is known of it may be judged. Times are monotonic, in us.
 
     One silence goes on until state was judged again: a link that comes and goes within it begins no new one.
@@ -35,16 +53,21 @@ class Link:
         self._policy = policy
         self._monitor = monitor
         self._limits = limits
-        self.down = False
+        self.state = LinkState.UP
         self._since_us: int | None = None  # the silence began; None: none is under way
         self._waits_us: int | None = None  # and is waited out since then
         self._lost_us = 0  # the link was lost last
         self._first_back_us: int | None = None  # the link was back first in this silence,
         self._back_us = 0  # and last
-        self._until_us: int | None = None  # fresh state is waited for; None: nothing is
+        self._until_us = 0  # fresh state is waited for
         self._standing_us: int | None = None  # since then nothing is judged
         self._awaited: frozenset[int] = frozenset()
         self._awaits_air = False
+
+    @property
+    def down(self) -> bool:
+        """Whether the vehicle is not heard: nothing that is sent would arrive."""
+        return self.state is _DOWN
 
     def lost(self, now_us: int, heard_us: int, *, takes_off: bool) -> bool:
         """The link is lost: the vehicle was last heard at `heard_us`, and what was current then will be awaited.
@@ -53,7 +76,7 @@ class Link:
         """
         if self.down:
             return False
-        self.down = True
+        self.state = LinkState.DOWN
         self._lost_us = heard_us
         if self._since_us is None:
             self._since_us = self._waits_us = heard_us
@@ -69,7 +92,7 @@ class Link:
         """
         if not self.down:
             return None
-        self.down = False
+        self.state = LinkState.AWAITING
         self._back_us = now_us
         self._first_back_us = now_us if self._first_back_us is None else self._first_back_us
         self._until_us = min(now_us + self._limits.fresh_us, self._first_back_us + self._limits.flapping_us)
@@ -88,21 +111,18 @@ class Link:
         return 0 if self._waits_us is None else now_us - self._waits_us
 
     def awaits(self, now_us: int) -> bool:
-        """Whether nothing may be judged now, for fresh state may still come. Not to be asked while the link is down."""
-        if self._until_us is None:
-            return False
+        """Whether nothing may be judged now, for fresh state may still come. To be asked while it is awaited."""
         if now_us < self._until_us and self._missing(now_us):
             self._standing_us = now_us if self._standing_us is None else self._standing_us
             return True
         return False
 
     def judged(self, now_us: int) -> tuple[int, Silence | None]:
-        """State is judged now: for how long it was not, and the silence if that is over with it.
+        """State is judged now, though some may still be awaited: for how long it was not, and the silence if that is
+        over with it.
 
         Until the time for fresh state is over, what is stale only now and was not reported again is waited for too.
         """
-        if self._until_us is None:
-            return 0, None
         stood_us = 0 if self._standing_us is None else now_us - self._standing_us
         self._standing_us = None
         silence = None
@@ -116,7 +136,8 @@ class Link:
 
     def _forget(self) -> None:
         """All that was awaited has come, or is not awaited any more."""
-        self._until_us = None
+        self.state = LinkState.UP
+        self._until_us = 0
         self._lost_us = self._back_us = 0
         self._awaited = frozenset()
         self._awaits_air = False

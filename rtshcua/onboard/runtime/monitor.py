@@ -1,19 +1,19 @@
-"""The state monitor: keeps the paper's `S_t`, one value and its age a slot, from what the frames carried, and what the
-policy's temporal monitors say of it.
-"""
+"""What is known of the vehicle: its signals (the paper's `S_t`), and whether it is ready, armed and in the air."""
 
 from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.decision.reads import where
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.truth import UNKNOWN
 from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
+from rtshcua.onboard.runtime.view import Reading
 from rtshcua.wire.request import MAX_AGE_US
 
 
 class StateMonitor:
-    """Values by state slot, and when each was last reported.
+    """Keeps the state: values by slot, when each was last reported, and what the policy's temporal monitors say of it.
 
     A value reported as not known, or outside 64 bits, is None. A report older than the one held is set aside: a frame
     that comes late must not make the state younger. Slots that the policy does not have are ignored.
@@ -22,7 +22,7 @@ class StateMonitor:
     def __init__(self, policy: PreparedPolicy) -> None:
         self._policy = policy
         self._where = frozenset(where(policy.policy.vehicle))
-        self.moved = False  # position or height changed; who has looked at it may say so
+        self._moved = False  # position or height changed since it was last asked whether they did
         self._values: list[int | None] = [None] * policy.policy.slots
         self._stamps: list[int | None] = [None] * policy.policy.slots
         self._held: tuple[int | None, ...] | None = None  # the values, while none of them changes
@@ -42,9 +42,14 @@ class StateMonitor:
                 continue
             self._stamps[slot] = readings.at_us
             if slot in self._where and value != self._values[slot]:
-                self.moved = True
+                self._moved = True
             self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
             self._unseen.add(slot)
+
+    def moved(self) -> bool:
+        """Whether position or height changed since this was asked last."""
+        moved, self._moved = self._moved, False
+        return moved
 
     def current(self, now_us: int) -> frozenset[int]:
         """The slots with a value that is known, and not stale."""
@@ -96,3 +101,53 @@ class StateMonitor:
         state = State(self._held, ages, self._truths)
         self._state = (now_us, state)
         return state
+
+    def readings(self, at_us: int) -> tuple[Reading, ...]:
+        """The policy's signals at a monotonic time, for a display."""
+        state = self.state(at_us)
+        readings = []
+        for signal in self._policy.policy.signals:
+            slots = range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1))
+            values, age_us = tuple(state.values[slot] for slot in slots), max(state.ages[slot] for slot in slots)
+            readings.append(Reading(signal.name, values, age_us, age_us > signal.stale_us))
+        return tuple(readings)
+
+
+class VehicleStatus:
+    """Whether the vehicle is ready, armed and in the air (None: it has not said), and whether it ever flew for us.
+
+    `others`: how it flew when it was ready, if nothing of ours makes it fly so.
+    """
+
+    def __init__(self) -> None:
+        self.ready = False
+        self.others = ""
+        self.armed: bool | None = None
+        self.airborne: bool | None = None
+        self.flown = False
+
+    def is_ready(self, others: str) -> None:
+        """It is ready to fly, or flies already."""
+        self.ready, self.others = True, others
+
+    def report(self, *, armed: bool, airborne: bool, ours: bool) -> bool:
+        """It says how it is; `ours`: a command of this run was sent. Returns whether it came to rest with that."""
+        was_airborne, self.armed, self.airborne = self.airborne, armed, airborne
+        self.flown = self.flown or (airborne and ours)
+        return bool(was_airborne) and self.at_rest
+
+    def landed(self) -> None:
+        """It was observed to land."""
+        self.armed = self.airborne = False
+
+    @property
+    def at_rest(self) -> bool:
+        """On the ground and disarmed, as it said itself."""
+        return self.armed is False and self.airborne is False
+
+    @property
+    def last_seen(self) -> str:
+        """Where the vehicle was when it last said so, for whoever has to look for it."""
+        if self.airborne is None:
+            return "it never said whether it was in the air"
+        return "last seen in the air" if self.airborne else "last seen on the ground"

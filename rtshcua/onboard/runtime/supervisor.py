@@ -1,13 +1,19 @@
-"""The supervisor: what must hold all the while a skill runs, at every update of the state (`decision.watch`)."""
+"""What must hold all the while a skill runs (`decision.watch`), and while a step is waited for (`decision.holding`)."""
 
 from collections.abc import Iterable
 
+from rtshcua.decision.holding import holding
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.truth import FALSE, Truth
 from rtshcua.decision.watch import watch
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.wire.response import Answer
 
 _DURATION = "lasts longer than it may"
+_TIMING = 5  # the step of section 4.1 that holds a decision against its deadline
 
 
 class Grace:
@@ -37,17 +43,16 @@ class Grace:
 
 
 class Supervisor:
-    """Watches one running skill. UNKNOWN that lasts longer than the contract's grace counts as FALSE (design 4.2)."""
+    """Watches one running skill. UNKNOWN that lasts longer than the contract's grace counts as FALSE (design 4.2).
+
+    While nothing is judged no grace runs, but the skill's own time does.
+    """
 
     def __init__(self, prepared: PreparedInvocation, policy: PreparedPolicy, started_us: int) -> None:
         self._prepared = prepared
         self._policy = policy
         self._started_us = started_us
-        self._grace = Grace()
-
-    def stood(self, us: int) -> None:
-        """For so long nothing was judged: no grace ran meanwhile. The skill's own time did."""
-        self._grace.stood(us)
+        self.grace = Grace()
 
     def violated(self, state: State, now: Now) -> str | None:
         """The text of what does not hold any more, or None while all does."""
@@ -55,4 +60,56 @@ class Supervisor:
         at_us = now.monotonic_us
         if 0 < contract.duration_us < at_us - self._started_us:
             return _DURATION
-        return self._grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
+        return self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
+
+
+class RetryPolicy:
+    """Whether and when a step that was not admitted is asked for again, and how long it is waited for.
+
+    While nothing is judged no grace runs, but the step's deadline does.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self.grace = Grace()
+        self._news = True  # something was received, or began, since the step was last asked for
+        self._asked_us = 0  # when that was
+        self._held = False  # a hold for the step was tried
+
+    def renew(self, now_us: int, *, at_once: bool) -> None:
+        """Another step is waited for from now on; it is asked for `at_once`, or when something was received."""
+        self.grace = Grace()
+        self._news, self._asked_us, self._held = at_once, now_us, False
+
+    def news(self) -> None:
+        """Something was received: the answer may be another one now."""
+        self._news = True
+
+    def is_due(self, now_us: int) -> bool:
+        """Whether the step is to be asked for now; then it counts as asked for."""
+        if not self._news and now_us - self._asked_us < self._limits.again_us:
+            return False
+        self._news, self._asked_us = False, now_us
+        return True
+
+    @staticmethod
+    def may_wait(invocation: Invocation, answer: Answer, released_us: int, now_us: int) -> bool:
+        """Whether asking again can help: not past the deadline, but for an approval, which has a time of its own.
+
+        What passed the timing step is in time, also by a release that an approval moved.
+        """
+        if answer.reason is Reason.AWAITING_APPROVAL:
+            return True
+        holds = invocation.on_inadmissible == OnInadmissible.HOLD and answer.reason is not Reason.NO_SLACK
+        in_time = answer.rule_step > _TIMING or now_us < released_us + invocation.contract.deadline_us
+        return in_time and (answer.outcome is Outcome.DEFER or holds)
+
+    def may_hold(self) -> bool:
+        """Whether a hold is to be tried while the step is waited for: once, for a hold goes on."""
+        held, self._held = self._held, True
+        return not held
+
+    def unkept(self, prepared: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> str | None:
+        """What forbids waiting on in the air; UNKNOWN has the step's grace."""
+        grace_us = prepared.invocation.contract.grace_us
+        return self.grace.over(holding(prepared, state, policy, now), now.monotonic_us, grace_us)

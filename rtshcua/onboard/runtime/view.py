@@ -1,7 +1,18 @@
 """What a display may show of a run: plain data, made on request, with no way back into the runtime."""
 
+from enum import StrEnum
+
 from rtshcua.onboard.ports import Ending, Frozen
-from rtshcua.onboard.runtime.flight import Stage
+
+
+class Stage(StrEnum):
+    """Where a run stands."""
+
+    WAITING = "waiting"  # for the vehicle to be ready
+    DECIDING = "deciding"  # about the current step; on the ground, or holding
+    RUNNING = "running"  # the current step flies
+    FALLING = "falling-back"  # a chain flies, down to the ground
+    ENDED = "ended"
 
 
 class Reading(Frozen):

@@ -14,7 +14,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.unheard import unheard
+from rtshcua.onboard.rehearsal import unheard
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.faults import GpsLoss, LinkLoss
 from rtshcua.simulation.place import Home

@@ -14,9 +14,9 @@ from reference.world import TICK, Run, assert_audited, loaded
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.ports import Announce, Ending, Presented, Reply, Said, Sent
-from rtshcua.onboard.runtime.patience import Patience
-from rtshcua.onboard.runtime.queue import InvocationQueue
-from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US, WINDOW, RemainingLatency
+from rtshcua.onboard.runtime.admission import InvocationQueue
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US, WINDOW, RemainingLatency
+from rtshcua.onboard.runtime.supervisor import RetryPolicy
 from rtshcua.wire.response import Answer
 
 TIMES = st.lists(st.integers(-10, 1 << 40), max_size=2 * WINDOW)
@@ -61,7 +61,7 @@ def test_it_counts_until_the_first_frame_went_out() -> None:
 def waits(reason: Reason, outcome: Outcome, step: int, at_us: int, on: OnInadmissible = OnInadmissible.ABORT) -> bool:
     invocation = replace(MISSION.invocations[0], on_inadmissible=on)
     answer = Answer(outcome, reason, step, -1, 0, 0, 0)
-    return Patience(loaded()).may_wait(invocation, answer, 0, at_us)
+    return RetryPolicy.may_wait(invocation, answer, 0, at_us)
 
 
 BEFORE, AFTER = 1, 10 * S

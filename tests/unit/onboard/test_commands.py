@@ -4,7 +4,7 @@ from msgspec.structs import replace
 from reference.flat_case import CONTRACTS, GOTO, HOVER, MISSION, PATH, POLICY, RULES, M, S, link
 from rtshcua.model.flat.contract import QUANTITY, Motion, MotionKind, Parameter
 from rtshcua.model.flat.zone import project
-from rtshcua.onboard.enforcement.commands import Commands
+from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 

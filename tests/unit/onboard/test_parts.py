@@ -8,9 +8,9 @@ from reference.asking import POLICY
 from reference.flat_case import MISSION
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.onboard.ports import Readings
+from rtshcua.onboard.runtime.admission import InvocationQueue
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US, WINDOW, RemainingLatency
 from rtshcua.onboard.runtime.monitor import StateMonitor
-from rtshcua.onboard.runtime.queue import InvocationQueue
-from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US, WINDOW, RemainingLatency
 from rtshcua.wire.request import MAX_AGE_US
 
 

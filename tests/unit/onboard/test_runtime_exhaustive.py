@@ -13,8 +13,7 @@ from msgspec.structs import replace
 from reference.flat_case import OBSTACLE, WIND, M, S
 from reference.world import SESSION_KEY, FakeVehicle, Run, assert_covered, loaded, renewed
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.executor import Executor
+from rtshcua.onboard.enforcement.executor import Commands, Executor
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,

@@ -19,7 +19,8 @@ from rtshcua.onboard.ports import (
     LinkLost,
     TakenOver,
 )
-from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.view import Stage
 from rtshcua.wire.response import Status, encode_refusal
 
 

@@ -27,7 +27,8 @@ from rtshcua.model.flat.mission import Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import AirState, Ending, Failed, Readings, Ready, Succeeded
-from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.view import Stage
 
 RUNS: list[Run] = []
 

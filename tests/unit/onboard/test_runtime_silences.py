@@ -38,7 +38,8 @@ from rtshcua.onboard.ports import (
     Succeeded,
     TakenOver,
 )
-from rtshcua.onboard.runtime.flight import Limits, Stage
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.view import Stage
 
 LOST_US = S  # a link counts as lost when it was silent for so long
 EACH_US = 50_000  # the first messages after a silence come so far apart

@@ -8,8 +8,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.model.flat.situation import State
-from rtshcua.onboard.rehearsal import rehearse
-from rtshcua.onboard.unheard import needed, stranded, unheard
+from rtshcua.onboard.rehearsal import needed, rehearse, stranded, unheard
 from virtual import case
 
 POLICY = case.policy()

@@ -11,8 +11,7 @@ from rtshcua.cli.live.chart import chart
 from rtshcua.cli.live.lines import as_json, plain, sentence
 from rtshcua.cli.live.screen import picture
 from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Signal, Snapshot, Step, Summary
-from rtshcua.onboard.runtime.flight import Stage
-from rtshcua.onboard.runtime.view import Reading, View
+from rtshcua.onboard.runtime.view import Reading, Stage, View
 
 PLAN = Plan(
     mission="inspect", intent="Look at it.", policy="bridge@7", vehicle="quad-07", mode="software", speed=10.0,

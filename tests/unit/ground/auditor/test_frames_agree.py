@@ -13,9 +13,8 @@ from rtshcua.ground.auditor.sent import Frame, Nature, nature, read
 from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.enforcement.frame_shape import Frame as Shape
-from rtshcua.onboard.enforcement.frame_shape import read_frame
-from rtshcua.onboard.enforcement.motion_frames import carries_out
+from rtshcua.onboard.enforcement.allow_list import Frame as Shape
+from rtshcua.onboard.enforcement.allow_list import carries_out, read_frame
 from rtshcua.onboard.ports import Command
 
 AUTOPILOTS = {"px4": PX4, "ardupilot": ARDUPILOT}

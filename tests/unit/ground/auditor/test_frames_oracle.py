@@ -18,9 +18,9 @@ from rtshcua.ground.auditor.sent import read as read_frame
 from rtshcua.ground.auditor.trust import Basis, establish
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
-from rtshcua.onboard.enforcement.commands import Commands
-from rtshcua.onboard.enforcement.frame_shape import read_frame as read_shape
-from rtshcua.onboard.enforcement.motion_frames import carries_out
+from rtshcua.onboard.enforcement.allow_list import carries_out
+from rtshcua.onboard.enforcement.allow_list import read_frame as read_shape
+from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Command
 from rtshcua.simulation.faults import WindStep
 from virtual import case

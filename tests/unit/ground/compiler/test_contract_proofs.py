@@ -7,7 +7,7 @@ from rtshcua.adapters.vehicle import commander, streams, telemetry
 from rtshcua.ground.compiler.proofs import observation
 from rtshcua.ground.compiler.proofs.rates import COMMANDS, RATES
 from rtshcua.mavlink import dialect
-from rtshcua.onboard.runtime import remaining
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 
 LAND = {"motion": "land", "fallback": "", "class": "tactical"}
 
@@ -21,7 +21,7 @@ def test_the_figures_are_those_of_what_flies() -> None:
     assert RATES.most_often == telemetry.MOST_OFTEN_US
     assert RATES.least_often == telemetry.LEAST_OFTEN_US
     assert RATES.within_stale == telemetry._WITHIN_STALE
-    assert observation.DECIDE_US == remaining.CONSERVATIVE_US
+    assert observation.DECIDE_US == CONSERVATIVE_US
     assert observation.ACTUATE_US == commander.RETRY_US
     assert dialect.load().messages.keys() >= COMMANDS
 

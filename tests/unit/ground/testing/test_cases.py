@@ -15,7 +15,7 @@ from rtshcua.ground.testing.run import Ran, run_case
 from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Invocation
-from rtshcua.onboard.runtime.remaining import CONSERVATIVE_US
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
 TABLE = f"""test "charge and wind" {{

@@ -1,22 +1,151 @@
-"""Which frames carry out a command: the same rules for every adapter, read next to what autopilots make of a frame.
+"""The allow-list of frames: which ones may leave without a permit, and which carry out the command that is permitted.
+
+Housekeeping moves nothing. Questions, telemetry rates, texts and our own heartbeat pass always. A geofence may be
+handed over before the flight, never during it. What is not here is not housekeeping: no mission is uploaded, no
+parameter written but the two that switch ArduCopter's fence on, no signing key set, no file opened, no manual control
+given.
 
 A frame carries out a command if every field that the autopilot acts on has the value that the command gives it: the
 number, each parameter, the frame of reference, the point, the height, the speed, the mode. Nothing is "about right" but
-for what a 32-bit float rounds off, and for the height of home, which the autopilot's own estimate moves.
+for what a 32-bit float rounds off, and for the height of home, which the autopilot's own estimate moves. The rules are
+the same for every adapter, read next to what autopilots make of a frame.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import cos, hypot, isfinite, isnan, radians
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.framing import CHECKSUM, HEAD, HEADER, MARKER
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import meridian
-from rtshcua.onboard.enforcement.frame_shape import Frame
 from rtshcua.onboard.ports import Command
+
+_Fields = tuple[Any, ...]
+
+
+class Frame(NamedTuple):
+    """One whole frame. `fields` are in the order of the wire; `target` is (system, component) where it has one."""
+
+    system: int
+    component: int
+    message: int
+    fields: _Fields
+    target: tuple[int, int] | None
+
+
+_frame = tuple.__new__  # the constructor that a named tuple is given is a function more
+_head, _layout = HEAD.unpack_from, LAYOUTS.get  # bound once: every frame that is heard comes by here
+_TARGETS = {number: layout.at("target_system") for number, layout in LAYOUTS.items()}
+
+
+def read_frame(octets: bytes) -> Frame | None:
+    """The frame that these octets are; None unless they are one whole unsigned frame of a message in `LAYOUTS`.
+
+    The boundary reads frames itself: it shares no parser with the adapters that it checks. The checksum is the
+    receiver's to check: a frame whose checksum is wrong moves nothing.
+    """
+    if len(octets) < HEADER or octets[0] != MARKER:
+        return None
+    _, length, incompatible, compatible, _, system, component, low, high = _head(octets)
+    message = low | high << 16
+    layout = _layout(message)
+    if layout is None or incompatible or compatible or len(octets) != HEADER + length + CHECKSUM:
+        return None
+    if length > layout.fields.size:
+        return None
+    fields, target = layout.read(octets), _TARGETS[message]
+    return _frame(Frame, (system, component, message, fields, None if target < 0 else fields[target : target + 2]))
+
+
+# ---------------------------------------------------------------- housekeeping
+
+_OWN_HEARTBEAT: Final = (enums.MAV_TYPE_ONBOARD_CONTROLLER, enums.MAV_AUTOPILOT_INVALID, 0)
+_POLYGONS_TOO: Final = tuple(bits for bits in range(16) if bits & 4)  # FENCE_TYPE is a set of bits
+_FENCE_ITEMS: Final = range(enums.MAV_CMD_NAV_FENCE_RETURN_POINT, enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION + 1)
+
+_identity: Final = LAYOUTS[layouts.HEARTBEAT].getter("type autopilot base_mode")
+_command_number: Final = LAYOUTS[COMMAND_LONG].getter("command")
+_parameters: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7")
+_setting: Final = LAYOUTS[layouts.PARAM_SET].getter("param_id param_value")
+_item: Final = LAYOUTS[layouts.MISSION_ITEM_INT].getter("command current mission_type")
+
+
+def is_housekeeping(frame: Frame) -> bool:
+    """Whether the frame moves nothing, and may leave at any time."""
+    rule = _AT_ANY_TIME.get(frame.message)
+    return rule is not None and rule(frame.fields)
+
+
+def is_of_fence(frame: Frame) -> bool:
+    """Whether the frame is part of handing over a fence: it moves nothing, and may leave before the flight."""
+    rule = _BEFORE_FLIGHT.get(frame.message)
+    return rule is not None and rule(frame.fields)
+
+
+def _any(fields: _Fields) -> bool:
+    return True
+
+
+def _is_own(fields: _Fields) -> bool:
+    """A heartbeat of ours: a ground station's would hide that the real one is gone (vehicles.md, 2)."""
+    return bool(_identity(fields) == _OWN_HEARTBEAT)
+
+
+def _asks(fields: _Fields) -> bool:
+    """A command that asks for messages, or for the checks before arming."""
+    number = _command_number(fields)
+    if number == enums.MAV_CMD_RUN_PREARM_CHECKS:
+        return not any(_parameters(fields))
+    return number in (enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE)
+
+
+def _switches_fence_on(fields: _Fields) -> bool:
+    """FENCE_ENABLE on; FENCE_TYPE with polygons among what it heeds. Nothing else of the vehicle is set from here."""
+    name, value = _setting(fields)
+    match name.rstrip(b"\0"):
+        case b"FENCE_ENABLE":
+            return bool(value == 1)
+        case b"FENCE_TYPE":
+            return value in _POLYGONS_TOO
+    return False
+
+
+def _about_fence(message: int) -> Callable[[_Fields], bool]:
+    """Whether such a message is about a fence, and not about a mission."""
+    kind = LAYOUTS[message].getter("mission_type")
+    return lambda fields: bool(kind(fields) == enums.MAV_MISSION_TYPE_FENCE)
+
+
+def _is_fence_item(fields: _Fields) -> bool:
+    """Not `current`: 2 and 3 there are ArduPilot's way to say "go there now" and "climb to there now"."""
+    number, current, mission_type = _item(fields)
+    return mission_type == enums.MAV_MISSION_TYPE_FENCE and current == 0 and number in _FENCE_ITEMS
+
+
+_AT_ANY_TIME: Final[dict[int, Callable[[_Fields], bool]]] = {
+    layouts.HEARTBEAT: _is_own,
+    layouts.COMMAND_LONG: _asks,
+    layouts.PARAM_REQUEST_READ: _any,
+    layouts.PARAM_REQUEST_LIST: _any,
+    layouts.MISSION_REQUEST: _any,
+    layouts.MISSION_REQUEST_LIST: _any,
+    layouts.MISSION_REQUEST_INT: _any,
+    layouts.MISSION_ACK: _any,
+    layouts.TIMESYNC: _any,
+    layouts.STATUSTEXT: _any,
+}
+_BEFORE_FLIGHT: Final[dict[int, Callable[[_Fields], bool]]] = {
+    layouts.PARAM_SET: _switches_fence_on,
+    layouts.MISSION_COUNT: _about_fence(layouts.MISSION_COUNT),
+    layouts.MISSION_CLEAR_ALL: _about_fence(layouts.MISSION_CLEAR_ALL),
+    layouts.MISSION_ITEM_INT: _is_fence_item,
+}
+
+# ---------------------------------------------------------------- motion
 
 #: mm: how far home's height above sea may have moved between the frame that told it and the one that uses it; in the
 #: recorded flight of PX4 it moves by 0.7 m
@@ -100,7 +229,7 @@ def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
     return hypot(here[0] - latitude, east) * _METRES <= NEAR
 
 
-def _long(fields: tuple[Any, ...], command: Command, autopilot: int, home_amsl: int | None) -> bool:
+def _long(fields: _Fields, command: Command, autopilot: int, home_amsl: int | None) -> bool:
     one, two, three, four, five, six, seven, number = layouts.of_command_long(fields)
     match number:
         case enums.MAV_CMD_DO_SET_MODE:
@@ -124,7 +253,7 @@ def _long(fields: tuple[Any, ...], command: Command, autopilot: int, home_amsl: 
     return False
 
 
-def _reposition(fields: tuple[Any, ...], command: Command, home_amsl: int | None) -> bool:
+def _reposition(fields: _Fields, command: Command, home_amsl: int | None) -> bool:
     """DO_REPOSITION: a circle's radius, or a heading of its own, would be another manoeuvre."""
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     return (
@@ -138,7 +267,7 @@ def _reposition(fields: tuple[Any, ...], command: Command, home_amsl: int | None
     )
 
 
-def _stop(fields: tuple[Any, ...]) -> bool:
+def _stop(fields: _Fields) -> bool:
     """DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand.
 
     A finite one of them would make PX4 keep the target that it flies to.
@@ -153,7 +282,7 @@ def _stop(fields: tuple[Any, ...]) -> bool:
     )
 
 
-def _position_target(fields: tuple[Any, ...], command: Command) -> bool:
+def _position_target(fields: _Fields, command: Command) -> bool:
     """SET_POSITION_TARGET_GLOBAL_INT; what the mask tells the autopilot to ignore may be anything."""
     x, y, z, mask, reference = layouts.of_position_target(fields)
     return (

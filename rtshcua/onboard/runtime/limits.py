@@ -1,18 +1,42 @@
-"""How long a run may take at most, whatever happens: computed from the policy, and held against every path of small
-runs by a search (docs/model-checking.md).
+"""How long the runtime waits for the world, and how long a run may take at most, whatever happens.
 
+The bounds are computed from the policy, and held against every path of small runs by a search (docs/model-checking.md).
 Each wait of the runtime has a limit of its own. It is noticed at the next step of the loop, at most `period_us` later,
 and when the link was lost only on fresh state, at most `flapping_us` after it was back. Time in which the vehicle is
 not heard is not counted here: a silence lasts no longer than the vehicle can fly and `silent_us`, then the run stands
 down.
 """
 
-from collections.abc import Iterable
-
 from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
-from rtshcua.onboard.runtime.flight import Limits, link_us
+from rtshcua.onboard.ports import Frozen
+
+
+class Limits(Frozen):
+    """How long the runtime waits for the world, in us.
+
+    `ready_us` for a vehicle that is ready. `silent_us` for a lost link to come back: on the ground, or once somebody
+    asked this program to stop; in the air that, and as long as the vehicle can fly. When the link is back, `fresh_us`
+    for fresh state: longer than a link must be silent to count as lost, so that nothing is judged after one message and
+    no more. A link that comes and goes is waited for `flapping_us` in all, from when it was back first.
+
+    The last link of the contingency has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us`
+    bounds how long a deferred step is left without asking again when nothing was received.
+    """
+
+    ready_us: int = 120_000_000
+    silent_us: int = 30_000_000
+    fresh_us: int = 1_500_000
+    flapping_us: int = 5_000_000
+    retry_us: int = 2_000_000
+    tries: int = 5
+    again_us: int = 100_000
+
+
+def link_us(policy: Policy, link: Link) -> int:
+    """How long a link may take: its own limit, else its skill's, else as long as anything can fly."""
+    return link.limit_us or policy.contracts[link.skill].duration_us or policy.vehicle.endurance_us
 
 
 def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period_us: int) -> int:
@@ -26,9 +50,9 @@ def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period
     slack_us = limits.flapping_us + period_us
     chain = contract.fallback if contract is not None else ()
     targets = [rule.target for rule in policy.rules if contract is not None and rule.target is not None]
-    degraded = max((_link_us(policy, target) + slack_us for target in targets), default=0)
-    flown = sum(_link_us(policy, link) + slack_us for link in (*chain, *policy.contingency))
-    last_us = _link_us(policy, policy.contingency[-1]) + slack_us
+    degraded = max((link_us(policy, target) + slack_us for target in targets), default=0)
+    flown = sum(link_us(policy, link) + slack_us for link in (*chain, *policy.contingency))
+    last_us = link_us(policy, policy.contingency[-1]) + slack_us
     insisting = limits.tries * (limits.retry_us + slack_us + last_us) + slack_us
     return degraded + flown + insisting + last_us + insisting
 
@@ -47,12 +71,4 @@ def run_us(policy: Policy, mission: Mission, limits: Limits, period_us: int) -> 
     for contract in contracts:
         waited = approval_us + 2 * contract.deadline_us if approval_us else contract.deadline_us
         total += waited + contract.duration_us + 2 * slack_us
-    return total + max(falling_us(policy, contract, limits, period_us) for contract in _and_none(contracts))
-
-
-def _and_none(contracts: Iterable[Contract]) -> list[Contract | None]:
-    return [None, *contracts]
-
-
-def _link_us(policy: Policy, link: Link) -> int:
-    return link_us(link, policy.contracts[link.skill], policy.vehicle.endurance_us)
+    return total + max(falling_us(policy, contract, limits, period_us) for contract in (None, *contracts))

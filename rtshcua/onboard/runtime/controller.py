@@ -1,0 +1,458 @@
+"""The mission controller: the stages of a run, and what leads from one to the next (design section 4.4).
+
+What a step that is not admitted does: denied in the air, the contingency flies, and nothing that the step itself says
+is listened to. Deferred, it is asked for again until its deadline, in the air under a hold. Else `on inadmissible`
+counts: `skip` goes on with the next step, `hold` waits like a deferral, `abort` flies the step's fallback and, when
+that is used up, the contingency. On the ground nothing is sent, and the run ends.
+
+While the link is down, and until fresh state came or its time is over, there is no turn at all (`link`).
+"""
+
+from rtshcua.decision.links import look_ahead
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
+from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Failed, LinkLost
+from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
+from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
+from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.link import LinkState, LinkSupervision, Silence
+from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
+from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
+from rtshcua.onboard.runtime.view import Stage, View
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
+from rtshcua.wire.response import Answer
+
+#: what ends a run matters more the further down it stands
+_GRAVITY = (Ending.ABORTED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
+_UP = LinkState.UP  # an enumeration's attributes are slow to find
+_WAITING, _DECIDING, _RUNNING, _FALLING, _ENDED = Stage
+
+
+class MissionController:
+    """Owns where a run stands, and the parts that own the rest: see the package's docstring.
+
+    `stage` and `ending` are for reading; `ending` is None until the run ended.
+    """
+
+    def __init__(self, loaded: Loaded, journal: Journal, limits: Limits, *, resumed: bool) -> None:
+        self._loaded = loaded
+        self._policy = loaded.bundle.policy
+        self._journal = journal
+        self._limits = limits
+        self._resumed = resumed
+        self.stage = _WAITING
+        self.ending: Ending | None = None
+        self._cause: Ending | None = None  # why the mission was given up; None: it was not
+        self._began_us: int | None = None
+        self._recording = True  # records are kept, or the policy does not ask
+        self._stopping = False  # somebody asked this program to stop
+        self.vehicle = VehicleStatus()
+        self.monitor = StateMonitor(loaded.policy)
+        self.link = LinkSupervision(self._policy, self.monitor, limits)
+        self.queue = InvocationQueue(loaded.bundle.mission)
+        remaining = RemainingLatency()
+        self.admission = Admission(loaded, journal, self.queue, remaining)
+        self.dispatcher = Dispatcher(loaded.executor, journal, remaining)
+        self.retry = RetryPolicy(limits)
+        self._supervisor: Supervisor | None = None  # of the step that runs
+        self._fallback = Fallback(loaded, self.admission, self.dispatcher, limits)
+
+    @property
+    def aloft(self) -> bool:
+        """Whether a motion command may be needed: a command is under way, or a flight of this bundle is not at rest.
+
+        A flight that somebody else began is none of ours, whatever happens. After a restart of ours the vehicle counts
+        as in the air until it says that it is not.
+        """
+        if self.dispatcher.active is not None:
+            return True
+        if self.dispatcher.dispatched:
+            return not self.vehicle.at_rest
+        return self._resumed and self.vehicle.airborne is not False
+
+    # -------------------------------------------------------- turns: what is to be done now, by stage
+
+    def turn(self, now: Now) -> bool:
+        """Do one thing that can be done now; False when there is none left."""
+        if self._began_us is None:
+            self._began_us = now.monotonic_us
+        if self.stage is _ENDED or (self.link.state is not _UP and not self._judges(now)):
+            return False
+        stage = self.stage
+        if stage is _RUNNING:
+            return self._supervise(now)
+        if stage is _FALLING:
+            return self._fall(now)
+        return self._decide(now) if stage is _DECIDING else self._wait(now, self._began_us)
+
+    def _judges(self, now: Now) -> bool:
+        """Whether the vehicle is heard again, and what is known of it may be judged."""
+        link = self.link
+        if link.down:
+            if self._is_gone(now.monotonic_us):
+                self.stand_down(now, Ending.LINK_LOST)
+            return False  # nothing that is sent would arrive
+        if link.awaits(now.monotonic_us):
+            return False
+        stood_us, silence = link.judged(now.monotonic_us)
+        if stood_us:
+            self.retry.grace.stood(stood_us)
+            if self._supervisor is not None:
+                self._supervisor.grace.stood(stood_us)
+        if silence is not None:
+            self._heard_again(now, silence)
+        return True
+
+    def _is_gone(self, now_us: int) -> bool:
+        """Whether the silence was waited out: in the air the vehicle may come back as long as it can fly, unless
+        somebody waits for this program to stop.
+        """
+        limit_us = self._limits.silent_us
+        if self.aloft and not self._stopping:
+            limit_us += self._policy.vehicle.endurance_us
+        return self.link.waited_us(now_us) > limit_us
+
+    def _heard_again(self, now: Now, silence: Silence) -> None:
+        """State is judged again after a silence. One that was too long ends the mission, if the policy says so."""
+        policy, waited = self._policy, f"after {silence.awaited_us // 1_000} ms"
+        if silence.missing:
+            self._journal.effect(now, "not-fresh", detail=f"{waited} without {', '.join(silence.missing)}")
+        else:
+            self._journal.effect(now, "fresh", detail=waited)
+        if policy.after_silence != AfterSilence.CONTINGENCY or silence.lasted_us <= policy.silence_us:
+            return
+        ends = self.dispatcher.homeward and self.queue.at_last  # then nothing is left to be given up
+        if self.aloft and self.stage in (_DECIDING, _RUNNING) and not ends:
+            text = f"{silence.lasted_us // 1_000} ms, more than {policy.silence_us // 1_000} ms"
+            self._journal.effect(now, "long-silence", detail=text)
+            self.break_off(now, Ending.ABORTED, CONTINGENCY_LINK)
+
+    def _wait(self, now: Now, began_us: int) -> bool:
+        vehicle = self.vehicle
+        if not vehicle.ready or vehicle.airborne is None:
+            if now.monotonic_us - began_us > self._limits.ready_us:
+                self._journal.effect(now, "never-ready")
+                return self._come_down(now)
+            return False
+        self._journal.effect(now, "ready")
+        if self._resumed and vehicle.airborne and vehicle.others:  # while this program was gone somebody took it
+            self._journal.effect(now, "taken-over", detail=vehicle.others)
+            self.stand_down(now, Ending.STOOD_DOWN)
+            return False
+        if self._resumed or vehicle.airborne:
+            # What an earlier run of this bundle left in the air is brought down, and a bundle flies once. Any other
+            # flight that this run did not begin is someone else's.
+            self._journal.effect(now, "resumed" if self._resumed else "already-airborne")
+            return self._come_down(now)
+        self.queue.release(now.monotonic_us)
+        self.stage = _DECIDING
+        return True
+
+    def _decide(self, now: Now) -> bool:
+        if self._cause is not None:  # given up while a step of the mission brought the vehicle down
+            self.break_off(now, self._cause)
+            return True
+        invocation = self.queue.current
+        if invocation is None:
+            return self._finish(now)
+        if not self.retry.is_due(now.monotonic_us):
+            return False
+        state = self.monitor.state(now.monotonic_us)
+        released_us = self.queue.released_us or 0
+        if not self._recording:
+            if now.monotonic_us < released_us + invocation.contract.deadline_us:
+                return self._bide(now, invocation, state)
+            return self._come_down(now, cause=Ending.EVIDENCE_LOST)
+        answer = self.admission.ask(now, state, Ref(STEP, invocation.step, -1))
+        if answer is None or (answer.outcome is Outcome.DENY and not answer.permit):
+            return self._come_down(now)
+        if answer.permit:
+            return self._start(now, invocation, answer)
+        if self.retry.may_wait(invocation, answer, released_us, now.monotonic_us):
+            return self._bide(now, invocation, state)
+        return self._inadmissible(now, invocation)
+
+    def _finish(self, now: Now) -> bool:
+        if not self.aloft:
+            self._end(now, Ending.COMPLETED)
+            return False
+        self._journal.effect(now, "not-landed")
+        self.fall_back(CONTINGENCY_LINK)
+        return True
+
+    def _bide(self, now: Now, invocation: Invocation, state: State) -> bool:
+        """The step is not begun yet: in the air it is waited for under a hold, as long as what must hold does."""
+        if not self.aloft:
+            return False
+        unkept = self.retry.unkept(self._loaded.invocations[invocation.step], state, self._loaded.policy, now)
+        if unkept is not None:
+            return self._violated(now, unkept)
+        if self.dispatcher.active is None and self.retry.may_hold():
+            self._fallback.hold(now, state)
+        return False
+
+    def _start(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
+        if not self.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
+            return self._inadmissible(now, invocation)
+        prepared = self._loaded.invocations[invocation.step]
+        self._supervisor = Supervisor(prepared, self._loaded.policy, now.monotonic_us)
+        self.stage = _RUNNING
+        return False
+
+    def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
+        if invocation.on_inadmissible == OnInadmissible.SKIP:
+            self._journal.effect(now, "skipped", Ref(STEP, invocation.step, -1))
+            self._advance(now)
+            return True
+        return self._come_down(now, FALLBACK_LINK)
+
+    def _supervise(self, now: Now) -> bool:
+        supervisor = self._supervisor
+        violated = None if supervisor is None else supervisor.violated(self.monitor.state(now.monotonic_us), now)
+        return violated is not None and self._violated(now, violated)
+
+    def _violated(self, now: Now, what: str) -> bool:
+        """Something that must hold for the current step does not."""
+        self.dispatcher.end(now, "violated", what)
+        self.fall_back(FALLBACK_LINK)
+        return True
+
+    def _fall(self, now: Now) -> bool:
+        if self.dispatcher.active is None and self.vehicle.at_rest:
+            self.down(now)
+        elif not self._fallback.turn(now, self.monitor.state(now.monotonic_us)):
+            self._journal.effect(now, "stranded")
+            self.stand_down(now, self._cause or Ending.ABORTED)
+        return False
+
+    def prepare(self, now: Now) -> None:
+        """Look ahead at what the running step's fallback would need where the vehicle is now, if it moved."""
+        current = self.queue.current
+        if self.stage is _RUNNING and current is not None and self.monitor.moved():
+            prepared = self._loaded.invocations[current.step]
+            look_ahead(prepared, self.monitor.state(now.monotonic_us), self._loaded.policy, now)
+
+    # -------------------------------------------------------- what the vehicle says of itself
+
+    def air_reported(self, now: Now, event: AirState) -> None:
+        """The vehicle says whether it is armed and in the air."""
+        self.link.air_reported()
+        active, ours = self.dispatcher.active, self.dispatcher.dispatched
+        came_down = self.vehicle.report(armed=event.armed, airborne=event.airborne, ours=ours)
+        if self.stage is _DECIDING:
+            if ours and self.vehicle.at_rest:
+                self.down(now)
+            elif not ours and event.airborne:  # a flight that this run did not begin is the pilot's
+                self._journal.effect(now, "taken-over", detail="took off")
+                self.stand_down(now, Ending.STOOD_DOWN)
+        elif came_down and (
+            self.stage is _FALLING or (self.stage is _RUNNING and active is not None and not active.homeward)
+        ):
+            self.down(now)
+
+    def succeeded(self, now: Now, token: int) -> None:
+        """The effect of a command was observed."""
+        active = self.dispatcher.flying(token)
+        if active is None:
+            return
+        self.dispatcher.end(now, "succeeded")
+        if self.stage is _RUNNING:
+            if active.homeward:
+                self._landed()
+            self._advance(now)
+        elif active.homeward:
+            self.down(now)
+
+    def failed(self, now: Now, event: Failed) -> None:
+        """A command was refused, its effect did not come, or it was not sent."""
+        if self.dispatcher.flying(event.token) is None:
+            return
+        detail = f"{event.reason}: {event.text}" if event.text else event.reason
+        if self.link.down:
+            detail += "; the link is silent: what the vehicle does is not known"
+        self.dispatcher.end(now, "failed", detail)
+        if self.stage is _DECIDING and self.aloft:
+            # It was a hold: whatever the vehicle does, it does not wait where it should.
+            self.fall_back(FALLBACK_LINK, holds=False)
+        elif self.stage is not _RUNNING:
+            return
+        elif event.reason == WITHHELD and not self._recording:
+            self._come_down(now, cause=Ending.EVIDENCE_LOST)
+        elif self.aloft:
+            self.fall_back(FALLBACK_LINK)
+        else:
+            self._end(now, self._ending_on_ground)
+
+    def down(self, now: Now) -> None:
+        """The vehicle is on the ground again, told to or not: the flight is over, and the run with it. Nothing is sent
+        to a vehicle on the ground.
+        """
+        self.dispatcher.end(now, "landed")
+        self._landed()
+        self._end(now, self._cause or Ending.ABORTED)
+
+    def _landed(self) -> None:
+        self.dispatcher.landed()
+        self.vehicle.landed()
+
+    def link_lost(self, now: Now, event: LinkLost) -> None:
+        """The vehicle is not heard any more."""
+        takes_off = self.dispatcher.active is not None and self.vehicle.airborne is not True
+        if self.link.lost(now.monotonic_us, event.heard_us or now.monotonic_us, takes_off=takes_off):
+            self._journal.effect(now, "link-lost", detail=event.why)
+            self.retry.news()
+
+    def link_back(self, now: Now) -> None:
+        """The vehicle is heard again."""
+        down_us = self.link.back(now.monotonic_us)
+        if down_us is not None:
+            self._journal.effect(now, "link-back", detail=f"after {down_us // 1_000} ms")
+        self.retry.news()
+
+    # -------------------------------------------------------- what ends a run, or turns it homeward
+
+    def break_off(self, now: Now, cause: Ending, kind: int = FALLBACK_LINK) -> None:
+        """Give the mission up: on the ground the run ends, in the air a running step falls back by its own chain, or
+        by the contingency if `kind` says so, and between steps the contingency flies.
+
+        What already brings the vehicle home or down goes on.
+        """
+        self._blame(cause)
+        if not self.aloft:
+            self._end(now, cause)
+        elif self.stage is _RUNNING:
+            if not self.dispatcher.homeward:
+                self.fall_back(kind, cause)
+        elif self.stage is not _FALLING:
+            self.fall_back(CONTINGENCY_LINK, cause)
+
+    def stop(self, now: Now) -> None:
+        """Somebody asked this program to stop, and waits for it."""
+        if not self._stopping:
+            self._stopping = True
+            self.link.hurry(now.monotonic_us)
+        self.break_off(now, Ending.INTERRUPTED)
+
+    def recall(self, now: Now) -> None:
+        """An operator calls the vehicle back."""
+        self.break_off(now, Ending.RECALLED, CONTINGENCY_LINK)
+
+    def evidence_failed(self, now: Now) -> None:
+        """Records are not kept: as the policy says, the mission is given up, or no further step begins."""
+        if self._policy.without_evidence == WithoutEvidence.REFUSE:
+            self._recording = False
+        else:
+            self.break_off(now, Ending.EVIDENCE_LOST)
+
+    def evidence_kept(self) -> None:
+        """Records are kept again."""
+        self._recording = True
+        self.retry.news()
+
+    def replaced(self) -> None:
+        """A replacement is in force: steps that were not released are others now."""
+        self.queue.replace(self._loaded.bundle.mission)
+
+    def fall_back(self, kind: int, cause: Ending = Ending.ABORTED, *, holds: bool = True) -> None:
+        """Fly the current step's chain, or the contingency, down to the ground. Without `holds`, links that hold are
+        passed over: a hold has just failed.
+
+        A vehicle that has not left the ground is told to land and nothing else: a return or a hold makes no sense
+        there, and a take-off that is under way, not yet seen to have armed it, must not go on by itself.
+        """
+        self._blame(cause)
+        current = self.queue.current
+        if self.vehicle.airborne is False:
+            self._fallback.land()
+        else:
+            step = current.step if current is not None and kind == FALLBACK_LINK else -1
+            self._fallback.begin(kind, step, holds=holds)
+        self.stage = _FALLING
+
+    def leave(self) -> None:
+        """Nobody will watch any more: unless it is on its way home or down already, the last link flies."""
+        if self.stage is not _ENDED and self.aloft and not self.dispatcher.homeward:
+            self._blame(Ending.INTERRUPTED)
+            self._fallback.land()
+            self.stage = _FALLING
+
+    def stand_down(self, now: Now, ending: Ending) -> None:
+        """Send nothing more, whatever flies, and end."""
+        self.dispatcher.release(now)
+        self._journal.effect(now, "stood-down", detail=self.vehicle.last_seen)
+        self._end(now, ending)
+
+    def _come_down(self, now: Now, kind: int = CONTINGENCY_LINK, cause: Ending = Ending.ABORTED) -> bool:
+        """The mission is over: in the air a chain flies, on the ground the run ends."""
+        if cause is not Ending.ABORTED:
+            self._blame(cause)
+        if not self.aloft:
+            self._end(now, self._cause or self._ending_on_ground)
+            return False
+        self.fall_back(kind)
+        return True
+
+    @property
+    def _ending_on_ground(self) -> Ending:
+        """How a run ends that was given up on the ground for no other cause; refused if nothing ever flew."""
+        return Ending.ABORTED if self.vehicle.flown else Ending.REFUSED
+
+    def _advance(self, now: Now) -> None:
+        """The current step is done, or skipped."""
+        self.queue.advance(now.monotonic_us)
+        self._supervisor = None
+        # Where no step begins without records, the disk first gets a moment to say what became of those so far.
+        at_once = self._policy.without_evidence != WithoutEvidence.REFUSE
+        self.retry.renew(now.monotonic_us, at_once=at_once)
+        self.stage = _DECIDING
+
+    def _end(self, now: Now, ending: Ending) -> None:
+        self.admission.flush(now)
+        self.stage = _ENDED
+        self.ending = ending
+        self._loaded.executor.release()
+        self._journal.add(End(ending))
+
+    def _blame(self, cause: Ending) -> None:
+        if self._cause is None or _GRAVITY.index(cause) > _GRAVITY.index(self._cause):
+            self._cause = cause
+
+    # -------------------------------------------------------- what a display may show
+
+    def view(self, at_us: int) -> View:
+        """The run as it is at a monotonic time."""
+        mission, vehicle = self._loaded.bundle.mission, self.vehicle
+        active, current = self.dispatcher.active, self.queue.current
+        contract = current.contract.name if current is not None else ""
+        return View(
+            at_us,
+            self.stage,
+            mission.phases[self.queue.phase],
+            current.step if current is not None else len(mission.invocations),
+            len(mission.invocations),
+            contract if active is None else active.command.skill,
+            self._left_us(at_us),
+            vehicle.armed,
+            vehicle.airborne,
+            not self.link.down,
+            self.monitor.readings(at_us),
+            tuple(self.admission.recent),
+            self.ending,
+        )
+
+    def _left_us(self, at_us: int) -> int | None:
+        active, current, released_us = self.dispatcher.active, self.queue.current, self.queue.released_us
+        if self.stage is _DECIDING and current is not None and released_us is not None:
+            return released_us + current.contract.deadline_us - at_us
+        if active is None:
+            return None
+        if active.until_us is not None:
+            return active.until_us - at_us
+        if self.stage is _RUNNING and current is not None and current.contract.duration_us:
+            return active.since_us + current.contract.duration_us - at_us
+        return None

@@ -18,7 +18,6 @@ from rtshcua.decision.reads import slots_read
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle
-from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
@@ -97,7 +96,7 @@ def unheard(policy: Policy, messages: Container[str]) -> frozenset[int]:
     slots: set[int] = set()
     for signal in policy.signals:
         if signal.sources and all(source.message in messages for source in signal.sources):
-            slots.update(range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1)))
+            slots.update(signal.slots)
     return frozenset(slots)
 
 

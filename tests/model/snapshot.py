@@ -26,10 +26,10 @@ from rtshcua.onboard.enforcement.boundary import PermitIssuer, SoftwareBoundary
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.controller import MissionController
-from rtshcua.onboard.runtime.events import EventHandler
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
+from rtshcua.onboard.runtime.runtime import EventHandler
 from rtshcua.onboard.runtime.view import Decided, Stage
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.permit import AGAIN, SIZE, open_permit

@@ -17,9 +17,9 @@ from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.onboard.runtime.controller import MissionController
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
-from rtshcua.onboard.runtime.events import EventHandler
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.link import LinkSupervision
+from rtshcua.onboard.runtime.runtime import EventHandler
 from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
 
 LITTLE = small("little", (TAKEOFF, HOME), ("good",), VEHICLE, contingency=(BACK, DOWN), chain=(HOLD,))
@@ -142,11 +142,13 @@ AFTER: dict[str, tuple[type, str, Callable[[Any], Any], str, Small]] = {
     "it goes on after a takeover": (EventHandler, "_ended", goes_on, "it went on", with_events("taken over")),
     "it goes on after a crash": (EventHandler, "_ended", goes_on, "it went on", with_events(*WORST)),
     "stale state is judged": (
-        LinkSupervision, "awaits", judges_at_once, "judged what was known before a silence", with_events(*LINK, "silence")),
+        LinkSupervision, "awaits", judges_at_once, "judged what was known before a silence",
+        with_events(*LINK, "silence")),
     "grace runs through silence": (
         Grace, "stood", grace_runs, "its grace ran while the link was down",
         GOING_ON),
-    "a failed stop flies on": (MissionController, "fall_back", flies_on, "left flying after a stop that failed", HOLDING),
+    "a failed stop flies on": (
+        MissionController, "fall_back", flies_on, "left flying after a stop that failed", HOLDING),
 }  # fmt: skip
 
 

@@ -29,3 +29,8 @@ class Signal(Flat, frozen=True):
     stale_us: int
     labels: tuple[tuple[int, str], ...]
     sources: tuple[SignalSource, ...]
+
+    @property
+    def slots(self) -> range:
+        """The state slots that it owns."""
+        return range(self.slot, self.slot + (2 if self.kind == POSITION else 1))

@@ -13,7 +13,6 @@ the same for every adapter, read next to what autopilots make of a frame.
 
 from collections.abc import Callable, Mapping
 from math import cos, hypot, isfinite, isnan, radians
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from rtshcua.mavlink import enums, layouts
@@ -167,23 +166,21 @@ _places: Final = {
 _armings: Final = {number: LAYOUTS[number].getter("command param2") for number in (COMMAND_LONG, COMMAND_INT)}
 
 #: parameters 2 and 3 of DO_SET_MODE that a kind of motion is made with
-_MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = MappingProxyType(
-    {
-        PX4: {
-            MotionKind.CLIMB: Px4Mode.HOLD.parameters,  # it is armed in Hold
-            MotionKind.HOME: Px4Mode.RETURN.parameters,
-            MotionKind.LAND: Px4Mode.LAND.parameters,
-        },
-        ARDUPILOT: {
-            MotionKind.CLIMB: CopterMode.GUIDED.parameters,
-            MotionKind.FLY: CopterMode.GUIDED.parameters,
-            MotionKind.COVER: CopterMode.GUIDED.parameters,
-            MotionKind.HOLD: CopterMode.BRAKE.parameters,
-            MotionKind.HOME: CopterMode.RTL.parameters,
-            MotionKind.LAND: CopterMode.LAND.parameters,
-        },
-    }
-)
+_MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = {
+    PX4: {
+        MotionKind.CLIMB: Px4Mode.HOLD.parameters,  # it is armed in Hold
+        MotionKind.HOME: Px4Mode.RETURN.parameters,
+        MotionKind.LAND: Px4Mode.LAND.parameters,
+    },
+    ARDUPILOT: {
+        MotionKind.CLIMB: CopterMode.GUIDED.parameters,
+        MotionKind.FLY: CopterMode.GUIDED.parameters,
+        MotionKind.COVER: CopterMode.GUIDED.parameters,
+        MotionKind.HOLD: CopterMode.BRAKE.parameters,
+        MotionKind.HOME: CopterMode.RTL.parameters,
+        MotionKind.LAND: CopterMode.LAND.parameters,
+    },
+}
 _TRAVELS: Final = (MotionKind.FLY, MotionKind.COVER)
 
 
@@ -233,12 +230,8 @@ def _long(fields: _Fields, command: Command, autopilot: int, home_amsl: int | No
     one, two, three, four, five, six, seven, number = layouts.of_command_long(fields)
     match number:
         case enums.MAV_CMD_DO_SET_MODE:
-            mode = _MODES[autopilot].get(command.kind)
-            return (
-                (two, three) == mode
-                and one == enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-                and _zero(four, five, six, seven)
-            )
+            mode = (enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *_MODES[autopilot].get(command.kind, ()))
+            return (one, two, three) == mode and _zero(four, five, six, seven)
         case enums.MAV_CMD_COMPONENT_ARM_DISARM:
             return command.kind == MotionKind.CLIMB and one == 1 and _zero(two, three, four, five, six, seven)
         case enums.MAV_CMD_NAV_TAKEOFF if command.kind == MotionKind.CLIMB:
@@ -256,15 +249,9 @@ def _long(fields: _Fields, command: Command, autopilot: int, home_amsl: int | No
 def _reposition(fields: _Fields, command: Command, home_amsl: int | None) -> bool:
     """DO_REPOSITION: a circle's radius, or a heading of its own, would be another manoeuvre."""
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
-    return (
-        (number, reference, flags) == _REPOSITION
-        and command.kind in _TRAVELS
-        and radius == 0
-        and isnan(yaw)
-        and (_is_speed(speed, command) if command.speed else speed == -1)
-        and _is_point(x, y, command)
-        and _is_above_sea(z, command, home_amsl)
-    )
+    there = _is_point(x, y, command) and _is_above_sea(z, command, home_amsl) and isnan(yaw)
+    as_fast = radius == 0 and (_is_speed(speed, command) if command.speed else speed == -1)
+    return (number, reference, flags) == _REPOSITION and command.kind in _TRAVELS and there and as_fast
 
 
 def _stop(fields: _Fields) -> bool:
@@ -273,24 +260,16 @@ def _stop(fields: _Fields) -> bool:
     A finite one of them would make PX4 keep the target that it flies to.
     """
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
-    return (
-        (number, reference, flags) == _REPOSITION
-        and (speed, radius) == (-1, 0)
-        and (x, y) == _NOWHERE
-        and isnan(yaw)
-        and isnan(z)
-    )
+    nowhere = (x, y) == _NOWHERE and isnan(z) and isnan(yaw)
+    return (number, reference, flags) == _REPOSITION and nowhere and (speed, radius) == (-1, 0)
 
 
 def _position_target(fields: _Fields, command: Command) -> bool:
     """SET_POSITION_TARGET_GLOBAL_INT; what the mask tells the autopilot to ignore may be anything."""
     x, y, z, mask, reference = layouts.of_position_target(fields)
-    return (
-        (mask, reference) == (enums.POSITION_ONLY, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-        and command.kind in _TRAVELS
-        and _is_point(x, y, command)
-        and _is(z, command.altitude)
-    )
+    there = _is_point(x, y, command) and _is(z, command.altitude)
+    above_home = (mask, reference) == (enums.POSITION_ONLY, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+    return above_home and command.kind in _TRAVELS and there
 
 
 def _is_point(x: int, y: int, command: Command) -> bool:

@@ -13,7 +13,6 @@ may never be. Signals that were stale or missing before are not waited for: thei
 from enum import Enum, auto
 
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import POSITION
 from rtshcua.onboard.ports import Frozen
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
@@ -148,14 +147,6 @@ class LinkSupervision:
 
     def _missing(self, now_us: int) -> tuple[str, ...]:
         """The names of what is not known any more, and was awaited in vain so far."""
-        slots = self._pending
-        slots = slots and slots - self._monitor.current(now_us)
-        air = (AIR_STATE,) if self._awaits_air else ()
-        return (*self._names(slots), *air) if slots else air
-
-    def _names(self, slots: frozenset[int]) -> tuple[str, ...]:
-        return tuple(
-            signal.name
-            for signal in self._policy.signals
-            if signal.slot in slots or (signal.kind == POSITION and signal.slot + 1 in slots)
-        )
+        slots = self._pending - self._monitor.current(now_us)
+        names = [signal.name for signal in self._policy.signals if not slots.isdisjoint(signal.slots)]
+        return (*names, AIR_STATE) if self._awaits_air else tuple(names)

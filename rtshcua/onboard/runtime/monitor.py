@@ -1,11 +1,12 @@
 """What is known of the vehicle: its signals (the paper's `S_t`), and whether it is ready, armed and in the air."""
 
+from dataclasses import dataclass
+
 from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.decision.reads import where
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.truth import UNKNOWN
 from rtshcua.model.flat.limits import MAX_VALUE
-from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.view import Reading
@@ -107,24 +108,24 @@ class StateMonitor:
         state = self.state(at_us)
         readings = []
         for signal in self._policy.policy.signals:
-            slots = range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1))
-            values, age_us = tuple(state.values[slot] for slot in slots), max(state.ages[slot] for slot in slots)
+            values = tuple(state.values[slot] for slot in signal.slots)
+            age_us = max(state.ages[slot] for slot in signal.slots)
             readings.append(Reading(signal.name, values, age_us, age_us > signal.stale_us))
         return tuple(readings)
 
 
+@dataclass(slots=True)
 class VehicleStatus:
     """Whether the vehicle is ready, armed and in the air (None: it has not said), and whether it ever flew for us.
 
     `others`: how it flew when it was ready, if nothing of ours makes it fly so.
     """
 
-    def __init__(self) -> None:
-        self.ready = False
-        self.others = ""
-        self.armed: bool | None = None
-        self.airborne: bool | None = None
-        self.flown = False
+    ready: bool = False
+    others: str = ""
+    armed: bool | None = None
+    airborne: bool | None = None
+    flown: bool = False
 
     def is_ready(self, others: str) -> None:
         """It is ready to fly, or flies already."""

@@ -1,17 +1,35 @@
-"""The runtime: events in, actions out; no clock, no I/O, one thread, and the same actions for the same events."""
+"""The runtime: events in, actions out; no clock, no I/O, one thread, and the same actions for the same events.
 
+`EventHandler` takes in what happened, `MissionController` does what follows, `Journal` collects that as actions.
+"""
+
+from base64 import b64encode
 from collections.abc import Sequence
+from typing import Final
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Readings
+from rtshcua.onboard.ports import Action, Crashed, Dispatch, Ending, Event, Readings, Reply, TakenOver
 from rtshcua.onboard.runtime.controller import MissionController
-from rtshcua.onboard.runtime.events import EventHandler, last_words_first
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage, View
+from rtshcua.wire import names
+from rtshcua.wire.document import kind_of
+from rtshcua.wire.receipt import APPROVAL, RECALL, UNKNOWN, Receipt, decode
+from rtshcua.wire.request import STEP, Ref
+from rtshcua.wire.untrusted import Untrusted
 
+#: how much of what a vehicle says is recorded, in letters
+MOST_SAID: Final = 200
+#: how often a refused document leaves a record, in us: whoever floods the vehicle must not fill its disk
+REFUSED_EVERY_US: Final = 1_000_000
+
+#: what is taken over before a crash or a takeover: it changes no stage, and tells how it came to that
+_TOLD: Final = (Readings, ports.Sent, ports.ClockStepped, ports.Said, ports.Noted)
 _RUNNING, _ENDED = Stage.RUNNING, Stage.ENDED  # an enumeration's attributes are slow to find
 
 
@@ -93,3 +111,146 @@ class Runtime:
     def view(self, now: Now) -> View:
         """What a display may show."""
         return self._controller.view(now.monotonic_us)
+
+
+def last_words_first(events: Sequence[Event]) -> Sequence[Event]:
+    """Events in the order in which they are to be taken over: as they came, unless one of them is a crash or a
+    takeover. Nothing that came with it ends the run in another way, then, whichever the vehicle said first.
+    """
+    for event in events:
+        if isinstance(event, (Crashed, TakenOver)):
+            return sorted(events, key=_rank)
+    return events
+
+
+def _rank(event: Event) -> int:
+    if isinstance(event, _TOLD):
+        return 0
+    return 1 if isinstance(event, Crashed) else 2 if isinstance(event, TakenOver) else 3
+
+
+class EventHandler:
+    """Takes events over, one by one: records those that matter, and hands each to the part that owns what it changes.
+
+    Documents go to the boundary, which alone says what is to be trusted. What it accepted is recorded whole, so that an
+    audit can verify it again; what it refused is recorded by its slug, and no more often than `REFUSED_EVERY_US`.
+    """
+
+    def __init__(self, controller: MissionController, journal: Journal, boundary: ports.Boundary) -> None:
+        self._controller = controller
+        self._journal = journal
+        self._boundary = boundary
+        self._gap = False  # records are not kept, and that was recorded
+        self._refused_us: int | None = None  # when a refused document was last recorded,
+        self._unrecorded = 0  # and how many were refused since
+
+    def take(self, now: Now, event: Event) -> None:
+        """Take one event over. All are total: a late, repeated or senseless one changes nothing."""
+        controller = self._controller
+        match event:
+            case Readings():
+                controller.monitor.update(event)
+                controller.retry.news()
+            case ports.Ready():
+                controller.vehicle.is_ready(event.others)
+            case ports.AirState():
+                controller.air_reported(now, event)
+            case ports.Sent():
+                controller.dispatcher.sent(event.token, event.at_us)
+            case ports.Succeeded():
+                controller.succeeded(now, event.token)
+            case ports.Failed():
+                controller.failed(now, event)
+            case TakenOver() | Crashed():
+                self._ended(now, event)
+            case ports.LinkLost():
+                controller.link_lost(now, event)
+            case ports.LinkBack():
+                controller.link_back(now)
+            case ports.Interrupted():
+                self._journal.effect(now, "interrupted")
+                controller.stop(now)
+            case ports.EvidenceFailed():
+                self._evidence_failed(now, event.reason)
+            case ports.EvidenceKept():
+                self._evidence_kept(now)
+            case ports.Presented():
+                self._presented(now, event)
+            case _:
+                self._record(now, event)
+
+    def _record(self, now: Now, event: Event) -> None:
+        """Record what changes nothing."""
+        match event:
+            case ports.ClockStepped():
+                self._journal.effect(now, "clock-stepped", detail=f"{event.by_us:+d} us")
+            case ports.Said():
+                self._journal.effect(now, "said", detail=f"{event.severity}: {event.text[:MOST_SAID]}")
+            case ports.Noted():
+                self._journal.effect(now, "noted", detail=event.text)
+            case ports.Anchored():
+                self._journal.anchor(now, event.note)
+
+    def _ended(self, now: Now, event: TakenOver | Crashed) -> None:
+        crashed = isinstance(event, Crashed)
+        self._journal.effect(now, "crashed" if crashed else "taken-over", detail=event.how)
+        self._controller.stand_down(now, Ending.CRASHED if crashed else Ending.STOOD_DOWN)
+
+    def _evidence_failed(self, now: Now, reason: str) -> None:
+        """Recorded once a gap: the record may fail like the others, and be taken up when the sink can write again."""
+        if not self._gap:
+            self._gap = True
+            self._journal.effect(now, "gap", detail=reason)
+        self._controller.evidence_failed(now)
+
+    def _evidence_kept(self, now: Now) -> None:
+        if self._gap:
+            self._gap = False
+            self._journal.effect(now, "gap-over")
+        self._controller.evidence_kept()
+
+    # -------------------------------------------------------- documents
+
+    def _presented(self, now: Now, event: ports.Presented) -> None:
+        """Present one document, act on what became of it, and answer."""
+        receipt = self._receipt(now, event.document)
+        if receipt.accepted:
+            self._accepted(now, receipt, event.document)
+        else:
+            self._refused(now, receipt)
+        self._journal.add(Reply(event.sender, receipt.slug, receipt.text))
+
+    def _receipt(self, now: Now, document: bytes) -> Receipt:
+        if self._controller.stage is Stage.FALLING and not _recalls(document):
+            return Receipt(UNKNOWN, "falling-back", "the mission is over: the vehicle falls back")
+        receipt = decode(self._boundary.present(document, now, self._controller.queue.released))
+        return Receipt(UNKNOWN, "unanswered", receipt.text) if isinstance(receipt, Refusal) else receipt
+
+    def _accepted(self, now: Now, receipt: Receipt, document: bytes) -> None:
+        controller, journal = self._controller, self._journal
+        controller.retry.news()
+        envelope = b64encode(document).decode()
+        if receipt.kind == APPROVAL:
+            journal.effect(now, "approval", Ref(STEP, receipt.step, -1), detail=envelope)
+        elif receipt.kind == RECALL:
+            journal.effect(now, "recall", detail=envelope)
+            controller.recall(now)
+        else:
+            journal.effect(now, "replacement", Ref(STEP, receipt.step, -1), detail=envelope)
+            controller.replaced()
+
+    def _refused(self, now: Now, receipt: Receipt) -> None:
+        at_us = now.monotonic_us
+        if self._refused_us is not None and at_us - self._refused_us < REFUSED_EVERY_US:
+            self._unrecorded += 1
+            return
+        more = f" ({self._unrecorded} before it were refused too)" if self._unrecorded else ""
+        self._refused_us, self._unrecorded = at_us, 0
+        self._journal.effect(now, "document-refused", detail=f"{receipt.slug}: {receipt.text}{more}")
+
+
+def _recalls(document: bytes) -> bool:
+    try:
+        return kind_of(document) is names.RECALL
+    except Untrusted:
+        return False

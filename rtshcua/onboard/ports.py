@@ -224,14 +224,6 @@ class Append(Frozen, frozen=True):
     awaited: bool = True
 
 
-class Show(Frozen, frozen=True):
-    """Something a person watching would like to know; never needed for the flight."""
-
-    kind: str
-    text: str
-    step: int = -1
-
-
 class Announce(Frozen, frozen=True):
     """Tell any ground station, as STATUSTEXT; never needed for the flight, and the first to be left out."""
 
@@ -253,7 +245,7 @@ class End(Frozen, frozen=True):
     ending: Ending
 
 
-Action = Dispatch | Release | Append | Show | Announce | Reply | End
+Action = Dispatch | Release | Append | Announce | Reply | End
 
 
 # ---------------------------------------------------------------- the other side

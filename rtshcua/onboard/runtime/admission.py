@@ -14,7 +14,7 @@ from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Announce, Show
+from rtshcua.onboard.ports import Action, Announce
 from rtshcua.onboard.runtime.dispatcher import RemainingLatency
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.view import Decided
@@ -137,9 +137,12 @@ class Admission:
         self, now: Now, ref: Ref, of: Invocation | None, state: State, context: Context, answer: Answer, durability: int
     ) -> Iterable[Action]:
         """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
-        contract = None if of is None else of.contract
+        contract, subject = None if of is None else of.contract, self._subject(ref, of)
         clause = self._clause(contract, answer.clause)
-        yield from self._shown(now, ref, of, answer, "" if clause is None else clause.text)
+        outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
+        self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, "" if clause is None else clause.text))
+        why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
+        yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
         recorded = RecordedAnswer.of(
             answer.outcome,
             answer.reason,
@@ -152,15 +155,6 @@ class Admission:
         identity = b"" if of is None else of.invocation_id
         line = partial(self._journal.recorder.decision, now, ref, identity, state, context, recorded, durability)
         yield from self._journal.record(line, now, durability, awaited=True)
-
-    def _shown(self, now: Now, ref: Ref, of: Invocation | None, answer: Answer, clause: str) -> Iterable[Action]:
-        subject = self._subject(ref, of)
-        outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
-        self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, clause))
-        text = f"{outcome} {subject}: {reason}" + (f" (`{clause}`)" if clause else "")
-        yield Show("decision", text, ref.step)
-        why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
-        yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
 
     def _subject(self, ref: Ref, of: Invocation | None) -> str:
         if of is None:

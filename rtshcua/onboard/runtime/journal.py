@@ -5,12 +5,11 @@ from functools import partial
 
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
-from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Action, Append, Dispatch, Show
+from rtshcua.onboard.ports import Action, Append, Dispatch
 from rtshcua.wire.request import NOTHING, Ref
 
-#: makes what tells of something: its line, and what is shown of it
+#: makes what tells of something: its line, and what is announced of it
 Telling = Callable[[], Iterable[Action]]
 
 
@@ -51,13 +50,8 @@ class Journal:
         yield Append(line(), durability, awaited)
 
     def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: str = "") -> None:
-        """Record something that happened, and show it. `detail` may be the world's own text."""
+        """Record something that happened. `detail` may be the world's own text."""
         line = partial(self.recorder.effect, now, event, ref, token=token, detail=detail)
-        self._entries.append(partial(self._shown, line, now, Show(event, detail, ref.step)))
-
-    def anchor(self, now: Now, note: str) -> None:
-        """Record what a witness cosigned. It is for verifiers, and shown to nobody."""
-        line = partial(self.recorder.effect, now, ANCHORED, detail=note)
         self._entries.append(partial(self.record, line, now, WRITTEN, awaited=False))
 
     def take(self, now: Now, *, ended: bool) -> list[Action]:
@@ -74,10 +68,6 @@ class Journal:
         if not ended and self.recorder.due(now) and not any(isinstance(action, Dispatch) for action in actions):
             actions.append(self._seal(now))
         return actions
-
-    def _shown(self, line: Callable[[], bytes], now: Now, show: Show) -> Iterable[Action]:
-        yield from self.record(line, now, WRITTEN, awaited=False)
-        yield show
 
     def _seal(self, now: Now) -> Append:
         """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""

@@ -9,6 +9,7 @@ from typing import Final
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.load import Loaded
@@ -189,7 +190,7 @@ class EventHandler:
             case ports.Noted():
                 self._journal.effect(now, "noted", detail=event.text)
             case ports.Anchored():
-                self._journal.anchor(now, event.note)
+                self._journal.effect(now, ANCHORED, detail=event.note)
 
     def _ended(self, now: Now, event: TakenOver | Crashed) -> None:
         crashed = isinstance(event, Crashed)

@@ -20,7 +20,6 @@ from rtshcua.onboard.ports import (
     Interrupted,
     Noted,
     Release,
-    Show,
     Succeeded,
 )
 
@@ -83,7 +82,7 @@ class World:
     def react(self, now: Now, events: Sequence[Any]) -> Dispatch | None:
         self.events = list(events)
         self.doing = self.script.pop(0) if self.script else []
-        done = [action for action in self.doing if not isinstance(action, Append | Show)]
+        done = [action for action in self.doing if not isinstance(action, Append)]
         first = done[0] if done else None
         return first if isinstance(first, Dispatch) and not first.needs_record else None
 
@@ -95,7 +94,7 @@ class World:
 
 
 def test_actions_are_carried_out_in_their_order() -> None:
-    actions = [Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True), Append(b"2", WRITTEN), Show("k", "t"), Release()]
+    actions = [Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True), Append(b"2", WRITTEN), Release()]
     world = World(actions)
     assert world.loop.turn() is None
     assert world.did == [b"1", ("begin", 7), b"2", "release"]

@@ -103,7 +103,7 @@ def scope_of(policy: Policy) -> Scope:
     """What code may name anywhere in a policy; `policy.signals` own its slots."""
     kinds = [0] * policy.slots
     for signal in policy.signals:
-        for slot in range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1)):
+        for slot in signal.slots:
             kinds[slot] = signal.kind
     monitors, phases = len(policy.monitors), len(policy.phases)
     return Scope(tuple(kinds), len(policy.zones), len(policy.tables), policy.sets, (), monitors, phases)

@@ -9,9 +9,9 @@ import msgspec
 from rtshcua.decision.decide import Decision, decide
 from rtshcua.decision.in_force import InForce
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.model.flat.contract import Link
-from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.permit import LINK_VALID_US
@@ -87,7 +87,7 @@ class Session:
         decision = decide(invocation, state, self._policy, context, now)
         if decision.outcome is not _DENY or not self._enforced:
             self._latest = max(self._latest, step)
-        if decision.step > _AUTHORITY and not may_ask_again(invocation, decision):
+        if decision.step > _AUTHORITY and not may_ask_again(invocation.invocation, decision.outcome, decision.reason):
             self._consumed.add(step)
         return decision
 
@@ -129,11 +129,10 @@ class Session:
         return receipt
 
 
-def may_ask_again(invocation: PreparedInvocation, decision: Decision) -> bool:
-    """Whether a decision leaves the id unused: a deferred step is asked for again, and so is one that its mission holds
+def may_ask_again(invocation: Invocation, outcome: Outcome, reason: Reason) -> bool:
+    """Whether an answer leaves the id unused: a deferred step is asked for again, and so is one that its mission holds
     for, until its deadline.
     """
-    if decision.outcome is _FALLBACK:
-        holds = invocation.invocation.on_inadmissible == OnInadmissible.HOLD
-        return holds and decision.reason is not Reason.NO_SLACK
-    return decision.outcome is _DEFER
+    if outcome is _FALLBACK:
+        return invocation.on_inadmissible == OnInadmissible.HOLD and reason is not Reason.NO_SLACK
+    return outcome is _DEFER

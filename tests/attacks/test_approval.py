@@ -16,7 +16,6 @@ from reference.world import (
     POLICY_KEY,
     ROOT,
     ROOT_KEY,
-    SESSION_KEY,
     START,
     VEHICLE,
     Run,
@@ -28,7 +27,7 @@ from reference.world import (
 )
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
-from rtshcua.onboard.enforcement.load import Loaded, session
+from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey
@@ -128,9 +127,7 @@ def entitled(**fields: object) -> Loaded:
     rest = [key for key in ROOT.keys if key.duty is not Duty.APPROVAL]
     usual: dict[str, object] = {"roles": ("supervisor",), "sources": ("operator",), "vehicles": (VEHICLE,)}
     root = replace(ROOT, keys=(*rest, APPROVAL_KEY.verification(**(usual | fields))))  # type: ignore[arg-type]
-    return session(
-        OF.bundle, OF.policy, OF.invocations, root=root, vehicle=VEHICLE, mode=OF.mode, session_key=SESSION_KEY
-    )
+    return renewed(OF, root)
 
 
 @pytest.mark.parametrize(
@@ -156,9 +153,7 @@ def test_a_key_that_the_root_does_not_let_speak_for_this(fields: dict[str, objec
 
 def test_a_root_that_has_expired_meanwhile() -> None:
     root = replace(ROOT, expires_at_us=START.utc_us + START.utc_error_us)
-    of = session(
-        OF.bundle, OF.policy, OF.invocations, root=root, vehicle=VEHICLE, mode=OF.mode, session_key=SESSION_KEY
-    )
+    of = renewed(OF, root)
     assert presented(of, approval(of)).slug == "root-expired"
 
 

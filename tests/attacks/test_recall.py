@@ -14,7 +14,6 @@ from reference.world import (
     LOG_KEY,
     ROOT,
     ROOT_KEY,
-    SESSION_KEY,
     START,
     VEHICLE,
     Run,
@@ -26,7 +25,7 @@ from reference.world import (
     request_for,
 )
 from rtshcua.onboard.enforcement.executor import MISSION_OVER
-from rtshcua.onboard.enforcement.load import Loaded, session
+from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Dispatch, Ending, LinkBack, LinkLost, Presented
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey
@@ -45,9 +44,7 @@ def entitled(**fields: object) -> Loaded:
     rest = [key for key in ROOT.keys if key.duty is not Duty.APPROVAL]
     usual: dict[str, object] = {"roles": ("supervisor",), "sources": ("operator",), "vehicles": (VEHICLE,)}
     root = replace(ROOT, keys=(*rest, APPROVAL_KEY.verification(**(usual | fields))))  # type: ignore[arg-type]
-    return session(
-        OF.bundle, OF.policy, OF.invocations, root=root, vehicle=VEHICLE, mode=OF.mode, session_key=SESSION_KEY
-    )
+    return renewed(OF, root)
 
 
 @pytest.mark.parametrize("skill", ["takeoff", "goto"])

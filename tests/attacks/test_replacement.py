@@ -16,9 +16,7 @@ from reference.world import (
     POLICY_KEY,
     ROOT,
     ROOT_KEY,
-    SESSION_KEY,
     START,
-    VEHICLE,
     Run,
     allowed,
     answer_to,
@@ -31,7 +29,7 @@ from rtshcua.model.flat.contract import MotionKind, SourceKind
 from rtshcua.model.flat.mission import Mission, Plan
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
-from rtshcua.onboard.enforcement.load import Loaded, session
+from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire import cose, names
 from rtshcua.wire.binding import bind, binding_of
@@ -355,9 +353,7 @@ def test_few_are_kept_ahead() -> None:
 def test_what_was_considered_in_time_may_have_expired(keys: int | None, root: int, slug: str) -> None:
     keyring = tuple(replace(key, expires_us=keys) if key.duty is Duty.MISSION else key for key in ROOT.keys)
     trusted = replace(ROOT, keys=keyring, expires_at_us=root or ROOT.expires_at_us)
-    of = session(
-        OF.bundle, OF.policy, OF.invocations, root=trusted, vehicle=VEHICLE, mode=OF.mode, session_key=SESSION_KEY
-    )
+    of = renewed(OF, trusted)
     document = replacement(of)
     of.boundary.consider(document, START)
     later = Now(START.monotonic_us + 2 * S, START.utc_us + 2 * S, START.utc_error_us)

@@ -26,6 +26,7 @@ from reference.flat_case import (
 )
 from reference.seeds import epoch_seeds
 from reference.verifiers import agree
+from rtshcua.decision.in_force import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.ground.auditor.audit import audit
@@ -114,11 +115,10 @@ def loaded(policy: Policy = POLICY, mission: Mission = MISSION, mode: Mode = Mod
     return result
 
 
-def renewed(of: Loaded) -> Loaded:
+def renewed(of: Loaded, root: TrustRoot = ROOT) -> Loaded:
     """The same bundle in a new session, without opening it again."""
-    return session(
-        of.bundle, of.policy, of.invocations, root=ROOT, vehicle=VEHICLE, mode=of.mode, session_key=SESSION_KEY
-    )
+    in_force = InForce(of.bundle, of.policy, of.invocations, root, VEHICLE)
+    return session(in_force, of.policy, VEHICLE, of.mode, SESSION_KEY)
 
 
 class ManualClock:

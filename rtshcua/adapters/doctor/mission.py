@@ -7,7 +7,7 @@ from rtshcua.adapters.doctor.examination import Examination
 from rtshcua.adapters.doctor.finding import Finding, Verdict
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import POSITION, Signal
+from rtshcua.model.flat.signal import Signal
 from rtshcua.onboard.rehearsal import needed
 
 #: a message should come this often within the time to stale of what it carries
@@ -21,7 +21,7 @@ def signals(
     """Whether each signal of the policy is known, and comes often enough to stay so."""
     wanted = _needed(policy, mission)
     for signal in policy.signals:
-        slots = range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1))
+        slots = signal.slots
         is_needed = not wanted.isdisjoint(slots)
         if unheard.isdisjoint(slots):
             yield _signal(vehicle, signal, is_needed=is_needed, slots=slots)

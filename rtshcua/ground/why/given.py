@@ -28,7 +28,7 @@ def given(state: State, setting: str, policy: Policy) -> State | Refusal:
     if signal is None:
         return _over_time(state, name, text, policy)
     values = list(state.values)
-    slots = range(signal.slot, signal.slot + (2 if signal.kind == POSITION else 1))
+    slots = signal.slots
     if text == NOT_KNOWN:
         found: tuple[int | None, ...] | Refusal = (None,) * len(slots)
     else:

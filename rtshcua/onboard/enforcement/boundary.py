@@ -18,23 +18,16 @@ from rtshcua.model.flat.policy import Airspace, Policy, Rule
 from rtshcua.model.flat.situation import Context, Now
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.wire import response
 from rtshcua.wire.permit import AGAIN, LINK_VALID_US, Permit, seal
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import STEP, Ref, Request, decode
-from rtshcua.wire.response import (
-    NO_CLAUSE,
-    NO_TARGET,
-    Answer,
-    Status,
-    encode,
-    encode_refusal,
-    own_clauses,
-    shared_clauses,
-)
+from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, encode, encode_refusal
 
 #: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
 CLOCKS_PART_US: Final = 3_000_000
+_Numbers = dict[Clause | Rule | Airspace, int]
 _ALLOW: Final = Outcome.ALLOW  # an enumeration's attributes are slow to find
 
 
@@ -65,14 +58,7 @@ class SoftwareBoundary:
     """
 
     def __init__(
-        self,
-        policy: PreparedPolicy,
-        in_force: InForce,
-        commands: Commands,
-        vehicle: str,
-        session_key: bytes,
-        *,
-        enforced: bool,
+        self, policy: PreparedPolicy, in_force: InForce, commands: Commands, vehicle: str, key: bytes, *, enforced: bool
     ) -> None:
         self._policy = policy
         self._in_force = in_force
@@ -80,7 +66,7 @@ class SoftwareBoundary:
         self._commands = commands
         self._vehicle = vehicle
         self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
-        self._issuer = PermitIssuer(session_key)
+        self._issuer = PermitIssuer(key)
         self._enforced = enforced
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
@@ -196,10 +182,8 @@ class SoftwareBoundary:
         raise LookupError("no degrade rule has this target")
 
 
-def _numbers(
-    policy: Policy, invocations: tuple[PreparedInvocation, ...]
-) -> tuple[dict[Clause | Rule | Airspace, int], ...]:
+def _numbers(policy: Policy, invocations: tuple[PreparedInvocation, ...]) -> tuple[_Numbers, ...]:
     """By step, the numbers of the clauses in a response; a rule has its index in the policy."""
-    shared: dict[Clause | Rule | Airspace, int] = {clause: at for at, clause in enumerate(shared_clauses(policy))}
-    own = (own_clauses(prepared.invocation.contract) for prepared in invocations)
+    shared: _Numbers = {clause: at for at, clause in enumerate(response.shared_clauses(policy))}
+    own = (response.own_clauses(prepared.invocation.contract) for prepared in invocations)
     return tuple(shared | {clause: at for at, clause in enumerate(clauses, len(shared))} for clauses in own)

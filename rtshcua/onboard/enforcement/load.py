@@ -92,22 +92,12 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
-    return session(opened, policy, invocations, root=root, vehicle=vehicle, mode=mode, session_key=session_key)
+    return session(InForce(opened, policy, invocations, root, vehicle), policy, vehicle, mode, session_key)
 
 
-def session(
-    bundle: Bundle,
-    policy: PreparedPolicy,
-    invocations: tuple[PreparedInvocation, ...],
-    *,
-    root: TrustRoot,
-    vehicle: str,
-    mode: Mode,
-    session_key: bytes,
-) -> Loaded:
-    """A verified and prepared bundle in force, nothing of it decided yet."""
-    in_force = InForce(bundle, policy, invocations, root, vehicle)
-    commands = Commands(bundle.policy, bundle.mission)
+def session(in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes) -> Loaded:
+    """A session of a verified and prepared bundle, nothing of it decided yet."""
+    commands = Commands(policy.policy, in_force.bundle.mission)
     enforced = mode is not Mode.NONE
     boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, enforced=enforced)
     return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode)

@@ -242,7 +242,7 @@ class MissionController:
     def air_reported(self, now: Now, event: AirState) -> None:
         """The vehicle says whether it is armed and in the air."""
         self.link.air_reported()
-        active, ours = self.dispatcher.active, self.dispatcher.dispatched
+        ours = self.dispatcher.dispatched
         came_down = self.vehicle.report(armed=event.armed, airborne=event.airborne, ours=ours)
         if self.stage is _DECIDING:
             if ours and self.vehicle.at_rest:
@@ -250,9 +250,7 @@ class MissionController:
             elif not ours and event.airborne:  # a flight that this run did not begin is the pilot's
                 self._journal.effect(now, "taken-over", detail="took off")
                 self.stand_down(now, Ending.STOOD_DOWN)
-        elif came_down and (
-            self.stage is _FALLING or (self.stage is _RUNNING and active is not None and not active.homeward)
-        ):
+        elif came_down and (self.stage is _FALLING or (self.stage is _RUNNING and not self.dispatcher.homeward)):
             self.down(now)
 
     def succeeded(self, now: Now, token: int) -> None:
@@ -325,11 +323,8 @@ class MissionController:
         self._blame(cause)
         if not self.aloft:
             self._end(now, cause)
-        elif self.stage is _RUNNING:
-            if not self.dispatcher.homeward:
-                self.fall_back(kind, cause)
-        elif self.stage is not _FALLING:
-            self.fall_back(CONTINGENCY_LINK, cause)
+        elif self.stage is not _FALLING and not self.dispatcher.homeward:
+            self.fall_back(kind if self.stage is _RUNNING else CONTINGENCY_LINK, cause)
 
     def stop(self, now: Now) -> None:
         """Somebody asked this program to stop, and waits for it."""

@@ -4,11 +4,12 @@ from collections.abc import Iterable
 
 from rtshcua.decision.holding import holding
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.session import may_ask_again
 from rtshcua.decision.truth import FALSE, Truth
 from rtshcua.decision.watch import watch
-from rtshcua.model.flat.mission import Invocation, OnInadmissible
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.model.outcome import Reason
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.wire.response import Answer
 
@@ -100,9 +101,8 @@ class RetryPolicy:
         """
         if answer.reason is Reason.AWAITING_APPROVAL:
             return True
-        holds = invocation.on_inadmissible == OnInadmissible.HOLD and answer.reason is not Reason.NO_SLACK
         in_time = answer.rule_step > _TIMING or now_us < released_us + invocation.contract.deadline_us
-        return in_time and (answer.outcome is Outcome.DEFER or holds)
+        return in_time and may_ask_again(invocation, answer.outcome, answer.reason)
 
     def may_hold(self) -> bool:
         """Whether a hold is to be tried while the step is waited for: once, for a hold goes on."""

@@ -34,7 +34,7 @@ _WAITING, _DECIDING, _RUNNING, _FALLING, _ENDED = Stage
 
 
 class MissionController:
-    """Owns where a run stands, and the parts that own the rest: see the package's docstring.
+    """Owns where a run stands, and the parts that own the rest (the table in docs/runtime.md).
 
     `stage` and `ending` are for reading; `ending` is None until the run ended.
     """

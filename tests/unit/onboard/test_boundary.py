@@ -59,7 +59,7 @@ def test_the_contingency_may_be_asked_for_before_any_step() -> None:
     assert allowed(of, 2, -1, 2)
 
 
-def test_a_link_of_an_earlier_step_that_was_minted_in_time_is_lapsed_by_the_next() -> None:
+def test_a_permit_for_a_link_of_an_earlier_step_lapses_with_the_next() -> None:
     of = loaded()
     allowed(of)
     link = allowed(of, 1, 0, 0)

@@ -40,11 +40,11 @@ def test_mode_none_flies_the_own_simulator_only() -> None:
     assert isinstance(try_load(sealed(), Mode.NONE, own_simulator=True), Loaded)
 
 
-def test_the_wrong_vehicle() -> None:
+def test_a_bundle_for_another_vehicle_is_refused() -> None:
     assert refusal(sealed(), vehicle="quad-08").slug == "wrong-vehicle"
 
 
-def test_a_key_that_expired() -> None:
+def test_an_expired_key_is_refused() -> None:
     expiring = replace(POLICY_KEY.verification(vehicles=(VEHICLE,)), expires_us=START.utc_us)
     root = replace(ROOT, keys=(expiring, *ROOT.keys[1:]))
     assert refusal(sealed(), root=root).slug == "key-expired"
@@ -59,13 +59,15 @@ def test_a_key_that_expired() -> None:
         ((), (), "wrong-source"),
     ],
 )
-def test_a_mission_key_that_may_not_speak_for_this(roles: tuple[str, ...], sources: tuple[str, ...], slug: str) -> None:
+def test_a_mission_key_without_the_role_or_source_is_refused(
+    roles: tuple[str, ...], sources: tuple[str, ...], slug: str
+) -> None:
     key = MISSION_KEY.verification(roles=roles, sources=sources, vehicles=(VEHICLE,))
     root = replace(ROOT, keys=(ROOT.keys[0], key, ROOT.keys[2]))
     assert refusal(sealed(), root=root).slug == slug
 
 
-def test_a_key_that_nobody_knows() -> None:
+def test_an_unknown_key_is_refused() -> None:
     stranger = SigningKey.from_seed(bytes(32), duty=Duty.MISSION)
     payload = bundle.policy_payload(POLICY)
     mission = bundle.mission_payload(binding.bind(MISSION, bundle.policy_digest(payload)))
@@ -73,7 +75,7 @@ def test_a_key_that_nobody_knows() -> None:
 
 
 @pytest.mark.parametrize("at", [0, 30, 200, 2_000, -100, -1])
-def test_a_changed_byte(at: int) -> None:
+def test_a_bundle_with_a_changed_byte_is_refused(at: int) -> None:
     data = bytearray(sealed())
     data[at] ^= 1
     assert refusal(bytes(data)).slug in {
@@ -86,11 +88,11 @@ def test_a_changed_byte(at: int) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00", b"\xff" * 100, sealed()[:-1], sealed() + b"\0"])
-def test_no_bundle_at_all(data: bytes) -> None:
+def test_bytes_that_are_no_bundle_are_malformed(data: bytes) -> None:
     assert refusal(data).slug == "malformed"
 
 
-def test_what_does_not_fit_a_request() -> None:
+def test_a_policy_whose_requests_do_not_fit_the_wire_is_refused() -> None:
     slots = POLICY.slots
     more = tuple(replace(SIGNALS[BATTERY], name=f"s{n}", slot=n) for n in range(slots, MAX_SLOTS + 1))
     wide = replace(POLICY, signals=(*POLICY.signals, *more), slots=MAX_SLOTS + 1)
@@ -101,7 +103,7 @@ def test_what_does_not_fit_a_request() -> None:
     assert "staleness" in refusal(sealed(lasting)).text
 
 
-def test_what_makes_no_sense() -> None:
+def test_a_signed_bundle_that_makes_no_sense_is_refused() -> None:
     assert "no contingency" in refusal(sealed(replace(POLICY, contingency=()))).text
     assert refusal(sealed(mission=replace(MISSION, invocations=()))).slug == "malformed"
     assert refusal(sealed(replace(POLICY, slots=POLICY.slots + 1))).slug == "malformed"
@@ -114,7 +116,7 @@ def test_a_session_key_of_another_length_is_a_fault() -> None:
         refusal(sealed(), session_key=b"short")
 
 
-def test_now_is_what_it_is_loaded_at() -> None:
+def test_a_bundle_may_be_loaded_before_it_was_issued() -> None:
     early = Now(0, 0, 0)
     assert isinstance(
         load(

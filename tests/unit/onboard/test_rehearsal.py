@@ -28,11 +28,11 @@ def told(of_state: State) -> list[tuple[str, str, bool]]:
     return [(each.decision.outcome.name.lower(), each.decision.reason.value, each.hopeful) for each in found]
 
 
-def test_a_good_day() -> None:
+def test_every_step_of_a_flyable_mission_is_admitted() -> None:
     assert told(state()) == [("allow", "admitted", True)] * 4
 
 
-def test_what_would_have_passed_is_said() -> None:
+def test_a_refused_step_names_the_nearest_value_that_would_pass() -> None:
     found = rehearse(OF, state(**{f"s{BATTERY}": 3_000}), START)
     first = found[0]
     assert first.decision.outcome is Outcome.FALLBACK
@@ -53,13 +53,13 @@ def test_a_step_that_asks_somebody_waits() -> None:
     assert (asked.decision.reason, asked.hopeful) == (Reason.AWAITING_APPROVAL, True)
 
 
-def test_a_denied_step_is_no_hope() -> None:
+def test_a_denied_step_is_not_hopeful() -> None:
     early = replace(START, utc_us=MISSION.issued_at_us - 60 * S)
     assert {each.decision.reason for each in rehearse(OF, state(), early)} == {Reason.ISSUED_IN_FUTURE}
     assert not any(each.hopeful for each in rehearse(OF, state(), early))
 
 
-def test_it_uses_nothing_up() -> None:
+def test_a_rehearsal_uses_nothing_up() -> None:
     of = loaded()
     rehearse(of, state(), START)
     assert allowed(of)

@@ -46,13 +46,13 @@ def test_a_rule_that_may_stop_a_step_is_needed_and_a_permit_where_there_is_no_ot
     assert not of(TAKEOFF, replace(POLICY, rules=(*POLICY.rules, permit)))
 
 
-def test_the_steps_that_would_wait_in_vain() -> None:
+def test_steps_that_need_a_silent_signal_are_stranded() -> None:
     mission = case.mission(case.short_steps())
     assert [each.skill for each in stranded(POLICY, mission, SILENT)] == [GOTO]
     assert stranded(POLICY, mission, frozenset()) == ()
 
 
-def test_a_rehearsal_has_no_hope_for_them() -> None:
+def test_a_rehearsal_has_no_hope_for_stranded_steps() -> None:
     values = FakeVehicle().values | {LINK: None}
     state = State(tuple(values[slot] for slot in range(len(values))), (10_000,) * len(values))
     told = [[each.hopeful for each in rehearse(loaded(), state, START, slots)] for slots in (frozenset(), SILENT)]

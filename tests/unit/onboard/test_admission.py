@@ -1,4 +1,4 @@
-"""What a deferred step waits for, how long, and `L_rem`: what validation and dispatch take."""
+"""Which step's turn it is, what a deferred one waits for and how long, and `L_rem`: what admission takes."""
 
 import json
 from collections import deque
@@ -30,7 +30,7 @@ def naive(times: list[int]) -> int:
 
 
 @given(TIMES)
-def test_it_is_a_high_quantile_of_the_latest_and_conservative_until_there_are_some(times: list[int]) -> None:
+def test_the_remaining_latency_is_a_high_quantile_of_the_latest_measurements(times: list[int]) -> None:
     remaining = RemainingLatency()
     for each in times:
         remaining.measured(each)
@@ -38,7 +38,7 @@ def test_it_is_a_high_quantile_of_the_latest_and_conservative_until_there_are_so
 
 
 @given(TIMES, st.integers(0, 1 << 40))
-def test_a_slow_one_is_never_forgotten_at_once(times: list[int], slow: int) -> None:
+def test_the_remaining_latency_covers_99_of_100_measurements(times: list[int], slow: int) -> None:
     remaining = RemainingLatency()
     for each in [*times, slow]:
         remaining.measured(each)
@@ -47,7 +47,7 @@ def test_a_slow_one_is_never_forgotten_at_once(times: list[int], slow: int) -> N
     assert beyond * 100 <= len(window)
 
 
-def test_it_counts_until_the_first_frame_went_out() -> None:
+def test_latency_is_measured_until_the_first_frame_went_out() -> None:
     """From the decision to `Sent`: the record that the command waits for is part of it."""
     run = Run(loaded())
     token = run.vehicle.commands[-1].token
@@ -80,7 +80,9 @@ BEFORE, AFTER = 1, 10 * S
         (Reason.STATE_VIOLATED, Outcome.FALLBACK, 6, False, False),
     ],
 )
-def test_what_is_waited_for(reason: Reason, outcome: Outcome, step: int, before: bool, after: bool) -> None:
+def test_an_answer_that_may_change_is_waited_for_until_the_deadline(
+    reason: Reason, outcome: Outcome, step: int, before: bool, after: bool
+) -> None:
     assert waits(reason, outcome, step, BEFORE) is before
     assert waits(reason, outcome, step, AFTER) is after
 
@@ -117,7 +119,7 @@ def test_a_deadline_runs_from_the_approval() -> None:
     assert_audited(run)
 
 
-def test_and_it_ends() -> None:
+def test_a_deadline_that_an_approval_moved_ends_the_wait() -> None:
     run = waiting()
     run.vehicle.values[OBSTACLE] = None
     run.tick()
@@ -159,3 +161,46 @@ def test_the_queue_knows_what_was_released() -> None:
         assert queue.released == number
     queue.replace(replace(MISSION, invocations=MISSION.invocations + MISSION.invocations))
     assert queue.current is MISSION.invocations[0]
+
+
+def test_the_queue_releases_step_by_step_and_phase_by_phase() -> None:
+    queue = InvocationQueue(MISSION)
+    assert (queue.released_us, queue.phase) == (None, 0)
+    queue.release(10)
+    queue.release(20)
+    assert queue.released_us == 10
+    seen = []
+    while (current := queue.current) is not None:
+        seen.append((current.step, queue.phase))
+        queue.advance(30 + current.step)
+    assert seen == [(0, 0), (1, 1), (2, 1), (3, 2)]
+    assert (queue.released_us, queue.phase) == (33, 2)
+
+
+def test_the_remaining_latency_is_conservative_until_measured() -> None:
+    remaining = RemainingLatency()
+    assert remaining.us == CONSERVATIVE_US
+    for _ in range(7):
+        remaining.measured(10)
+    assert remaining.us == CONSERVATIVE_US
+    remaining.measured(-5)
+    assert remaining.us == 10
+    remaining.measured(90_000)
+    assert remaining.us == 90_000
+
+
+def test_a_first_slow_dispatch_counts_at_once() -> None:
+    remaining = RemainingLatency()
+    remaining.measured(2 * CONSERVATIVE_US)
+    assert remaining.us == 2 * CONSERVATIVE_US
+
+
+@given(st.lists(st.integers(0, 10**6), min_size=8, max_size=3 * WINDOW))
+def test_the_remaining_latency_was_measured_and_covers_99_of_100(took: list[int]) -> None:
+    remaining = RemainingLatency()
+    for each in took:
+        remaining.measured(each)
+    latest = took[-WINDOW:]
+    covered = sum(each <= remaining.us for each in latest)
+    assert remaining.us in latest
+    assert covered * 100 >= 99 * len(latest)

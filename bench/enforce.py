@@ -1,6 +1,6 @@
 """The dispatch-time path, from a state in hand to a command that may be sent, against the published figure for it.
 
-One admission: encode the request, `enforce` in mode `software` (decide, mint the permit), read the answer, make the
+One admission: encode the request, `enforce` in mode `software` (decide, issue the permit), read the answer, make the
 evidence line and append it to a file, check the permit. Signatures were verified at load. The machine is noisy, so the
 percentiles are those of a block of admissions, and the quietest block counts; the median block stands beside it.
 Exits with 1 when the 95th percentile is above the limit.

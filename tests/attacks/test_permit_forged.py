@@ -1,4 +1,4 @@
-"""Permits that the boundary did not mint, or that were changed, send nothing."""
+"""Permits that the boundary did not issue, or that were changed, send nothing."""
 
 from hypothesis import given
 from hypothesis import strategies as st

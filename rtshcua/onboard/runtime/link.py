@@ -58,7 +58,7 @@ class LinkSupervision:
         self._lost_us = 0  # the link was lost last
         self._first_back_us: int | None = None  # the link was back first in this silence,
         self._back_us = 0  # and last
-        self._until_us = 0  # fresh state is waited for
+        self._until_us = 0  # fresh state is awaited until then, at the latest
         self._standing_us: int | None = None  # since then nothing is judged
         self._awaited: frozenset[int] = frozenset()
         self._awaits_air = False

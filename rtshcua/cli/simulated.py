@@ -7,7 +7,7 @@ import typer
 
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.config import Kind
-from rtshcua.simulation.fault_text import KINDS, parse_fault
+from rtshcua.simulation.faults import KINDS, parse_fault
 from rtshcua.virtual.fitting import fitting
 
 _WIND = re.compile(r"\d+(\.\d+)?,\d+(\.\d+)?(,\d+(\.\d+)?)?", re.ASCII)

@@ -1,37 +1,34 @@
 """The autopilot: vehicle, battery, sensors, air and settings in one place, and what a flavour makes of them."""
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from random import Random
+from types import MappingProxyType
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink.layouts import TEXT_OCTETS
-from rtshcua.simulation.activity import Event
 from rtshcua.simulation.battery import Battery
-from rtshcua.simulation.boot import BootPlan
 from rtshcua.simulation.command import Command
 from rtshcua.simulation.config import Boot, SimulationConfig
 from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
-from rtshcua.simulation.fence_watch import Breach, FenceRules, FenceWatch
+from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
-from rtshcua.simulation.mission import Mission
-from rtshcua.simulation.mission_items import MissionRules
+from rtshcua.simulation.mission import Mission, MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
 from rtshcua.simulation.parameters import Parameter, Parameters
 from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plan import MISSION, Item, Plans
-from rtshcua.simulation.reports import Reports
-from rtshcua.simulation.sensors import Sensors
+from rtshcua.simulation.plans import MISSION, Item, Plans
+from rtshcua.simulation.sensors import FAST_S, BootPlan, Sensors
 from rtshcua.simulation.signing import VehicleSigning
-from rtshcua.simulation.streams import Streams
-from rtshcua.simulation.surroundings import Surroundings
+from rtshcua.simulation.streams import Reports, Streams
+from rtshcua.simulation.surroundings import Air, Surroundings
 from rtshcua.simulation.transfer import Transfer, TransferRules
-from rtshcua.simulation.vehicle import Vehicle
-from rtshcua.simulation.wind import Air
+from rtshcua.simulation.vehicle import Event, Vehicle
 
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
@@ -47,31 +44,25 @@ Builder = Callable[["Autopilot"], Message | None]
 """A message with what the vehicle knows now; None if it knows nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Flavour:
+class Flavour(ABC):
     """What PX4 and ArduCopter do differently."""
 
     autopilot: int
     """HEARTBEAT.autopilot (MAV_AUTOPILOT)."""
     modes: ModeTable
-    handling: Callable[[SimulationConfig], Handling]
     commands: Mapping[int, Handler]
-    on_set_mode: Callable[["Autopilot", int], tuple[int, ...]]
-    """Obeys a SET_MODE message with this `custom_mode`."""
-    on_position_target: Callable[["Autopilot", Message], None]
-    """Obeys SET_POSITION_TARGET_GLOBAL_INT, or does not; there is no answer."""
-    on_data_stream: Callable[["Autopilot", int, int], None]
-    """Obeys REQUEST_DATA_STREAM: (stream, rate in Hz, 0 to stop)."""
     streams: Mapping[int, int]
     """The streams that run from boot, and their intervals in microseconds."""
     builders: Mapping[int, Builder]
     """Every message that can be streamed or requested."""
-    constant: frozenset[int]
+    constant: frozenset[int] = frozenset()
     """The messages whose interval is refused to be changed."""
-    only_streamed: frozenset[int]
+    only_streamed: frozenset[int] = frozenset()
     """The messages that REQUEST_MESSAGE is refused for."""
-    least_us: Mapping[int, int]
+    least_us: Mapping[int, int] = MappingProxyType({})
     """The shortest interval that is delivered, whatever is asked for, where there is one."""
+    handling: Handling
+    """How it flies, unless the configuration or a parameter says otherwise."""
     parameters: tuple[Parameter, ...]
     bytewise: bool
     """Whether integer parameters travel as their bytes."""
@@ -79,8 +70,6 @@ class Flavour:
     """`{speed}` is the one of touching down; `{amsl}` and `{up}` are the height of a return, above the sea and home."""
     boot: BootPlan
     failsafes: FailsafeRules
-    arming: Callable[["Autopilot"], tuple[str, ...]]
-    """What stands against arming, the mode apart."""
     fix: int
     """GPS_RAW_INT.fix_type of a good fix."""
     coast_s: float
@@ -95,25 +84,57 @@ class Flavour:
     """Whether it says again and again, while disarmed, why it would not arm."""
     transfer: TransferRules
     missions: MissionRules
-    home_item: Callable[[Home], Item] | None
-    """What slot 0 of every mission is, where the flavour keeps it for home."""
-    on_setup_signing: Callable[["Autopilot", Message], None]
-    """Obeys SETUP_SIGNING, or refuses it."""
-    insists: Callable[["Autopilot"], bool]
-    """Whether, with a key, frames without a signature are refused."""
-    on_plan: Callable[["Autopilot", int], None]
-    """Tells of a plan of this kind (MAV_MISSION_TYPE) that was stored."""
     fence: FenceRules
-    on_breach: Callable[["Autopilot", Breach], None]
-    """Does what the fence's action asks for when a breach begins."""
-    on_mode_in_breach: Callable[["Autopilot"], None]
-    on_breach_cleared: Callable[["Autopilot"], None]
-    on_sticks: Callable[["Autopilot", int], None]
-    """Obeys sticks that steer it east for so many microseconds, or does not mind."""
-    target_timeout_us: int | None
+    target_timeout_us: int | None = None
     """In GUIDED, how long one position target is good for; then LOITER."""
     tells_fence: bool
     """Whether SYS_STATUS has the geofence: always present, enabled if in force, healthy unless breached (recorded)."""
+
+    @abstractmethod
+    def arming(self, a: "Autopilot") -> tuple[str, ...]:
+        """What stands against arming, the mode apart; nothing if it would arm."""
+
+    @abstractmethod
+    def insists(self, a: "Autopilot") -> bool:
+        """Whether, with a key, frames without a signature are refused."""
+
+    @abstractmethod
+    def on_set_mode(self, a: "Autopilot", number: int) -> tuple[int, ...]:
+        """Obeys a SET_MODE message with this `custom_mode`; the results to acknowledge with."""
+
+    @abstractmethod
+    def on_position_target(self, a: "Autopilot", message: Message) -> None:
+        """Obeys SET_POSITION_TARGET_GLOBAL_INT, or does not; there is no answer."""
+
+    def on_setup_signing(self, a: "Autopilot", message: Message) -> None:
+        """Obeys SETUP_SIGNING, or refuses it."""
+        a.signing.set_up(message, a.now_us)
+
+    @abstractmethod
+    def on_breach(self, a: "Autopilot", breach: Breach) -> None:
+        """Does what the fence's action asks for when a breach begins."""
+
+    @abstractmethod
+    def on_sticks(self, a: "Autopilot", for_us: int) -> None:
+        """Obeys sticks that steer it east for so many microseconds, or does not mind."""
+
+    # What follows is nothing unless a flavour does something then.
+
+    def home_item(self, home: Home) -> Item | None:
+        """What slot 0 of every mission is, where the flavour keeps it for home."""
+        return None
+
+    def on_data_stream(self, a: "Autopilot", stream: int, rate_hz: int) -> None:  # noqa: B027
+        """Obeys REQUEST_DATA_STREAM: (stream, rate in Hz, 0 to stop)."""
+
+    def on_plan(self, a: "Autopilot", kind: int) -> None:  # noqa: B027
+        """Tells of a plan of this kind (MAV_MISSION_TYPE) that was stored."""
+
+    def on_mode_in_breach(self, a: "Autopilot") -> None:  # noqa: B027
+        """Another mode while the fence is breached."""
+
+    def on_breach_cleared(self, a: "Autopilot") -> None:  # noqa: B027
+        """The vehicle is inside again."""
 
 
 class Autopilot:
@@ -133,12 +154,16 @@ class Autopilot:
         self.air = Air(config.wind, Random(f"{config.seed} wind"))
         self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
         fast = config.boot is Boot.FAST
-        pace = flavour.boot.pace if fast else 1.0
+        pace = flavour.boot.all_s / FAST_S if fast else 1.0
         self.sensors = Sensors(Random(f"{config.seed} sensors"), config.noise, flavour.coast_s, flavour.boot, pace)
         self.surroundings = Surroundings()
         self._boot_texts = deque(() if fast else flavour.boot.texts)
-        self.vehicle = Vehicle(flavour.handling(config), flavour.modes.start)
-        self.parameters = Parameters(flavour.parameters, self.vehicle.handling, flavour.bytewise)
+        handling = replace(
+            flavour.handling, cruise=config.cruise_mm_s / 1000, max_speed=config.max_speed_mm_s / 1000,
+            return_up=config.return_mm / 1000,
+        )  # fmt: skip
+        self.vehicle = Vehicle(handling, flavour.modes.start)
+        self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)
         for name in SYSTEM_PARAMETERS:
             self.parameters.assign(name, config.system)
         if config.signing_key is not None:
@@ -150,10 +175,13 @@ class Autopilot:
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()})
         self.signing = VehicleSigning(config.signing_key, config.usb, config.utc_us, config.speed)
         self.plans = Plans()
-        if flavour.home_item is not None:
-            self.plans.replace(MISSION, (flavour.home_item(self.home),))
+        self._home_item = flavour.home_item(self.home)
+        if self._home_item is not None:
+            self.plans.replace(MISSION, (self._home_item,))
         self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value)
-        self.mission = Mission(flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self)
+        self.mission = Mission(
+            flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self.send, self.say
+        )
         self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
         self.plans.listeners.append(partial(flavour.on_plan, self))
         self._mode_in_breach = self.vehicle.mode
@@ -227,12 +255,12 @@ class Autopilot:
     def _stored(self, kind: int) -> tuple[Item, ...]:
         """What a download shows."""
         items = self.plans.items(kind)
-        if kind == MISSION and items and self.flavour.home_item is not None:
-            return (self.flavour.home_item(self.home), *items[1:])
+        if kind == MISSION and items and self._home_item is not None:
+            return (self._home_item, *items[1:])
         return items
 
     def _may_clear(self, kind: int) -> bool:
-        return kind != MISSION or self.flavour.home_item is None or not self.mission.running
+        return kind != MISSION or self._home_item is None or not self.mission.running
 
     def _keep_targets(self) -> None:
         """Leaves GUIDED when position targets stop coming."""
@@ -267,18 +295,6 @@ class Autopilot:
         return self.now_us // 1000
 
     # ------------------------------------------------------------------------------------------- speaking
-
-    def on_reached(self, number: int) -> None:
-        """An item of the mission is done: MISSION_ITEM_REACHED."""
-        self.send(mavlink.MAVLink_mission_item_reached_message(number))
-
-    def on_moved_on(self) -> None:
-        """Another item of the mission is the current one: MISSION_CURRENT, without waiting for the stream."""
-        self.send(self.flavour.builders[mavlink.MAVLINK_MSG_ID_MISSION_CURRENT](self))
-
-    def on_begun(self, text: str) -> None:
-        """An item of the mission begins."""
-        self.say(mavlink.MAV_SEVERITY_INFO, text)
 
     def send(self, message: Message | None) -> None:
         """Queues a message for the link."""

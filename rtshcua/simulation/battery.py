@@ -62,10 +62,6 @@ class Battery:
         """Finds that no more than `level` is left."""
         self.level = min(self.level, level)
 
-    def measure(self, millivolts: int) -> None:
-        """From now on this voltage is measured, whatever the level."""
-        self.forced_mv = millivolts
-
     @property
     def percent(self) -> int:
         """`battery_remaining` of BATTERY_STATUS: rounded down, so that it never promises what is not there."""

@@ -6,7 +6,7 @@ from enum import StrEnum
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.place import Home
-from rtshcua.simulation.wind import Wind
+from rtshcua.simulation.surroundings import Wind
 
 HOME = Home(473_977_400, 85_455_900, 488_000)
 """Where PX4's simulations start: an airfield in Zurich."""

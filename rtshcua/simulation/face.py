@@ -1,15 +1,20 @@
-"""The vehicle's MAVLink face: frames in, frames out."""
+"""The vehicle's MAVLink face: frames in, frames out.
 
+What is not there (files, logs, parts of plans) is refused at once: QGroundControl asks for all of it when it connects,
+and waits seconds for each answer that does not come.
+"""
+
+import struct
 from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec, Message, Received
-from rtshcua.simulation import plan_face, questions
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message
-from rtshcua.simulation.command_rules import UNSUPPORTED
+from rtshcua.simulation.commands import UNSUPPORTED
 from rtshcua.simulation.telemetry import radio_status
+from rtshcua.simulation.transfer import Peer, Transfer
 
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 FENCE_PREFIXES = ("FENCE_", "GF_")
@@ -136,6 +141,42 @@ def _ping(a: Autopilot, received: Received) -> None:
         a.send(mavlink.MAVLink_ping_message(m.time_usec, m.seq, received.system, received.component))
 
 
+def _transfers(step: Callable[[Transfer, Peer, Message, int], None]) -> Callable[[Autopilot, Received], None]:
+    """A message of the mission protocol, handed to the vehicle's end of it."""
+    return lambda a, received: step(a.transfer, (received.system, received.component), received.message, a.now_us)
+
+
+def _set_current(a: Autopilot, received: Received) -> None:
+    """MISSION_SET_CURRENT: answered with MISSION_CURRENT, or with a text."""
+    if not a.mission.select(received.message.seq):
+        a.say(mavlink.MAV_SEVERITY_CRITICAL, "WPM: WP CURR CMD: Not in list")
+
+
+def _partial(a: Autopilot, received: Received) -> None:
+    """Parts of a plan are not read or written: refused at once."""
+    result, kind = mavlink.MAV_MISSION_UNSUPPORTED, received.message.mission_type
+    a.send(mavlink.MAVLink_mission_ack_message(received.system, received.component, result, kind))
+
+
+_NAK, _UNKNOWN_COMMAND = 129, 7
+"""MAV_FTP_OPCODE and MAV_FTP_ERR."""
+_FTP_SIZE = 251
+
+
+def _file(a: Autopilot, received: Received) -> None:
+    """FILE_TRANSFER_PROTOCOL: there are no files."""
+    m = received.message
+    sequence, session, opcode = struct.unpack_from("<HBB", bytes(m.payload))
+    head = struct.pack("<HBBBBBBIB", (sequence + 1) % 65_536, session, _NAK, 1, opcode, 0, 0, 0, _UNKNOWN_COMMAND)
+    payload = list(head.ljust(_FTP_SIZE, b"\0"))
+    a.send(mavlink.MAVLink_file_transfer_protocol_message(0, received.system, received.component, payload))
+
+
+def _logs(a: Autopilot, _: Received) -> None:
+    """LOG_REQUEST_LIST: there are no logs."""
+    a.send(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+
+
 _HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
     "HEARTBEAT": _heartbeat,
     "COMMAND_LONG": _command,
@@ -149,6 +190,17 @@ _HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
     "SETUP_SIGNING": _setup_signing,
     "TIMESYNC": _timesync,
     "PING": _ping,
-    **plan_face.HANDLERS,
-    **questions.HANDLERS,
+    "MISSION_COUNT": _transfers(Transfer.count),
+    "MISSION_ITEM": _transfers(Transfer.item),
+    "MISSION_ITEM_INT": _transfers(Transfer.item),
+    "MISSION_REQUEST_LIST": _transfers(Transfer.request_list),
+    "MISSION_REQUEST": _transfers(Transfer.request),
+    "MISSION_REQUEST_INT": _transfers(Transfer.request),
+    "MISSION_ACK": _transfers(Transfer.acknowledged),
+    "MISSION_CLEAR_ALL": _transfers(Transfer.clear_all),
+    "MISSION_SET_CURRENT": _set_current,
+    "MISSION_REQUEST_PARTIAL_LIST": _partial,
+    "MISSION_WRITE_PARTIAL_LIST": _partial,
+    "FILE_TRANSFER_PROTOCOL": _file,
+    "LOG_REQUEST_LIST": _logs,
 }

@@ -27,18 +27,18 @@ class FailsafeRules:
 
     position: tuple[Text, ...]
     """Said when it lands because it does not know where it is."""
-    position_after_s: float
-    """How long after the estimator gave up."""
-    land_pause_s: float
-    """How long it stays up after it decided to land."""
-    position_back: Text | None
     level: Text
     """Said when it lands because the battery is empty."""
-    low_voltage: str | None
+    position_after_s: float = 0.0
+    """How long after the estimator gave up."""
+    land_pause_s: float = 0.0
+    """How long it stays up after it decided to land."""
+    position_back: Text | None = None
+    low_voltage: str | None = None
     """The parameter with the voltage below which the battery is found to be low."""
-    low_action: str | None
+    low_action: str | None = None
     """The parameter that says what happens then: 0 nothing, 1 land, 2 return."""
-    low_text: str
+    low_text: str = ""
 
 
 class Failsafes:

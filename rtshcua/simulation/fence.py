@@ -1,24 +1,16 @@
-"""The geofence as the vehicle keeps it: polygons and circles on the plane around home, and a ceiling. Metres."""
+"""The geofence as the vehicle keeps it, and watches it in flight. Metres.
 
-from collections.abc import Sequence
+Polygons and circles on the plane around home, and a ceiling. A flavour says when there is a fence, and what a breach
+brings.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import hypot, inf
 from typing import Self
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
 from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plan import Item
-
-INCLUDED = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
-EXCLUDED = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
-ROUND_INCLUDED = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
-ROUND_EXCLUDED = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
-RETURN_POINT = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
-POLYGONS = (INCLUDED, EXCLUDED)
-CIRCLES = (ROUND_INCLUDED, ROUND_EXCLUDED)
-COMMANDS = frozenset({*POLYGONS, *CIRCLES, RETURN_POINT})
-_FEWEST_VERTICES = 3
+from rtshcua.simulation.plans import EXCLUDED, FENCE, INCLUDED, POLYGONS, ROUND_EXCLUDED, ROUND_INCLUDED, Item, Plans
 
 Place = tuple[float, float]
 """Metres north and east of home."""
@@ -117,29 +109,6 @@ class Area:
         return cls(tuple(included), tuple(excluded), every)
 
 
-def problem(items: Sequence[Item]) -> bool:
-    """Whether the items draw no fence: vertices too few or of mixed count, a circle without a radius."""
-    at = 0
-    while at < len(items):
-        item = items[at]
-        if item.command in CIRCLES:
-            if not 0 < item.p1 < inf:
-                return True
-            at += 1
-        elif item.command in POLYGONS:
-            if not _FEWEST_VERTICES <= item.p1 < inf:
-                return True
-            vertices = items[at : at + int(item.p1)]
-            if len(vertices) < int(item.p1) or any((v.command, v.p1) != (item.command, item.p1) for v in vertices):
-                return True
-            at += len(vertices)
-        elif item.command == RETURN_POINT:
-            at += 1
-        else:
-            return True
-    return False
-
-
 @dataclass(frozen=True, slots=True)
 class Limits:
     """A fence in force: an area, and how high flying is allowed, in metres above home."""
@@ -150,3 +119,99 @@ class Limits:
     def holds(self, point: Point) -> bool:
         """Whether flying is allowed there."""
         return point.up <= self.ceiling and self.area.holds(point.north, point.east)
+
+
+LOADED_US = 100_000
+"""How long after a change, of the upload or of a setting, there is no fence: targets that come right behind an upload
+are not checked, as recorded from both autopilots."""
+CHECK_US = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """What is violated: the flavour's name of it, and by how much on the plane, in metres."""
+
+    name: str
+    by: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class FenceRules:
+    """What a flavour does its own way."""
+
+    limits: Callable[[Callable[[str], float], Area], Limits | None]
+    """From the parameters (by name) and the uploaded area: the fence in force, if there is one."""
+    name: Callable[[Limits, Point], str]
+    """What of the fence is violated there."""
+    every: bool
+    """Whether every included area must be kept to."""
+    critical: bool
+    """Whether HEARTBEAT tells of a breach (MAV_STATE_CRITICAL)."""
+
+
+class FenceWatch:
+    """The fence of one vehicle. `value` gives a parameter's value by its name."""
+
+    def __init__(self, rules: FenceRules, plans: Plans, home: Home, value: Callable[[str], float]) -> None:
+        self._rules = rules
+        self._plans = plans
+        self._home = home
+        self._value = value
+        self._area = Area()
+        self._limits: Limits | None = None
+        self._changed_us = 0
+        self._checked_us = -CHECK_US
+        self._now_us = 0
+        self._stale = True
+        self.breach: Breach | None = None
+        """What is violated now, while armed and in the air."""
+        self.count = 0
+        """How many breaches there were."""
+        plans.listeners.append(self._plan_changed)
+
+    def _plan_changed(self, kind: int) -> None:
+        if kind == FENCE:
+            self._area = Area.of(self._plans.items(FENCE), self._home, self._rules.every)
+            self.settings_changed()
+
+    def settings_changed(self) -> None:
+        """A parameter was set; the fence is another one a moment later."""
+        self._limits = None
+        self._stale = True
+        self._changed_us = self._now_us
+
+    @property
+    def in_force(self) -> bool:
+        """Whether there is a fence."""
+        return self._limits is not None
+
+    @property
+    def critical(self) -> bool:
+        """Whether HEARTBEAT tells of a breach now."""
+        return self.breach is not None and self._rules.critical
+
+    def allows(self, point: Point) -> bool:
+        """Whether the fence that is in force now has nothing against a target there."""
+        return self._limits is None or self._limits.holds(point)
+
+    def step(self, now_us: int, where: Callable[[], Point], flying: bool) -> Breach | None:
+        """Lets time pass; the breach that began now, if one did. `where` tells where the vehicle believes to be."""
+        self._now_us = now_us
+        if now_us - self._checked_us < CHECK_US and not self._stale:
+            return None
+        if self._stale:
+            if now_us - self._changed_us < LOADED_US:
+                return None
+            self._stale, self._limits = False, self._rules.limits(self._value, self._area)
+        self._checked_us = now_us
+        limits = self._limits
+        point = where() if limits is not None and flying else None
+        if limits is None or point is None or limits.holds(point):
+            self.breach = None
+            return None
+        before = self.breach
+        self.breach = Breach(self._rules.name(limits, point), limits.area.outside_by(point.north, point.east))
+        if before is not None:
+            return None
+        self.count += 1
+        return self.breach

@@ -1,10 +1,40 @@
 """How a flavour's vehicle flies: what parameters may change, and what they may not."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import hypot
 
-from rtshcua.simulation.kinematics import Approach
+from rtshcua.simulation.kinematics import Approach, Body
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.stopping import Stop
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """How it stops, from any ground speed (m/s)."""
+
+    approach: Approach
+    hardest: float
+    """The most that it accelerates meanwhile, in m/s^2."""
+    ahead: Callable[[float], float]
+    """How far ahead it comes to stand."""
+    told: Callable[[float], float]
+    """How far ahead it says that it will."""
+
+    def place(self, body: Body) -> tuple[float, float]:
+        """Where it comes to stand, in metres north and east of home."""
+        return _in_front(body, self.ahead)
+
+    def told_place(self, body: Body) -> tuple[float, float]:
+        """The target that it reports."""
+        return _in_front(body, self.told)
+
+
+def _in_front(body: Body, distance: Callable[[float], float]) -> tuple[float, float]:
+    speed = hypot(body.v_north, body.v_east)
+    if speed == 0:
+        return body.north, body.east
+    time = distance(speed) / speed
+    return body.north + body.v_north * time, body.east + body.v_east * time
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +75,17 @@ class Handling:
     """How it flies; parameters may change it. Speeds in m/s, heights in metres above home, times in seconds."""
 
     agility: Agility
-    cruise: float
-    max_speed: float
     climb: float
-    descent: float
     takeoff_climb: float
     land_speed: float
     """The rate of descent below `land_below`."""
     land_below: float
-    return_up: float
+    cruise: float = 5.0
+    max_speed: float = 12.0
+    descent: float = 1.5
+    return_up: float = 30.0
     """The height of the way home."""
-    takeoff_up: float
+    takeoff_up: float = 2.5
     """The height of a takeoff that names none."""
     idle_disarm_s: float = 10.0
     landed_disarm_s: float = 2.0

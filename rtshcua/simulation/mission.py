@@ -1,43 +1,58 @@
-"""Flies an uploaded mission, item by item, while the mode is MISSION."""
+"""Flies an uploaded mission, item by item, while the mode is MISSION; and what a flavour decides about missions."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
 from math import hypot, isfinite
-from typing import Protocol
 
-from rtshcua.simulation.activity import Landed
-from rtshcua.simulation.mission_items import (
-    DELAY,
-    JUMP,
-    LAND,
-    LOITER,
-    NAVIGATION,
-    RETURN,
-    SPEED,
-    TAKEOFF,
-    WAYPOINT,
-    WAYPOINTS,
-    MissionRules,
-    State,
-)
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.codec.frames import Message
+from rtshcua.simulation import plans
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plan import AMSL_FRAMES, FENCE, MISSION, Item, Plans
-from rtshcua.simulation.vehicle import Vehicle
+from rtshcua.simulation.plans import AMSL_FRAMES, FENCE, MISSION, Item, Plans
+from rtshcua.simulation.vehicle import Landed, Vehicle
 
 _ARRIVED_UP_M = 1.0
+_IN_MISSION, _SUSPENDED = 1, 2
 
 
-class Listener(Protocol):
-    """Who is told how a mission goes."""
+class State(IntEnum):
+    """MISSION_CURRENT.mission_state (MISSION_STATE)."""
 
-    def on_reached(self, number: int) -> None:
-        """Item `number` is done."""
+    UNKNOWN = 0
+    NO_MISSION = 1
+    NOT_STARTED = 2
+    ACTIVE = 3
+    PAUSED = 4
+    COMPLETE = 5
 
-    def on_moved_on(self) -> None:
-        """Another item is the current one, or the mission's state is another."""
 
-    def on_begun(self, text: str) -> None:
-        """An item begins, in the flavour's words."""
+@dataclass(frozen=True, slots=True)
+class MissionRules:
+    """What a flavour does its own way."""
+
+    first: int
+    """The slot of the first item that is flown."""
+    judge: Callable[[tuple[Item, ...], Vehicle, Home, Callable[[Point], bool]], bool]
+    """Whether a mission can be flown; the last argument says what the fence allows."""
+    may_enter: Callable[[tuple[Item, ...], Vehicle], bool]
+    """Whether the mode may be entered, the mission being one that can be flown."""
+    judged_us: int
+    """How long after an upload the judgement comes; until then the one before stands."""
+    waits_for_start: bool
+    """Whether on the ground only MISSION_START begins it, not the mode alone."""
+    return_is_mode: bool
+    """Whether an item that returns changes the mode."""
+    after: Mode | None
+    """The mode after the last item, in the air; None keeps the mode and holds."""
+    accept_m: float
+    """How near a waypoint counts as reached, if it does not say so itself."""
+    tells_all: bool
+    """Whether MISSION_ITEM_REACHED is sent for items too that take no time."""
+    text: Callable[[int, Item], str | None]
+    """What is said when an item that takes time begins."""
 
 
 class Mission:
@@ -46,18 +61,20 @@ class Mission:
     def __init__(
         self,
         rules: MissionRules,
-        plans: Plans,
+        stored: Plans,
         vehicle: Vehicle,
         home: Home,
         allows: Callable[[Point], bool],
-        listener: Listener,
+        send: Callable[[Message], None],
+        say: Callable[[int, str], None],
     ) -> None:
         self._rules = rules
-        self._plans = plans
+        self._stored = stored
         self._vehicle = vehicle
         self._home = home
         self._allows = allows
-        self._listener = listener
+        self._send = send
+        self._say = say
         self._judge_at_us: int | None = None
         self._now_us = 0
         self._begun = False
@@ -70,14 +87,14 @@ class Mission:
         self.valid = False
         """Whether the vehicle would fly it."""
         self.state = State.NO_MISSION
-        plans.listeners.append(self._plan_changed)
+        stored.listeners.append(self._plan_changed)
 
     # -------------------------------------------------------------------------------------------- from outside
 
     @property
     def items(self) -> tuple[Item, ...]:
         """All items, home in slot 0 included where the flavour has it."""
-        return self._plans.items(MISSION)
+        return self._stored.items(MISSION)
 
     @property
     def running(self) -> bool:
@@ -105,15 +122,22 @@ class Mission:
         self._begun, self._arrived_us = False, None
         if self.state is State.COMPLETE:
             self.state = State.NOT_STARTED
-        self._listener.on_moved_on()
+        self._send(self.message())
         return True
+
+    def message(self) -> Message:
+        """MISSION_CURRENT. `total` counts the items that are flown, home left out; PX4 tells no `mission_mode`."""
+        first = self._rules.first
+        mode = (_IN_MISSION if self._vehicle.mode is Mode.MISSION else _SUSPENDED) if first else 0
+        total = max(0, len(self.items) - first)
+        return mavlink.MAVLink_mission_current_message(self.current, total, self.state, mode)
 
     def tell_current(self) -> None:
         """Says which item begins, if it is one that takes time and the flavour says so."""
         item = self.items[self.current]
-        text = self._rules.text(self.current, item) if item.command in NAVIGATION else None
+        text = self._rules.text(self.current, item) if item.command in plans.NAVIGATION else None
         if text is not None:
-            self._listener.on_begun(text)
+            self._say(mavlink.MAV_SEVERITY_INFO, text)
 
     def _plan_changed(self, kind: int) -> None:
         if kind == MISSION:
@@ -133,7 +157,7 @@ class Mission:
             self.state = State.NOT_STARTED if self.valid else State.UNKNOWN
         if not self.valid and self._vehicle.mode is Mode.MISSION:
             self._vehicle.set_mode(Mode.LOITER)
-        self._listener.on_moved_on()
+        self._send(self.message())
 
     def _rewind(self) -> None:
         self.current = min(self._rules.first, max(0, len(self.items) - 1))
@@ -155,7 +179,7 @@ class Mission:
             if self.state is State.ACTIVE:
                 self.state = State.PAUSED
                 self._begun, self._arrived_us = False, None
-                self._listener.on_moved_on()
+                self._send(self.message())
             return
         if not self._entered:
             self._entered = True
@@ -169,7 +193,7 @@ class Mission:
             return
         if self.state is not State.ACTIVE:
             self.state = State.ACTIVE
-            self._listener.on_moved_on()
+            self._send(self.message())
         here = where()
         for _ in range(len(self.items)):
             if not self._step_item(self.items[self.current], here):
@@ -183,21 +207,21 @@ class Mission:
             self._begin(item, here)
         if not self._is_done(item, here):
             return False
-        if item.command in NAVIGATION or self._rules.tells_all:
-            self._listener.on_reached(self.current)
+        if item.command in plans.NAVIGATION or self._rules.tells_all:
+            self._send(mavlink.MAVLink_mission_item_reached_message(self.current))
         return self._advance(item)
 
     def _advance(self, item: Item) -> bool:
         self._begun = False
         following = self.current + 1
-        if item.command == JUMP:
+        if item.command == plans.JUMP:
             done = self._jumps.get(self.current, 0)
             if (item.p2 < 0 or done < item.p2) and self._rules.first <= item.p1 < len(self.items):
                 self._jumps[self.current] = done + 1
                 following = int(item.p1)
-        if following < len(self.items) and (item.command != RETURN or not self._rules.return_is_mode):
+        if following < len(self.items) and (item.command != plans.RETURN or not self._rules.return_is_mode):
             self.current = following
-            self._listener.on_moved_on()
+            self._send(self.message())
             return True
         self.state = State.COMPLETE
         self._started = False
@@ -206,24 +230,24 @@ class Mission:
                 self._vehicle.set_mode(self._rules.after)
             else:
                 self._vehicle.hold()
-        self._listener.on_moved_on()
+        self._send(self.message())
         return False
 
     def _begin(self, item: Item, here: Point) -> None:
         vehicle, command = self._vehicle, item.command
-        if command == TAKEOFF or (command in WAYPOINTS and not vehicle.in_air):
+        if command == plans.TAKEOFF or (command in plans.WAYPOINTS and not vehicle.in_air):
             self._climb(self._up(item, here))
-        elif command in WAYPOINTS:
+        elif command in plans.WAYPOINTS:
             vehicle.go_to(self._place(item, here))
-        elif command == LAND and item.has_place:
+        elif command == plans.LAND and item.has_place:
             vehicle.go_to(Point(*self._home.local(item.x, item.y), here.up))
-        elif command == LAND:
+        elif command == plans.LAND:
             vehicle.land_here()
-        elif command == RETURN and self._rules.return_is_mode:
+        elif command == plans.RETURN and self._rules.return_is_mode:
             vehicle.set_mode(Mode.RETURN)
-        elif command == RETURN:
+        elif command == plans.RETURN:
             vehicle.return_home()
-        elif command == SPEED and item.p2 > 0:
+        elif command == plans.SPEED and item.p2 > 0:
             vehicle.speed = item.p2
 
     def _climb(self, up: float) -> None:
@@ -235,28 +259,28 @@ class Mission:
     def _is_done(self, item: Item, here: Point) -> bool:
         vehicle, command = self._vehicle, item.command
         climbing = not vehicle.in_air or vehicle.landed is Landed.TAKEOFF
-        if command == TAKEOFF:
+        if command == plans.TAKEOFF:
             return not climbing
-        if command in WAYPOINTS:
+        if command in plans.WAYPOINTS:
             if climbing:
                 return False
             place = self._place(item, here)
             if vehicle.target != place:  # on the ground it had to climb first
                 vehicle.go_to(place)
-            return self._has_arrived(item, place, here) and command != LOITER and self._has_waited(item.p1)
-        if command == DELAY:
+            return self._has_arrived(item, place, here) and command != plans.LOITER and self._has_waited(item.p1)
+        if command == plans.DELAY:
             return self._has_waited(item.p1)
-        if command == LAND:
+        if command == plans.LAND:
             if item.has_place and vehicle.landed is Landed.IN_AIR and self._is_near(vehicle.target, here):
                 vehicle.land_here()
             return not vehicle.in_air
-        return command != RETURN or self._rules.return_is_mode or not vehicle.in_air
+        return command != plans.RETURN or self._rules.return_is_mode or not vehicle.in_air
 
     def _has_arrived(self, item: Item, place: Point, here: Point) -> bool:
         """Whether it is there, or was: gusts may carry it off while it waits."""
         if self._arrived_us is not None:
             return True
-        accept = item.p2 if item.command == WAYPOINT and item.p2 > 0 else self._rules.accept_m
+        accept = item.p2 if item.command == plans.WAYPOINT and item.p2 > 0 else self._rules.accept_m
         return self._is_near(place, here, accept) and abs(place.up - here.up) < _ARRIVED_UP_M
 
     def _is_near(self, place: Point, here: Point, accept_m: float | None = None) -> bool:

@@ -50,12 +50,12 @@ class ModeTable:
     """The mode after boot."""
     armable: frozenset[Mode]
     """The modes in which arming is not refused."""
-    blind: int
-    """What `base_mode` loses while the vehicle lands without a position."""
-    stands_by: bool
-    """Whether HEARTBEAT tells that it stands by until it lifts off, armed or not."""
     names: Mapping[int, str]
     """What the flavour calls them in its texts, by number."""
+    blind: int = 0
+    """What `base_mode` loses while the vehicle lands without a position."""
+    stands_by: bool = False
+    """Whether HEARTBEAT tells that it stands by until it lifts off, armed or not."""
 
     def name(self, mode: Mode) -> str:
         """What the flavour calls a mode that it has."""

@@ -1,10 +1,50 @@
-"""What the vehicle believes of itself: the receiver's fix, and the estimate of position. What is ahead: `ranging`."""
+"""What the vehicle believes of itself: the receiver's fix, and the estimate of position; and how both come up.
 
+What is ahead: `surroundings`.
+"""
+
+from dataclasses import dataclass
 from random import Random
 
-from rtshcua.simulation.boot import BootPlan
 from rtshcua.simulation.kinematics import Body
 from rtshcua.simulation.place import Point
+
+FAST_S = 1.0
+"""All that a fast boot takes."""
+
+
+@dataclass(frozen=True, slots=True)
+class BootPlan:
+    """When what is there, as recorded; a text is (time, severity, text); `{amsl}` is home's height."""
+
+    answers_s: float
+    """Sensors answer: SYS_STATUS, and a position if only of zeros."""
+    standby_s: float
+    """The heartbeat leaves `booting`."""
+    booting: int
+    """HEARTBEAT.system_status (MAV_STATE) up to then."""
+    initialised_s: float
+    attitude_s: float
+    receiver_s: float
+    """The receiver has a fix."""
+    origin_s: float
+    """There is a home, and with it a height above it."""
+    checks_s: float
+    """Nothing is inconsistent any more: without a position, the modes that need none can be armed in."""
+    position_s: float
+    """The estimator vouches for its position."""
+    tells_early: bool
+    """Whether GLOBAL_POSITION_INT comes before that: zeros, then what the receiver says."""
+    texts: tuple[tuple[float, int, str], ...] = ()
+
+    @property
+    def all_s(self) -> float:
+        """All that it takes."""
+        return max(
+            self.answers_s, self.standby_s, self.initialised_s, self.attitude_s, self.receiver_s, self.origin_s,
+            self.checks_s, self.position_s,
+        )  # fmt: skip
+
 
 _DRIFT = 0.2
 """How fast the estimate strays in each axis while there is no good fix, m/s."""
@@ -24,98 +64,66 @@ class Sensors:
         self._coast_s = coast_s
         self._without_fix_s = 0.0
         self._jump = (0.0, 0.0)
-        self._glitch = (0.0, 0.0)
+        self.glitch = (0.0, 0.0)
+        """How far the receiver alone is off, metres north and east: the estimator does not believe it."""
         self._drift = 0.0
         self._last_fix: Point | None = None
         self._plan = plan
         self._pace = pace
         self.age_s = 0.0
         """Seconds since the start, as the plan counts them."""
-        self._lost = False
+        self.lost = False
+        """Whether the receiver has lost its fix; when it has found it again the estimate is right again."""
+        self._come_up()
 
     def step(self, dt: float) -> None:
         """Lets `dt` seconds pass."""
         self.age_s += dt * self._pace
-        if self._lost or self.glitching:
+        if not self._is_up:
+            self._come_up()
+        if self.lost or self.glitching:
             self._without_fix_s += dt
             self._drift += _DRIFT * dt
         else:
             self._without_fix_s = self._drift = 0.0
 
-    def lose_fix(self) -> None:
-        """The receiver loses its fix."""
-        self._lost = True
-
-    def find_fix(self) -> None:
-        """The receiver has its fix again, and the estimate is right again."""
-        self._lost = False
+    def _come_up(self) -> None:
+        plan, age_s = self._plan, self.age_s
+        self._is_up = age_s >= plan.all_s
+        self.answers = age_s >= plan.answers_s
+        """Whether there is telemetry of sensors at all."""
+        self.booting = plan.booting if age_s < plan.standby_s else None
+        """HEARTBEAT.system_status while it comes up."""
+        self.initialised = age_s >= plan.initialised_s
+        """Whether the estimator runs."""
+        self.has_attitude = age_s >= plan.attitude_s
+        """Whether the estimator knows attitude and height, if not yet where it is."""
+        self.receives = age_s >= plan.receiver_s
+        """Whether the receiver was found."""
+        self.has_origin = age_s >= plan.origin_s
+        """Whether there is a home."""
+        self.consistent = age_s >= plan.checks_s
+        """Whether the checks of the sensors against each other pass."""
+        self.locates = age_s >= plan.position_s
+        """Whether the estimator has come up far enough to vouch for a position."""
+        self.tells_position = self.answers if plan.tells_early else self.locates
+        """Whether GLOBAL_POSITION_INT is sent, whatever it is worth."""
 
     def jump(self, north_m: float, east_m: float) -> None:
         """From now on the receiver, and with it the estimate, is off by this much more."""
         self._jump = (self._jump[0] + north_m, self._jump[1] + east_m)
-
-    def glitch(self, north_m: float, east_m: float) -> None:
-        """From now on the receiver alone is off by this: the estimator does not believe it. 0, 0: right again."""
-        self._glitch = (north_m, east_m)
-
-    # ---------------------------------------------------------------------------------------------- coming up
-
-    @property
-    def answers(self) -> bool:
-        """Whether there is telemetry of sensors at all."""
-        return self.age_s >= self._plan.answers_s
-
-    @property
-    def booting(self) -> int | None:
-        """HEARTBEAT.system_status while it comes up."""
-        return self._plan.booting if self.age_s < self._plan.standby_s else None
-
-    @property
-    def initialised(self) -> bool:
-        """Whether the estimator runs."""
-        return self.age_s >= self._plan.initialised_s
-
-    @property
-    def has_attitude(self) -> bool:
-        """Whether the estimator knows attitude and height, if not yet where it is."""
-        return self.age_s >= self._plan.attitude_s
-
-    @property
-    def receives(self) -> bool:
-        """Whether the receiver was found."""
-        return self.age_s >= self._plan.receiver_s
-
-    @property
-    def has_origin(self) -> bool:
-        """Whether there is a home."""
-        return self.age_s >= self._plan.origin_s
-
-    @property
-    def consistent(self) -> bool:
-        """Whether the checks of the sensors against each other pass."""
-        return self.age_s >= self._plan.checks_s
-
-    @property
-    def tells_position(self) -> bool:
-        """Whether GLOBAL_POSITION_INT is sent, whatever it is worth."""
-        return self.answers if self._plan.tells_early else self.locates
-
-    @property
-    def locates(self) -> bool:
-        """Whether the estimator has come up far enough to vouch for a position."""
-        return self.age_s >= self._plan.position_s
 
     # ------------------------------------------------------------------------------------------------ position
 
     @property
     def has_fix(self) -> bool:
         """Whether the receiver has a fix now."""
-        return self.receives and not self._lost
+        return self.receives and not self.lost
 
     @property
     def glitching(self) -> bool:
         """Whether the estimator does not believe the receiver."""
-        return self._glitch != (0.0, 0.0)
+        return self.glitch != (0.0, 0.0)
 
     @property
     def has_position(self) -> bool:
@@ -140,8 +148,8 @@ class Sensors:
         """The position that GPS_RAW_INT reports; the last one over again while there is no fix."""
         if self.has_fix or self._last_fix is None:
             self._last_fix = Point(
-                body.north + self._jump[0] + self._glitch[0] + self._draw(_FIX_NOISE),
-                body.east + self._jump[1] + self._glitch[1] + self._draw(_FIX_NOISE),
+                body.north + self._jump[0] + self.glitch[0] + self._draw(_FIX_NOISE),
+                body.east + self._jump[1] + self.glitch[1] + self._draw(_FIX_NOISE),
                 body.up + self._draw(_FIX_NOISE),
             )
         return self._last_fix

@@ -1,5 +1,7 @@
-"""The messages that both flavours stream, built from what the autopilot knows."""
+"""The messages that both flavours stream or list alike, built from what the autopilot knows."""
 
+import struct
+from collections.abc import Mapping
 from math import atan2, degrees, hypot
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -22,6 +24,14 @@ _SENSORS = (
     | mavlink.MAV_SYS_STATUS_AHRS
     | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+)
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
 
 
@@ -205,9 +215,81 @@ def radio_status(a: Autopilot) -> Message:
     return mavlink.MAVLink_radio_status_message(rssi, rssi, percent, 30, 30, 0, 0)
 
 
+def extended_sys_state(vtol: int) -> Builder:
+    """EXTENDED_SYS_STATE; `vtol` is its `vtol_state`."""
+    return lambda a: mavlink.MAVLink_extended_sys_state_message(vtol, a.vehicle.landed)
+
+
+def autopilot_version(capabilities: int, version: int, numbered: int) -> Builder:
+    """AUTOPILOT_VERSION; `numbered` is its `vendor_id` and `uid`."""
+    zeros = [0] * 8
+    parts = (_CAPABILITIES | capabilities, version, 0, 0, numbered, zeros, zeros, zeros, 0, 0, numbered)
+    return lambda _: mavlink.MAVLink_autopilot_version_message(*parts)
+
+
 def system_time(a: Autopilot) -> Message:
     """SYSTEM_TIME: the time of day, and since the start."""
     return mavlink.MAVLink_system_time_message(a.utc_us + a.now_us, a.boot_ms)
+
+
+AVAILABLE_MODES = 435
+"""The message is not in the dialect: https://mavlink.io/en/messages/common.html#AVAILABLE_MODES."""
+_LAYOUT = struct.Struct("<IIBBB35s")
+
+CURRENT_MODE = 436
+"""Neither is this one: https://mavlink.io/en/messages/common.html#CURRENT_MODE."""
+_CURRENT_MODE_LAYOUT = struct.Struct("<IIB")
+
+_STANDARD: Mapping[Mode, int] = {
+    Mode.POSITION: 1, Mode.ALTITUDE: 4, Mode.RETURN: 5, Mode.MISSION: 6, Mode.LAND: 7, Mode.TAKEOFF: 8
+}  # fmt: skip
+"""MAV_STANDARD_MODE; others have none (0)."""
+
+
+class _Packed(mavlink.MAVLink_message):  # type: ignore[misc]
+    """A message that the dialect does not have, packed by hand."""
+
+    id: int
+    name: str
+    extra: int
+
+    def __init__(self, payload: bytes) -> None:
+        super().__init__(self.id, self.name)
+        self._bytes = payload
+
+    def pack(self, mav: Message, force_mavlink1: bool = False) -> Message:
+        """The frame."""
+        return self._pack(mav, self.extra, self._bytes, force_mavlink1=force_mavlink1)
+
+
+class _AvailableModes(_Packed):
+    id, name, extra = AVAILABLE_MODES, "AVAILABLE_MODES", 134
+
+
+class _CurrentMode(_Packed):
+    id, name, extra = CURRENT_MODE, "CURRENT_MODE", 193
+
+
+def available_modes(a: Autopilot, number: int) -> bool:
+    """Queues the mode of this number, counted from 1, or all of them for 0; False if there is none of that number."""
+    modes = a.flavour.modes
+    listed = list(modes.numbers.items())
+    if not 0 <= number <= len(listed):
+        return False
+    for index, (mode, custom) in enumerate(listed, start=1):
+        if number in (0, index):
+            name = modes.name(mode).encode()
+            payload = _LAYOUT.pack(custom, 0, len(listed), index, _STANDARD.get(mode, 0), name)
+            a.send(_AvailableModes(payload))
+    return True
+
+
+def current_mode(a: Autopilot) -> Message:
+    """CURRENT_MODE."""
+    mode = a.vehicle.mode
+    number = a.flavour.modes.numbers[mode]
+    payload = _CURRENT_MODE_LAYOUT.pack(number, number, _STANDARD.get(mode, 0))
+    return _CurrentMode(payload)
 
 
 COMMON: dict[int, Builder] = {
@@ -222,5 +304,6 @@ COMMON: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
     mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE: obstacle_distance,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: system_time,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda a: a.mission.message(),
 }
 """Those that both flavours stream alike, by number."""

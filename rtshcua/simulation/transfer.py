@@ -1,6 +1,6 @@
 """The mission protocol: uploads, downloads and clearing, one at a time, as (system, component) of the vehicle.
 
-What PX4 and ArduCopter do differently is in `TransferRules`; each has them in its `plans.py`. An upload takes effect
+What PX4 and ArduCopter do differently is in `TransferRules`. An upload takes effect
 as a whole when its last item has come.
 """
 
@@ -10,12 +10,29 @@ from dataclasses import dataclass, field
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
-from rtshcua.simulation.plan import ALL, KINDS, Item, Plans, from_message, to_message
+from rtshcua.simulation.plans import (
+    ALL,
+    AMSL_FRAMES,
+    FENCE,
+    FLOWN,
+    KINDS,
+    MISSION,
+    PLACELESS_FRAME,
+    RALLY,
+    RELATIVE_FRAMES,
+    WAYPOINTS,
+    Item,
+    Plans,
+    draws_no_fence,
+    from_message,
+    to_message,
+)
 
 ACCEPTED: int = mavlink.MAV_MISSION_ACCEPTED
 ERROR: int = mavlink.MAV_MISSION_ERROR
 UNSUPPORTED: int = mavlink.MAV_MISSION_UNSUPPORTED
 UNSUPPORTED_FRAME: int = mavlink.MAV_MISSION_UNSUPPORTED_FRAME
+_FRAMES = AMSL_FRAMES | RELATIVE_FRAMES | {PLACELESS_FRAME}
 
 Peer = tuple[int, int]
 """(system, component) of the other end."""
@@ -38,10 +55,21 @@ class TransferRules:
     opens_downloads: bool
     """Whether items can be asked for only after MISSION_REQUEST_LIST, and are then sent again unasked if need be."""
     capacity: Mapping[int, int]
-    check: Callable[[int, int, Item], int]
-    """(kind, number, item) to MAV_MISSION_RESULT: what it says to an item."""
-    check_all: Callable[[int, tuple[Item, ...]], int]
-    """(kind, items) to MAV_MISSION_RESULT: what it says when all have come."""
+    fence_items: frozenset[int]
+    """The commands that a fence may be made of."""
+    keeps_home: bool
+    """Whether slot 0 of a mission is home, and not looked at."""
+
+    def check(self, kind: int, number: int, item: Item) -> int:
+        """MAV_MISSION_RESULT: what it says to an item."""
+        if item.frame not in _FRAMES:
+            return UNSUPPORTED_FRAME
+        if self.keeps_home and kind == MISSION and number == 0:
+            return ACCEPTED
+        known = {MISSION: FLOWN, FENCE: self.fence_items, RALLY: {mavlink.MAV_CMD_NAV_RALLY_POINT}}[kind]
+        if item.command not in known or (item.frame == PLACELESS_FRAME and item.command in WAYPOINTS):
+            return UNSUPPORTED
+        return ACCEPTED
 
 
 @dataclass(slots=True)
@@ -86,9 +114,9 @@ class Transfer:
 
     # --------------------------------------------------------------------------------------------- upload
 
-    def count(self, peer: Peer, kind: int, count: int, now_us: int) -> None:
+    def count(self, peer: Peer, message: Message, now_us: int) -> None:
         """MISSION_COUNT: an upload begins."""
-        upload, rules = self._upload, self._rules
+        upload, rules, kind, count = self._upload, self._rules, message.mission_type, message.count
         if kind not in KINDS:
             return self._ack(peer, UNSUPPORTED, kind)
         if upload is not None and upload.peer != peer:
@@ -126,13 +154,14 @@ class Transfer:
             self._store(peer, kind, tuple(upload.items))
 
     def _store(self, peer: Peer, kind: int, items: tuple[Item, ...]) -> None:
-        result = self._rules.check_all(kind, items)
+        result = ERROR if kind == FENCE and draws_no_fence(items) else ACCEPTED
         self._ack(peer, result, kind)
         if result == ACCEPTED:
             self._plans.replace(kind, items)
 
-    def clear_all(self, peer: Peer, kind: int) -> None:
+    def clear_all(self, peer: Peer, message: Message, now_us: int) -> None:
         """MISSION_CLEAR_ALL."""
+        kind = message.mission_type
         if kind != ALL and kind not in KINDS:
             return self._ack(peer, UNSUPPORTED, kind)
         if self._upload is not None:
@@ -154,8 +183,9 @@ class Transfer:
 
     # ------------------------------------------------------------------------------------------- download
 
-    def request_list(self, peer: Peer, kind: int, now_us: int) -> None:
+    def request_list(self, peer: Peer, message: Message, now_us: int) -> None:
         """MISSION_REQUEST_LIST: how many items there are."""
+        kind = message.mission_type
         if self._upload is not None:
             return self._ack(peer, self._rules.busy, kind)
         if kind not in KINDS:
@@ -178,8 +208,9 @@ class Transfer:
             download.heard_us, download.sent_us, download.next, download.whole = now_us, now_us, number + 1, whole
         return self._send_item(peer, kind, number, whole)
 
-    def acknowledged(self, peer: Peer, result: int, now_us: int) -> None:
+    def acknowledged(self, peer: Peer, message: Message, now_us: int) -> None:
         """MISSION_ACK: the other end has what it wanted, or gives up, or wants to be asked in the other form."""
+        result = message.type
         if self._download is not None and self._download.peer == peer:
             self._download = None
         upload = self._upload

@@ -3,32 +3,138 @@
 It is the same for both flavours; `Handling` and the mode table hold what differs.
 """
 
-from rtshcua.simulation.activity import Activity, Event, Landed
-from rtshcua.simulation.flight import Flight
-from rtshcua.simulation.ground import Ground
+from enum import Enum, IntEnum, auto
+from math import copysign, hypot
+
+from rtshcua.mavlink import enums
+from rtshcua.simulation import battery, guidance
 from rtshcua.simulation.handling import Handling
+from rtshcua.simulation.kinematics import Body, heading
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 
+
+class Landed(IntEnum):
+    """EXTENDED_SYS_STATE.landed_state (MAV_LANDED_STATE)."""
+
+    ON_GROUND = enums.MAV_LANDED_STATE_ON_GROUND
+    IN_AIR = enums.MAV_LANDED_STATE_IN_AIR
+    TAKEOFF = enums.MAV_LANDED_STATE_TAKEOFF
+    LANDING = enums.MAV_LANDED_STATE_LANDING
+
+
+class Event(Enum):
+    """What happened that the autopilot has a text for."""
+
+    ARMED = auto()
+    DISARMED = auto()
+    TAKEOFF = auto()
+    RETURN = auto()
+    RETURN_CLIMB = auto()
+    HOME = auto()
+    TOUCHED = auto()
+    LANDED = auto()
+    AUTO_DISARMED = auto()
+    TIPPED = auto()
+    CRASHED = auto()
+
+
+class Activity(Enum):
+    """What it does at present; `REST` is to stand on the ground, `TOUCHED` not to know it yet, `WRECK` to lie there."""
+
+    REST = auto()
+    CLIMB = auto()
+    TRACK = auto()
+    RETURN_CLIMB = auto()
+    RETURN_CROSS = auto()
+    RETURN_WAIT = auto()
+    CIRCLE = auto()
+    DESCEND = auto()
+    TOUCHED = auto()
+    FALL = auto()
+    WRECK = auto()
+
+
+_FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
+
+_DOWN = frozenset({Activity.REST, Activity.TOUCHED, Activity.WRECK})
+_STEADY = frozenset({Activity.TRACK, Activity.DESCEND, Activity.CIRCLE})
+"""Activities that go on until something else is asked for, or the ground comes."""
 _HARD_M_S = 4.0
 """Who comes down faster than this breaks."""
 
 
-class Vehicle(Flight):
-    """A multirotor on the ground at home, disarmed."""
+class Vehicle:
+    """A multirotor, at first on the ground at home and disarmed; what it was told, and how it goes on from that."""
 
     def __init__(self, handling: Handling, mode: Mode) -> None:
-        super().__init__(handling, mode)
-        self._ground = Ground(handling)
+        self.handling = handling
+        self.body = Body()
+        self.mode = mode
+        self.armed = False
+        self.landed = Landed.ON_GROUND
+        self.target = Point(0.0, 0.0, 0.0)
+        self.destination: Point | None = None
+        """What it was told to fly to, or chose as the place to stop at: the target that it reports."""
+        self.sent = False
+        """Whether somebody named that place: no stopping point, no takeoff."""
+        self.takeoff_up: float | None = None
+        """The height that the next takeoff climbs to; kept while disarmed, for arming in TAKEOFF starts it."""
+        self.events: list[Event] = []
+        self.blind = False  # flies level, for it has no position to hold
+        self.crashed = False
+        self.touched_m_s = 0.0  # how fast it last came down on the ground
         self.paused = False
         """Whether it stands still on its way to a target, until told to go on (ArduCopter)."""
+        self._stood_s = 0.0  # since it was armed, or came down
+        self._lifting_s: float | None = None  # until the motors carry it, if it is to lift off
+        self._has_flown = False  # since it was armed
+        self._activity = Activity.REST
+        self._error = (0.0, 0.0)  # how far its estimate is off
+        self._speed: float | None = None
+        self._waiting_s = 0.0
+        self._nose: float | None = None
+        self._radius = 0.0
+        self._steer_to_target()
+
+    @property
+    def in_air(self) -> bool:
+        """Whether it has left the ground, and does not know that it came down."""
+        return self._activity is not Activity.REST
+
+    @property
+    def flies(self) -> bool:
+        """Whether it is in the air and obeys."""
+        return self._activity not in (Activity.REST, Activity.FALL, Activity.WRECK)
+
+    @property
+    def lies(self) -> bool:
+        """Whether it lies on the ground as it came down."""
+        return self._activity is Activity.WRECK
+
+    @property
+    def descends(self) -> bool:
+        """Whether it is on its way down to land, or has come down."""
+        return self._activity in (Activity.DESCEND, Activity.TOUCHED)
+
+    @property
+    def speed(self) -> float:
+        """The ground speed that it flies to a target with."""
+        wanted = self.handling.cruise if self._speed is None else self._speed
+        return min(wanted, self.handling.max_speed)
+
+    @speed.setter
+    def speed(self, value: float) -> None:
+        self._speed = max(value, 0.1)
+
+    # ------------------------------------------------------------------------------------------- what it is told
 
     def arm(self) -> None:
         """Starts the motors; in TAKEOFF mode the climb follows."""
         if self.armed:
             return
         self.armed = True
-        self._ground.arm()
+        self._stood_s, self._lifting_s, self._has_flown = 0.0, None, False
         self.events.append(Event.ARMED)
         if self.mode is Mode.TAKEOFF:
             self.climb()
@@ -41,7 +147,7 @@ class Vehicle(Flight):
         self._speed = None
         self.takeoff_up = None
         self.destination, self.sent, self.paused = None, False, False
-        self._ground.stay()
+        self._lifting_s = None
         if self._activity in (Activity.REST, Activity.TOUCHED, Activity.WRECK):
             self._activity, self.landed = Activity.REST, Landed.ON_GROUND
         else:
@@ -76,7 +182,7 @@ class Vehicle(Flight):
         if mode is Mode.TAKEOFF:
             self.climb()
         else:
-            self._ground.stay()
+            self._lifting_s = None
         if not self.flies:
             return
         if mode is Mode.LAND:
@@ -103,7 +209,9 @@ class Vehicle(Flight):
         """Runs up the motors; when they carry, it flies to `target`, straight up first if that is a takeoff."""
         if not self.crashed:
             self.target = self.destination = target
-            self._ground.run_up()
+            if self._lifting_s is None:  # motors that run up already go on
+                agility = self.handling.agility
+                self._lifting_s = max(agility.spool_s - self._stood_s, 0.0) + agility.ramp_s
 
     def hold(self, up: float | None = None) -> None:
         """Stops as soon as it can and stays there, or goes to another height."""
@@ -176,25 +284,146 @@ class Vehicle(Flight):
             self._activity = Activity.CIRCLE
             self.landed = Landed.IN_AIR
 
+    # ------------------------------------------------------------------------------------------------- in time
+
+    def step(
+        self, dt: float, wind: tuple[float, float], error: tuple[float, float], powered: bool, sees: bool = True
+    ) -> float:
+        """Lets `dt` seconds pass, in this wind, steering by a position that is off by `error`, or by none (`sees`).
+
+        Returns the load on the battery, hovering being 1.
+        """
+        activity, body = self._activity, self.body
+        self._error = error
+        if activity in _DOWN:
+            self._stand(dt)
+            return battery.IDLE if self.armed else battery.REST
+        if not powered:
+            self._activity = activity = Activity.FALL
+        if activity is Activity.FALL:
+            body.fall(dt)
+        else:
+            self._fly(dt, wind, error, sees)
+        if body.up <= 0 and body.v_up < 0:
+            self._touch_down()
+        if not self.armed:
+            return battery.REST
+        airspeed = hypot(body.v_north - wind[0], body.v_east - wind[1])
+        return battery.flight_load(airspeed, body.v_up, body.thrust)
+
+    def _believed(self, north: float, east: float, up: float) -> Point:
+        """A place as it takes it to be: it steers by its estimate, which may be off."""
+        return Point(north + self._error[0], east + self._error[1], up)
+
+    def _hold(self, activity: Activity = Activity.TRACK, up: float | None = None) -> None:
+        """Stops where it can, at the height `up`, or where it can stop climbing as well."""
+        body, agility = self.body, self.handling.agility
+        stop = agility.brake if self.mode is Mode.BRAKE else agility.stop
+        if self.mode is Mode.LAND:
+            stop = agility.land
+        self._approach, self._hardest = stop.approach, stop.hardest
+        if up is None:
+            # PX4 comes back to the height where it was told to hold (recorded); ArduCopter stops ahead of it.
+            ahead = 0.0 if self.handling.comes_back else body.v_up**2 / (2 * agility.climb_acceleration)
+            up = body.up + copysign(ahead, body.v_up)
+        self.target = self._believed(*stop.place(body), up)
+        self.destination = self._believed(*stop.told_place(body), up)
+        self.sent = False
+        self._activity = activity
+        self.landed = Landed.IN_AIR
+
+    def _steer_to_target(self) -> None:
+        agility = self.handling.agility
+        self._approach, self._hardest = agility.approach, guidance.hardest(agility)
+
+    def _fly(self, dt: float, wind: tuple[float, float], error: tuple[float, float], sees: bool) -> None:
+        body, agility = self.body, self.handling.agility
+        self._waiting_s -= dt
+        self._advance(error)
+        most = agility.takeoff_acceleration if self._activity is Activity.CLIMB else agility.climb_acceleration
+        self.blind = self.blind or not sees
+        north, east = self.target.north - error[0], self.target.east - error[1]
+        if self.blind:
+            body.drift(dt, self._climb_rate(north, east), most, wind)
+            return
+        if self._activity is Activity.CIRCLE:
+            want = guidance.around(body, north, east, self._radius, self.speed)
+        else:
+            want = guidance.towards(body, north, east, self.speed, self._approach)
+        climb = self._climb_rate(north, east)
+        body.track(dt, want, self._hardest, climb, most, wind)
+        if self._nose is not None:
+            body.turn(dt, self._nose)
+        elif abs(want[0]) + abs(want[1]) > _FACING_M_S:
+            body.turn(dt, heading(body.v_north, body.v_east))
+
+    def _advance(self, error: tuple[float, float]) -> None:
+        """Goes on to the next part of a takeoff or a return when the present one is done."""
+        activity, body = self._activity, self.body
+        if activity in _STEADY:
+            return
+        away = abs(self.target.up - body.up)
+        if activity is Activity.CLIMB:
+            if away < self.handling.agility.takeoff_within:
+                self._activity = Activity.TRACK
+                self.landed = Landed.IN_AIR
+                self.takeoff_up = None
+                if self.mode is Mode.TAKEOFF and self.handling.after_takeoff is not None:
+                    self.mode = self.handling.after_takeoff
+        elif activity is Activity.RETURN_CLIMB:
+            if away < guidance.ARRIVED_M and abs(body.v_up) < guidance.ARRIVED_M_S:
+                self.target = self.destination = Point(0.0, 0.0, self.target.up)
+                self._steer_to_target()
+                self._activity = Activity.RETURN_CROSS
+        elif activity is Activity.RETURN_CROSS:
+            within = self.handling.agility.home_within
+            if guidance.is_above(body, self.target.north - error[0], self.target.east - error[1], within):
+                self._activity = Activity.RETURN_WAIT
+                self._waiting_s = self.handling.agility.return_wait_s
+        elif self._waiting_s <= 0:
+            self._activity = Activity.DESCEND
+            self.destination = Point(self.target.north, self.target.east, 0.0)
+            self.landed = Landed.LANDING
+            self.events.append(Event.HOME)
+
+    def _climb_rate(self, north: float, east: float) -> float:
+        """Upwards; (north, east) is the target as it is steered to."""
+        if self._activity is Activity.DESCEND:
+            if self._waiting_s > 0:
+                return 0.0
+            return guidance.landing_rate(self.body, self.handling)
+        climbs = self._activity is Activity.CLIMB
+        rate = guidance.climb_rate(self.body.up, self.target.up, self.handling, climbs)
+        if self._activity is Activity.TRACK:
+            most = guidance.steepest(self.body, north, east, self.target.up)
+            rate = max(-most, min(most, rate))
+        return rate
+
     # ---------------------------------------------------------------------------------------------- on the ground
 
     def _stand(self, dt: float) -> None:
+        handling = self.handling
+        self._stood_s += dt
         if self._activity is Activity.TOUCHED:
-            if self._ground.has_landed(dt):
+            if self._stood_s >= handling.agility.land_detect_s:
+                self._stood_s = 0.0
                 self._activity = Activity.REST
                 self.landed = Landed.ON_GROUND
                 self.events.append(Event.LANDED)
         elif self._activity is Activity.WRECK:
-            after_s = self.handling.crash_disarm_s
-            if self.armed and after_s is not None and self._ground.has_lain(dt, after_s):
+            if self.armed and handling.crash_disarm_s is not None and self._stood_s >= handling.crash_disarm_s:
                 self.disarm(Event.CRASHED)
-        elif self._ground.lifting:
-            if self._ground.lifts_off(dt):
+        elif self._lifting_s is not None:
+            self._lifting_s -= dt
+            if self._lifting_s <= 0:
                 self._lift_off()
-        elif self.armed and self._ground.has_done(dt, self.mode in (Mode.RETURN, Mode.LAND)):
-            self.disarm(Event.AUTO_DISARMED)
+        elif self.armed:
+            landed = self._has_flown or self.mode in (Mode.RETURN, Mode.LAND)
+            if self._stood_s >= (handling.landed_disarm_s if landed else handling.idle_disarm_s):
+                self.disarm(Event.AUTO_DISARMED)
 
     def _lift_off(self) -> None:
+        self._lifting_s, self._has_flown = None, True
         self.events.append(Event.TAKEOFF)
         self._steer_to_target()
         climbs = self.takeoff_up is not None
@@ -211,5 +440,5 @@ class Vehicle(Flight):
         else:
             self._activity = Activity.WRECK if self.crashed else Activity.TOUCHED
         self.landed = self.landed if self.armed else Landed.ON_GROUND
-        self._ground.touch()
+        self._stood_s = 0.0
         self.blind = False

@@ -4,22 +4,24 @@ Time moves in ticks of 20 ms, however it is asked to advance, so that the same c
 the same times give the same bytes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 from math import hypot
 from random import Random
 
-from rtshcua.simulation.autopilot import TICK_US, Autopilot
-from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.ardupilot.flavour import ArduCopter
+from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour
+from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.effects import Affected, effects
 from rtshcua.simulation.face import Face
 from rtshcua.simulation.faults import Fault
-from rtshcua.simulation.flavours import FLAVOURS
 from rtshcua.simulation.link import Link
-from rtshcua.simulation.loop import Loop
 from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.px4.flavour import Px4
+
+FLAVOURS: Mapping[Kind, Flavour] = {Kind.PX4: Px4(), Kind.ARDUPILOT: ArduCopter()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +48,11 @@ class Simulation:
 
     def __init__(self, config: SimulationConfig) -> None:
         self._autopilot = Autopilot(FLAVOURS[config.flavour], config)
-        self._loop = Loop(self._autopilot)
         self._face = Face(self._autopilot, config.system)
         self._up = Link(Random(f"{config.seed} uplink"))
         self._down = Link(Random(f"{config.seed} downlink"))
-        self._now_us = 0
+        self._now_us = self._ticked_us = 0
+        self._halted = False
         self._events: list[tuple[int, int, Callable[[], object]]] = []
         self._order = count()
         for fault in config.faults:
@@ -68,14 +70,15 @@ class Simulation:
 
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
-        loop = self._loop
-        while loop.now_us + TICK_US <= to_us:
-            at_us = loop.now_us + TICK_US
+        while self._ticked_us + TICK_US <= to_us:
+            self._ticked_us = at_us = self._ticked_us + TICK_US
             self._happen(at_us)
             self._deliver(at_us)
-            loop.tick()
-            due = [] if loop.halted else self._face.due()
-            for frame in due + self._face.radio_due(at_us):
+            if not self._halted:
+                self._autopilot.tick()
+                for frame in self._face.due():
+                    self._down.send(frame, at_us)
+            for frame in self._face.radio_due(at_us):
                 self._down.send(frame, at_us)
         self._now_us = max(self._now_us, to_us)
         return self._down.due(self._now_us)
@@ -92,7 +95,7 @@ class Simulation:
 
     def inject(self, fault: Fault) -> None:
         """Adds a fault; one whose time is over happens at the next tick."""
-        for at_us, effect in effects(fault, Affected(self._autopilot, self._up, self._down, self._loop)):
+        for at_us, effect in effects(fault, Affected(self._autopilot, self._up, self._down, self._halt)):
             heappush(self._events, (at_us, next(self._order), effect))
 
     def truth(self) -> Truth:
@@ -113,8 +116,12 @@ class Simulation:
             vehicle.crashed,
         )
 
+    def _halt(self, halted: bool) -> None:
+        """The autopilot's loop halts, or goes on: while it does the autopilot stands still, its clock too."""
+        self._halted = halted
+
     def _deliver(self, now_us: int) -> None:
-        for datagram in [] if self._loop.halted else self._up.due(now_us):
+        for datagram in [] if self._halted else self._up.due(now_us):
             for frame in self._face.handle(datagram):
                 self._down.send(frame, now_us)
 

@@ -22,7 +22,7 @@ ALLOWED = {
     "ground/language/table.py": "reads the table that ships",
     "codec/build_dialect.py": "a developer's tool: from pymavlink to the table",
     "mavlink/dialect.py": "reads the table that ships",
-    "simulation/options.py": "the simulated vehicle's own key, and no sibling is imported from there",
+    "simulation/process.py": "the simulated vehicle's own key, and no sibling is imported from there",
 }
 #: of modules, and of paths
 MODULES = {

@@ -5,57 +5,24 @@ from math import isfinite, radians
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Message
-from rtshcua.simulation.ardupilot.modes import MODES
-from rtshcua.simulation.ardupilot.streams import GROUPS
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
-from rtshcua.simulation.command_rules import (
-    ACCEPTED,
-    DENIED,
-    FAILED,
-    FORCE,
-    UNSUPPORTED,
-    change_speed,
-    enter,
-    get_home,
-    request_message,
-    request_version,
-    run_checks,
-    set_message_interval,
-)
+from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, arm_disarm, shared
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
+from rtshcua.simulation.plans import AMSL_FRAMES, RELATIVE_FRAMES
 
-_AMSL_FRAMES = {mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT}
-_RELATIVE_FRAMES = {None, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
+_RELATIVE_FRAMES = RELATIVE_FRAMES | {None}
 """None is COMMAND_LONG, which has no frame: its altitudes are relative."""
 
 
-def _up(a: Autopilot, frame: int | None, altitude: float) -> float | None:
+def above_home(a: Autopilot, frame: int | None, altitude: float) -> float | None:
     """Metres above home; None for a frame that this vehicle cannot follow (above terrain), or no number."""
     if not isfinite(altitude):
         return None
-    if frame in _AMSL_FRAMES:
+    if frame in AMSL_FRAMES:
         return altitude - a.home.amsl_mm / 1000
     return altitude if frame in _RELATIVE_FRAMES else None
-
-
-def _arm_disarm(a: Autopilot, command: Command) -> tuple[int, ...]:
-    vehicle, forced = a.vehicle, whole(command.p2) == FORCE
-    if whole(command.p1) == 1:
-        if vehicle.armed or forced or (a.ready and vehicle.mode in MODES.armable):
-            vehicle.arm()
-            return (ACCEPTED,)
-        for reason in a.flavour.arming(a) or (f"{MODES.name(vehicle.mode)} mode not armable",):
-            a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {reason}")
-        return (FAILED,)
-    if whole(command.p1) != 0:
-        return (UNSUPPORTED,)
-    if vehicle.in_air and not forced:
-        return (FAILED,)
-    vehicle.disarm()
-    return (ACCEPTED,)
 
 
 def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
@@ -75,7 +42,7 @@ def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
 
 
 def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
-    up = _up(a, command.frame, command.altitude)
+    up = above_home(a, command.frame, command.altitude)
     if command.latitude is None or command.longitude is None or up is None:
         return (DENIED,)
     vehicle, target = a.vehicle, Point(*a.home.local(command.latitude, command.longitude), up)
@@ -124,42 +91,20 @@ def _yaw(a: Autopilot, command: Command) -> tuple[int, ...]:
 def _set_mode(a: Autopilot, command: Command) -> tuple[int, ...]:
     if whole(command.p1) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED == 0:
         return (DENIED,)
-    return _enter_number(a, whole(command.p2))
+    return enter_number(a, whole(command.p2))
 
 
-def _enter_number(a: Autopilot, number: int) -> tuple[int, ...]:
-    mode = MODES.mode(number)
+def enter_number(a: Autopilot, number: int) -> tuple[int, ...]:
+    """Enters the mode with this `custom_mode`, or says why it does not; the result."""
+    mode = a.flavour.modes.mode(number)
     if mode is None:
         a.say(mavlink.MAV_SEVERITY_WARNING, f"No such mode {number}")
         return (FAILED,)
     if not a.can_enter(mode):
-        a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {MODES.name(mode)} failed: requires position")
+        a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {a.flavour.modes.name(mode)} failed: requires position")
         return (FAILED,)
     a.vehicle.set_mode(mode)
     return (ACCEPTED,)
-
-
-def on_set_mode(a: Autopilot, number: int) -> tuple[int, ...]:
-    """SET_MODE: acknowledged with the message's own number as the command."""
-    return _enter_number(a, number)
-
-
-def on_position_target(a: Autopilot, message: Message) -> None:
-    """SET_POSITION_TARGET_GLOBAL_INT: flown to in GUIDED and in the air, ignored in silence else.
-
-    Targets of velocity alone are ignored too: this vehicle does not fly them.
-    """
-    up = _up(a, message.coordinate_frame, message.alt)
-    if a.vehicle.mode is Mode.GUIDED and up is not None and not message.type_mask & 0b111:
-        target = Point(*a.home.local(message.lat_int, message.lon_int), up)
-        if a.fence.allows(target):
-            a.vehicle.go_to(target)
-
-
-def on_data_stream(a: Autopilot, stream: int, rate_hz: int) -> None:
-    """REQUEST_DATA_STREAM: sets every message of the group, whatever SET_MESSAGE_INTERVAL said before."""
-    for number in GROUPS.get(stream, ()):
-        a.streams.set(number, 1_000_000 // rate_hz if rate_hz > 0 else -1)
 
 
 def _mission_start(a: Autopilot, _: Command) -> tuple[int, ...]:
@@ -185,23 +130,14 @@ def _fence_enable(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-COMMANDS: Mapping[int, Handler] = {
-    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm_disarm,
+COMMANDS: Mapping[int, Handler] = shared(mode=FAILED, stream=DENIED, says_why=True, message=FAILED, needs_one=False) | {
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: arm_disarm(FAILED, "Arm", "{} mode not armable", ""),
     mavlink.MAV_CMD_NAV_TAKEOFF: _takeoff,
-    mavlink.MAV_CMD_NAV_LAND: enter(Mode.LAND, FAILED),
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: enter(Mode.RETURN, FAILED),
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM: enter(Mode.LOITER, FAILED),
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
-    mavlink.MAV_CMD_DO_CHANGE_SPEED: change_speed,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
     mavlink.MAV_CMD_CONDITION_YAW: _yaw,
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
     mavlink.MAV_CMD_DO_FENCE_ENABLE: _fence_enable,
-    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval(DENIED, say_why=True),
-    mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(FAILED, needs_one=False),
-    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,
-    mavlink.MAV_CMD_GET_HOME_POSITION: get_home,
-    mavlink.MAV_CMD_RUN_PREARM_CHECKS: run_checks,
 }

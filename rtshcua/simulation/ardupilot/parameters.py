@@ -1,10 +1,8 @@
 """ArduCopter's parameters, as far as this vehicle has them, and how it flies."""
 
-from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.handling import Agility, Handling
+from rtshcua.simulation.handling import Agility, Handling, Stop
 from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.parameters import INT8, INT16, INT32, Parameter
-from rtshcua.simulation.stopping import Stop
 
 PARAMETERS = (
     Parameter("ARMING_CHECK", INT32, value=1),
@@ -79,21 +77,14 @@ _AGILITY = Agility(
 """As measured on recorded flights of ArduCopter 4.7."""
 
 
-def handling(config: SimulationConfig) -> Handling:
-    """ArduCopter's defaults."""
-    return Handling(
-        agility=_AGILITY,
-        cruise=config.cruise_mm_s / 1000,
-        max_speed=config.max_speed_mm_s / 1000,
-        climb=2.5,
-        descent=1.5,
-        takeoff_climb=2.5,
-        land_speed=0.5,
-        land_below=10.0,
-        return_up=config.return_mm / 1000,
-        takeoff_up=2.5,
-        landed_disarm_s=0.3,
-        forgets_speed=True,
-        forgets_at_first_target=True,  # `pos_control_start` of mode_guided.cpp takes WPNAV_SPEED again
-        crash_disarm_s=2.0,  # CRASH_CHECK_TRIGGER_SEC of crash_check.cpp
-    )
+HANDLING = Handling(
+    agility=_AGILITY,
+    climb=2.5,
+    takeoff_climb=2.5,
+    land_speed=0.5,
+    land_below=10.0,
+    landed_disarm_s=0.3,
+    forgets_speed=True,
+    forgets_at_first_target=True,  # `pos_control_start` of mode_guided.cpp takes WPNAV_SPEED again
+    crash_disarm_s=2.0,  # CRASH_CHECK_TRIGGER_SEC of crash_check.cpp
+)

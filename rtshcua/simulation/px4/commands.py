@@ -1,56 +1,22 @@
 """PX4's commands. Altitudes are above sea level whatever the frame says; an ACK is for the mode, not the effect."""
 
 from collections.abc import Mapping
-from math import isfinite, nan
+from math import isfinite
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Message
+from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
-from rtshcua.simulation.command_rules import (
-    ACCEPTED,
-    DENIED,
-    FAILED,
-    FORCE,
-    TEMPORARILY_REJECTED,
-    UNSUPPORTED,
-    change_speed,
-    enter,
-    get_home,
-    request_message,
-    request_version,
-    run_checks,
-    set_message_interval,
-)
+from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, arm_disarm, shared
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
-from rtshcua.simulation.px4.modes import MODES, number_of
 
 _STREAM_US = 500_000
 """OFFBOARD is entered only while position targets come faster than this (2 Hz)."""
+_AUTO, _ = Px4Mode.HOLD.parameters
 _ORBIT_M = 10.0
 """The radius of an orbit that names none."""
-_AMSL_FRAMES = {mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT}
-_RELATIVE_FRAMES = {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
-
-
-def _arm_disarm(a: Autopilot, command: Command) -> tuple[int, ...]:
-    forced = whole(command.p2) == FORCE
-    if whole(command.p1) == 1:
-        if a.vehicle.armed or forced or (a.ready and a.vehicle.mode in MODES.armable):
-            a.vehicle.arm()
-            return (ACCEPTED,)
-        for reason in a.flavour.arming(a) or (f"mode {MODES.name(a.vehicle.mode)}",):
-            a.say(mavlink.MAV_SEVERITY_CRITICAL, f"Arming denied: {reason}")
-        return (TEMPORARILY_REJECTED,)
-    if whole(command.p1) != 0:
-        return (UNSUPPORTED,)
-    if a.vehicle.in_air and not forced:
-        a.say(mavlink.MAV_SEVERITY_CRITICAL, "Disarming denied: not landed")
-        return (TEMPORARILY_REJECTED,)
-    a.vehicle.disarm()
-    return (ACCEPTED,)
 
 
 def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
@@ -139,14 +105,16 @@ def _orbit(a: Autopilot, command: Command) -> tuple[int, ...]:
 
 def _set_mode(a: Autopilot, command: Command) -> tuple[int, ...]:
     """Acknowledged twice: the first ACK is of the message, only the second of the mode; a bogus main mode gets 0, 0."""
-    number = number_of(whole(command.p2), whole(command.p3))
-    if number is None:
+    main, sub = whole(command.p2), whole(command.p3)
+    if main not in {number >> 16 & 0xFF for number in a.flavour.modes.numbers.values()}:
         return (ACCEPTED, ACCEPTED)
-    return (ACCEPTED, ACCEPTED if _enter_number(a, number) else TEMPORARILY_REJECTED)
+    number = main << 16 | (sub & 0xFF if main == _AUTO else 0) << 24
+    return (ACCEPTED, ACCEPTED if enter_number(a, number) else TEMPORARILY_REJECTED)
 
 
-def _enter_number(a: Autopilot, number: int) -> bool:
-    mode = MODES.mode(number)
+def enter_number(a: Autopilot, number: int) -> bool:
+    """Enters the mode with this `custom_mode`; whether it may be entered."""
+    mode = a.flavour.modes.mode(number)
     if mode is None or not a.can_enter(mode):
         return False
     if mode is Mode.GUIDED and (a.last_target_us is None or a.now_us - a.last_target_us > _STREAM_US):
@@ -157,29 +125,6 @@ def _enter_number(a: Autopilot, number: int) -> bool:
         vehicle.takeoff_up = vehicle.body.up + vehicle.handling.takeoff_up
     vehicle.set_mode(mode)
     return True
-
-
-def on_set_mode(a: Autopilot, number: int) -> tuple[int, ...]:
-    """SET_MODE: obeyed, if it can be, and never acknowledged."""
-    _enter_number(a, number)
-    return ()
-
-
-def on_position_target(a: Autopilot, message: Message) -> None:
-    """SET_POSITION_TARGET_GLOBAL_INT: kept alive by coming again and again, flown to in OFFBOARD only."""
-    if message.coordinate_frame in _AMSL_FRAMES:
-        up = message.alt - a.home.amsl_mm / 1000
-    else:
-        up = message.alt if message.coordinate_frame in _RELATIVE_FRAMES else nan
-    if message.type_mask & 0b111 or not isfinite(up):
-        return
-    a.last_target_us = a.now_us
-    if a.vehicle.mode is Mode.GUIDED:
-        a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up))
-
-
-def on_data_stream(_a: Autopilot, _stream: int, _rate_hz: int) -> None:
-    """REQUEST_DATA_STREAM: PX4 does not know it; its streams run unasked."""
 
 
 def _mission_start(a: Autopilot, command: Command) -> tuple[int, ...]:
@@ -193,21 +138,15 @@ def _mission_start(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-COMMANDS: Mapping[int, Handler] = {
-    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm_disarm,
+_SHARED = shared(mode=TEMPORARILY_REJECTED, stream=FAILED, says_why=False, message=DENIED, needs_one=True)
+COMMANDS: Mapping[int, Handler] = _SHARED | {
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: arm_disarm(
+        TEMPORARILY_REJECTED, "Arming denied", "mode {}", "Disarming denied: not landed"
+    ),
     mavlink.MAV_CMD_NAV_TAKEOFF: _takeoff,
-    mavlink.MAV_CMD_NAV_LAND: enter(Mode.LAND, TEMPORARILY_REJECTED),
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: enter(Mode.RETURN, TEMPORARILY_REJECTED),
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM: enter(Mode.LOITER, TEMPORARILY_REJECTED),
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
-    mavlink.MAV_CMD_DO_CHANGE_SPEED: change_speed,
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
-    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval(FAILED, say_why=False),
-    mavlink.MAV_CMD_REQUEST_MESSAGE: request_message(DENIED, needs_one=True),
-    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: request_version,
-    mavlink.MAV_CMD_GET_HOME_POSITION: get_home,
-    mavlink.MAV_CMD_RUN_PREARM_CHECKS: run_checks,
 }

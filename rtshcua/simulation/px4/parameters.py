@@ -1,11 +1,9 @@
 """PX4's parameters, as far as this vehicle has them, and how it flies."""
 
-from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.handling import Agility, Handling
+from rtshcua.simulation.handling import Agility, Handling, Stop
 from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.parameters import INT32, Parameter
-from rtshcua.simulation.stopping import Stop
 
 PARAMETERS = (
     Parameter("BAT1_CAPACITY", value=5000),
@@ -75,23 +73,16 @@ _AGILITY = Agility(
 """As measured on recorded flights of PX4 v1.16."""
 
 
-def handling(config: SimulationConfig) -> Handling:
-    """PX4's defaults."""
-    return Handling(
-        agility=_AGILITY,
-        cruise=config.cruise_mm_s / 1000,
-        max_speed=config.max_speed_mm_s / 1000,
-        climb=3.0,
-        descent=1.5,
-        takeoff_climb=1.5,
-        land_speed=0.6,
-        land_below=5.0,
-        return_up=config.return_mm / 1000,
-        takeoff_up=2.5,
-        # a failure of attitude is only warned of after the takeoff, unless CBRK_FLIGHTTERM is changed (failsafe.cpp)
-        crash_disarm_s=None,
-        after_takeoff=Mode.LOITER,
-        after_landing=Mode.LOITER,
-        lifts_to_targets=True,
-        comes_back=True,
-    )
+HANDLING = Handling(
+    agility=_AGILITY,
+    climb=3.0,
+    takeoff_climb=1.5,
+    land_speed=0.6,
+    land_below=5.0,
+    # a failure of attitude is only warned of after the takeoff, unless CBRK_FLIGHTTERM is changed (failsafe.cpp)
+    crash_disarm_s=None,
+    after_takeoff=Mode.LOITER,
+    after_landing=Mode.LOITER,
+    lifts_to_targets=True,
+    comes_back=True,
+)

@@ -11,7 +11,7 @@ from rtshcua.adapters.simulator import SimulatorError
 from rtshcua.cli import sim as command
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.simulation.config import Kind
-from rtshcua.simulation.options import config_of, parser
+from rtshcua.simulation.process import config_of, parser
 
 KEY = b"shared/traces test key, 32 bytes"
 

@@ -7,9 +7,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.simulation import faults
-from rtshcua.simulation.fault_text import parse_fault
+from rtshcua.simulation.faults import parse_fault
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.wind import Wind
+from rtshcua.simulation.surroundings import Wind
 
 S = 1_000_000
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.simulation.config import HOME
-from rtshcua.simulation.fence import Area, Circle, Limits, Polygon, problem
+from rtshcua.simulation.fence import Area, Circle, Limits, Polygon
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
-from rtshcua.simulation.plan import from_message
+from rtshcua.simulation.plans import draws_no_fence, from_message
 from virtual import plans as p
 
 Pilots = Callable[..., Any]
@@ -100,7 +100,7 @@ def test_what_is_uploaded_becomes_an_area(pilot: Pilots) -> None:
         (5000, 0, (0, 0, 0, 0), 0, 0, 0),
     ]
     items = [from_message(p.item(a, row, number, p.FENCE)) for number, row in enumerate(rows)]
-    assert not problem([item for item in items if item])
+    assert not draws_no_fence([item for item in items if item])
     area = Area.of([item for item in items if item], HOME, every=False)
     for place, allowed in {(40, 0): 1, (20, 0): 0, (0, 0): 0, (0, 100): 1, (60, 0): 0, (0, 55): 0}.items():
         assert area.holds(*place) == bool(allowed)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.wind import Wind
+from rtshcua.simulation.surroundings import Wind
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The parts by themselves: braking, battery, link, parameters."""
 
+from dataclasses import replace
 from math import degrees, hypot, tan
 from random import Random
 
@@ -9,13 +10,13 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.simulation.battery import Battery, flight_load
-from rtshcua.simulation.config import Kind, SimulationConfig
-from rtshcua.simulation.flavours import FLAVOURS
+from rtshcua.simulation.config import Kind
 from rtshcua.simulation.guidance import towards
 from rtshcua.simulation.kinematics import GRAVITY, JERK, MAX_AIRSPEED, MAX_LEAN, Approach, Body
 from rtshcua.simulation.link import Link
 from rtshcua.simulation.parameters import Parameters
-from rtshcua.simulation.px4.parameters import PARAMETERS, handling
+from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
+from rtshcua.simulation.world import FLAVOURS
 
 DT = 0.02
 
@@ -38,7 +39,7 @@ def test_the_distance_to_stop_is_the_inverse_of_the_speed_to_stop_from(
 def test_it_arrives_and_stops_without_much_overshoot(
     flavour: Kind, north: float, east: float, speed: float, wind_north: float, wind_east: float
 ) -> None:
-    agility = FLAVOURS[flavour].handling(SimulationConfig()).agility
+    agility = FLAVOURS[flavour].handling.agility
     body, wind = Body(), (wind_north, wind_east)
     closest = distance = hypot(north, east)
     for _ in range(round((distance / speed + 30) / DT)):
@@ -96,7 +97,7 @@ def test_voltage_falls_with_the_level_and_sags_under_load() -> None:
         battery.drain(100, 1.0)
     assert resting == sorted(resting, reverse=True)
     assert (resting[0], resting[-1]) == (16_800, 12_800)
-    battery.measure(10_200)
+    battery.forced_mv = 10_200
     assert battery.millivolts == 10_200
 
 
@@ -132,7 +133,7 @@ def test_link_keeps_the_order_when_the_delay_shrinks() -> None:
 
 def test_integer_parameters_travel_as_bytes_or_as_floats() -> None:
     for bytewise in (True, False):
-        parameters = Parameters(PARAMETERS, handling(SimulationConfig()), bytewise)
+        parameters = Parameters(PARAMETERS, replace(HANDLING), bytewise)
         message = parameters.read("MAV_SYS_ID", -1)
         assert message.param_type == mavlink.MAV_PARAM_TYPE_INT32
         assert (message.param_value == 1.0) is not bytewise
@@ -141,7 +142,7 @@ def test_integer_parameters_travel_as_bytes_or_as_floats() -> None:
 
 
 def test_parameters_set_how_it_flies_and_echo() -> None:
-    flown = handling(SimulationConfig())
+    flown = replace(HANDLING)
     parameters = Parameters(PARAMETERS, flown, bytewise=True)
     assert parameters.write("RTL_RETURN_ALT", 45.0, mavlink.MAV_PARAM_TYPE_REAL32).param_value == 45.0
     assert flown.return_up == 45.0

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from rtshcua.simulation.faults import Pillar as Standing
 from rtshcua.simulation.kinematics import Body
-from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS, Pillar, Surroundings
+from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS, Cylinder, Surroundings
 
 BEAM = pi / SECTORS
 
 
-def naive(pillar: Pillar, body: Body, bearing: float) -> float | None:
+def naive(pillar: Cylinder, body: Body, bearing: float) -> float | None:
     """Walks along many rays of the beam."""
     for step in range(round(RANGE_MAX_M / 0.05)):
         for ray in range(-10, 11):
@@ -28,13 +28,13 @@ def naive(pillar: Pillar, body: Body, bearing: float) -> float | None:
 
 @given(st.floats(-30, 30), st.floats(-30, 30), st.floats(0.5, 5), st.floats(-pi, pi))
 def test_the_distance_is_that_of_a_walk_along_the_beam(north: float, east: float, radius: float, yaw: float) -> None:
-    pillar, body = Pillar(north, east, radius, 20.0), Body(yaw=yaw)
+    pillar, body = Cylinder(north, east, radius, 20.0), Body(yaw=yaw)
     surroundings = Surroundings()
     surroundings.pillars.append(pillar)
     seen, walked = surroundings.ahead(body), naive(pillar, body, yaw)
     if walked is None or seen is None:
         # a hair's breadth on the edge of the beam, or of the range
-        edge = Pillar(north, east, radius * 0.98 - 0.05, 20.0), Pillar(north, east, radius * 1.02 + 0.05, 20.0)
+        edge = Cylinder(north, east, radius * 0.98 - 0.05, 20.0), Cylinder(north, east, radius * 1.02 + 0.05, 20.0)
         assert walked is seen or naive(edge[0], body, yaw) is None or naive(edge[1], body, yaw) is not None
     else:
         assert abs(max(walked, RANGE_MIN_M) - seen) < 0.3
@@ -42,7 +42,7 @@ def test_the_distance_is_that_of_a_walk_along_the_beam(north: float, east: float
 
 def test_all_around_and_from_above() -> None:
     surroundings = Surroundings()
-    surroundings.pillars += [Pillar(10.0, 0.0, 1.0, 5.0), Pillar(0.0, 20.0, 1.0, 30.0)]
+    surroundings.pillars += [Cylinder(10.0, 0.0, 1.0, 5.0), Cylinder(0.0, 20.0, 1.0, 30.0)]
     around = surroundings.around(Body(yaw=pi / 2))
     assert around[0] == pytest.approx(19.0)
     assert around[54] == pytest.approx(9.0)
@@ -54,7 +54,7 @@ def test_all_around_and_from_above() -> None:
 
 def test_the_nearer_one_hides_the_other_and_the_range_ends() -> None:
     surroundings = Surroundings()
-    surroundings.pillars += [Pillar(30.0, 0.0, 1.0, 9.0), Pillar(15.0, 0.0, 1.0, 9.0)]
+    surroundings.pillars += [Cylinder(30.0, 0.0, 1.0, 9.0), Cylinder(15.0, 0.0, 1.0, 9.0)]
     assert surroundings.ahead(Body()) == pytest.approx(14.0)
     assert surroundings.ahead(Body(north=-30.0)) is None
     assert surroundings.ahead(Body(north=14.5)) == RANGE_MIN_M

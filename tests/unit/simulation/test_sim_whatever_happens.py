@@ -12,7 +12,7 @@ from rtshcua.simulation import faults
 from rtshcua.simulation.config import Boot, Kind, SimulationConfig
 from rtshcua.simulation.kinematics import MAX_FALL
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.wind import Wind
+from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 
 S = 1_000_000

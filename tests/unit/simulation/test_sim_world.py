@@ -15,7 +15,7 @@ from rtshcua.simulation import faults
 from rtshcua.simulation.config import HOME, Kind, SimulationConfig
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home
-from rtshcua.simulation.wind import Wind
+from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 
 S = 1_000_000

@@ -6,7 +6,7 @@ import pytest
 
 from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
 from rtshcua.onboard.ports import Event
-from rtshcua.simulation.fault_text import parse_fault
+from rtshcua.simulation.faults import parse_fault
 from virtual import case
 from virtual.flight import Flight
 from virtual.sampling import each_once

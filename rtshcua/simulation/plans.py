@@ -1,11 +1,11 @@
 """What is uploaded before a flight: missions, fences and rally points, as items of the MAVLink mission protocol.
 
-https://mavlink.io/en/services/mission.html
+What the items mean to this vehicle, too. https://mavlink.io/en/services/mission.html
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -21,6 +21,53 @@ AMSL_FRAMES = frozenset({mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT}
 RELATIVE_FRAMES = frozenset({mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT})
 PLACELESS_FRAME = mavlink.MAV_FRAME_MISSION
 _LARGEST_E7 = 1_800_000_000
+
+WAYPOINT = mavlink.MAV_CMD_NAV_WAYPOINT
+LOITER = mavlink.MAV_CMD_NAV_LOITER_UNLIM
+LOITER_TIME = mavlink.MAV_CMD_NAV_LOITER_TIME
+RETURN = mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+LAND = mavlink.MAV_CMD_NAV_LAND
+TAKEOFF = mavlink.MAV_CMD_NAV_TAKEOFF
+DELAY = mavlink.MAV_CMD_NAV_DELAY
+SPEED = mavlink.MAV_CMD_DO_CHANGE_SPEED
+JUMP = mavlink.MAV_CMD_DO_JUMP
+WAYPOINTS = frozenset({WAYPOINT, LOITER, LOITER_TIME})
+"""Items that fly to a place."""
+NAVIGATION = WAYPOINTS | frozenset({RETURN, LAND, TAKEOFF, DELAY})
+"""Items that take time."""
+PASSED_BY = frozenset(
+    {
+        mavlink.MAV_CMD_CONDITION_YAW,
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        mavlink.MAV_CMD_DO_SET_ROI_NONE,
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+        mavlink.MAV_CMD_SET_CAMERA_MODE,
+        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
+        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+    }
+)
+"""Items for cameras and gimbals, of which this vehicle has none: they are done at once."""
+FLOWN = NAVIGATION | PASSED_BY | {SPEED, JUMP}
+
+INCLUDED = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+EXCLUDED = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+ROUND_INCLUDED = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
+ROUND_EXCLUDED = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+RETURN_POINT = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
+POLYGONS = (INCLUDED, EXCLUDED)
+CIRCLES = (ROUND_INCLUDED, ROUND_EXCLUDED)
+FENCE_ITEMS = frozenset({*POLYGONS, *CIRCLES, RETURN_POINT})
+_FEWEST_VERTICES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +116,29 @@ def to_message(item: Item, sequence: int, kind: int, to: tuple[int, int], whole:
         return mavlink.MAVLink_mission_item_int_message(*head, item.x, item.y, item.z, kind)
     scale = 1.0 if item.frame == PLACELESS_FRAME else 1e-7
     return mavlink.MAVLink_mission_item_message(*head, item.x * scale, item.y * scale, item.z, kind)
+
+
+def draws_no_fence(items: Sequence[Item]) -> bool:
+    """Whether the items draw no fence: vertices too few or of mixed count, a circle without a radius."""
+    at = 0
+    while at < len(items):
+        item = items[at]
+        if item.command in CIRCLES:
+            if not 0 < item.p1 < inf:
+                return True
+            at += 1
+        elif item.command in POLYGONS:
+            if not _FEWEST_VERTICES <= item.p1 < inf:
+                return True
+            vertices = items[at : at + int(item.p1)]
+            if len(vertices) < int(item.p1) or any((v.command, v.p1) != (item.command, item.p1) for v in vertices):
+                return True
+            at += len(vertices)
+        elif item.command == RETURN_POINT:
+            at += 1
+        else:
+            return True
+    return False
 
 
 class Plans:

@@ -7,27 +7,40 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
 from rtshcua.simulation.autopilot import Autopilot, Builder
-from rtshcua.simulation.mission_telemetry import mission_current
-from rtshcua.simulation.px4.targets import position_target
-from rtshcua.simulation.questions import CURRENT_MODE, current_mode
-from rtshcua.simulation.telemetry import COMMON, LOST_FLAGS
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.telemetry import (
+    COMMON,
+    CURRENT_MODE,
+    LOST_FLAGS,
+    autopilot_version,
+    current_mode,
+    extended_sys_state,
+)
+
+_NAVIGATED = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND})
+"""The modes in which the navigator sets one; a pilot's modes, OFFBOARD and circling have none."""
+
+
+def _position_target(a: Autopilot) -> Message | None:
+    """POSITION_TARGET_GLOBAL_INT: the position setpoint, whenever there is one and it steers by position.
+
+    As recorded from v1.16: altitude above the sea, and 0 in Land; all fields of the mask are valid.
+    """
+    vehicle = a.vehicle
+    target = vehicle.destination
+    if target is None or vehicle.mode not in _NAVIGATED or not vehicle.armed:
+        return None
+    latitude, longitude = a.home.globe(target.north, target.east)
+    amsl = 0.0 if vehicle.mode is Mode.LAND else a.home.amsl_mm / 1000 + target.up
+    body = vehicle.body
+    velocity = (body.v_north, body.v_east, -body.v_up)
+    return mavlink.MAVLink_position_target_global_int_message(
+        a.boot_ms, mavlink.MAV_FRAME_GLOBAL_INT, 0, latitude, longitude, amsl, *velocity, 0.0, 0.0, 0.0, body.yaw, 0.0
+    )
+
 
 _BOOT_FLAGS, _FIRST_FLAGS, _GOOD_FLAGS = 0x480, 0x0E5, 0x3FF
 """As recorded from PX4 v1.16: at first, when it knows its attitude, and in good health on the ground."""
-_CAPABILITIES = (
-    mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
-)
-_VERSION = 1 << 24 | 16 << 16 | 0xFF
-
-
-def _extended_sys_state(a: Autopilot) -> Message:
-    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, a.vehicle.landed)
 
 
 def _estimator_status(a: Autopilot) -> Message | None:
@@ -60,18 +73,14 @@ def _timesync(a: Autopilot) -> Message:
     return mavlink.MAVLink_timesync_message(0, a.now_us * 1000)
 
 
-def _autopilot_version(_: Autopilot) -> Message:
-    zeros = [0] * 8
-    return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 1, zeros, zeros, zeros, 0, 0, 1)
-
-
 BUILDERS: Mapping[int, Builder] = COMMON | {
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_sys_state,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state(mavlink.MAV_VTOL_STATE_UNDEFINED),
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _estimator_status,
     mavlink.MAVLINK_MSG_ID_WIND_COV: _wind_cov,
-    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
-    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version(
+        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE, 1 << 24 | 16 << 16 | 0xFF, 1
+    ),
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _position_target,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,
     CURRENT_MODE: current_mode,
 }

@@ -5,31 +5,36 @@ from collections.abc import Mapping
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
-from rtshcua.simulation.ardupilot.targets import position_target
 from rtshcua.simulation.autopilot import Autopilot, Builder
-from rtshcua.simulation.mission_telemetry import mission_current
-from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS
+from rtshcua.simulation.modes import Mode
+from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS, autopilot_version, extended_sys_state
 
-_CAPABILITIES = (
-    mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
-)
-_VERSION = 4 << 24 | 7 << 16
+_PLACE_ONLY = 0xFDF8
+"""`type_mask`: only the place counts; the last byte's upper half is set as well (`send_position_target_global_int`)."""
+
+
+def _position_target(a: Autopilot) -> Message | None:
+    """POSITION_TARGET_GLOBAL_INT: what `get_wp` of the mode gives, if it gives anything; altitude above the sea.
+
+    `ModeGuided::get_wp` has one only after a position target: not after entering the mode, nor in the takeoff.
+    `ModeRTL::get_wp` has one until the landing. Other modes have none.
+    """
+    vehicle = a.vehicle
+    target, mode = vehicle.destination, vehicle.mode
+    has_one = vehicle.sent if mode in (Mode.GUIDED, Mode.MISSION) else mode is Mode.RETURN and not vehicle.descends
+    if target is None or not has_one:
+        return None
+    latitude, longitude = a.home.globe(target.north, target.east)
+    amsl = a.home.amsl_mm / 1000 + target.up
+    return mavlink.MAVLink_position_target_global_int_message(
+        a.boot_ms, mavlink.MAV_FRAME_GLOBAL, _PLACE_ONLY, latitude, longitude, amsl, *[0.0] * 8
+    )
 
 
 _FIRST_FLAGS = 0x0A7
 """As recorded: attitude and height, and held to be at rest."""
 _GLITCHING = 1 << 15
 """EKF_GPS_GLITCHING of ArduPilot's EKF_STATUS_FLAGS; the dialect does not have it."""
-
-
-def _extended_sys_state(a: Autopilot) -> Message:
-    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_MC, a.vehicle.landed)
 
 
 def _ekf_status_report(a: Autopilot) -> Message | None:
@@ -59,18 +64,14 @@ def _timesync(a: Autopilot) -> Message:
     return mavlink.MAVLink_timesync_message(0, a.now_us * 1000 + a.system)
 
 
-def _autopilot_version(_: Autopilot) -> Message:
-    zeros = [0] * 8
-    return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0)
-
-
 BUILDERS: Mapping[int, Builder] = COMMON | {
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_sys_state,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state(mavlink.MAV_VTOL_STATE_MC),
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status_report,
     mavlink.MAVLINK_MSG_ID_WIND: _wind,
-    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
-    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version(
+        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT, 4 << 24 | 7 << 16, 0
+    ),
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _position_target,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,
 }
 

@@ -1,4 +1,4 @@
-"""Commands that both flavours obey alike, but for the results they refuse with."""
+"""Commands that both flavours obey alike, but for the results and the words they refuse with."""
 
 from math import isnan
 
@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
 from rtshcua.simulation.modes import Mode
-from rtshcua.simulation.questions import AVAILABLE_MODES, available_modes
+from rtshcua.simulation.telemetry import AVAILABLE_MODES, available_modes
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
@@ -19,7 +19,7 @@ FORCE = 21196
 """Parameter 2 of COMPONENT_ARM_DISARM that overrides every check."""
 
 
-def request_message(refused: int, needs_one: bool) -> Handler:
+def _request_message(refused: int, needs_one: bool) -> Handler:
     """MAV_CMD_REQUEST_MESSAGE; `refused` answers for a message that the vehicle does not have.
 
     `needs_one`: for one that it has nothing to tell in, too.
@@ -37,7 +37,7 @@ def request_message(refused: int, needs_one: bool) -> Handler:
     return handle
 
 
-def set_message_interval(refused: int, say_why: bool) -> Handler:
+def _set_message_interval(refused: int, say_why: bool) -> Handler:
     """MAV_CMD_SET_MESSAGE_INTERVAL; `refused` answers for a stream that the vehicle does not have."""
 
     def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
@@ -55,13 +55,13 @@ def set_message_interval(refused: int, say_why: bool) -> Handler:
     return handle
 
 
-def request_version(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _request_version(a: Autopilot, _: Command) -> tuple[int, ...]:
     """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION](a))
     return (ACCEPTED,)
 
 
-def run_checks(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _run_checks(a: Autopilot, _: Command) -> tuple[int, ...]:
     """MAV_CMD_RUN_PREARM_CHECKS: refused while armed; what stands against arming comes as texts."""
     if a.vehicle.armed:
         return (TEMPORARILY_REJECTED,)
@@ -70,20 +70,20 @@ def run_checks(a: Autopilot, _: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def get_home(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _get_home(a: Autopilot, _: Command) -> tuple[int, ...]:
     """MAV_CMD_GET_HOME_POSITION."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_HOME_POSITION](a))
     return (ACCEPTED,)
 
 
-def change_speed(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _change_speed(a: Autopilot, command: Command) -> tuple[int, ...]:
     """MAV_CMD_DO_CHANGE_SPEED of the ground speed."""
     if command.p2 > 0:
         a.vehicle.speed = command.p2
     return (ACCEPTED,)
 
 
-def enter(mode: Mode, refused: int) -> Handler:
+def _enter(mode: Mode, refused: int) -> Handler:
     """A command that changes the mode and nothing else; `refused` answers when the mode cannot be entered."""
 
     def handle(a: Autopilot, _: Command) -> tuple[int, ...]:
@@ -94,3 +94,48 @@ def enter(mode: Mode, refused: int) -> Handler:
         return (ACCEPTED,)
 
     return handle
+
+
+def arm_disarm(refused: int, arming: str, mode: str, landing: str) -> Handler:
+    """MAV_CMD_COMPONENT_ARM_DISARM: refused with the reasons after `arming`, `mode` being what is said of a mode.
+
+    `landing` is said when it is not to disarm in the air; nothing, if that is empty.
+    """
+
+    def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
+        vehicle, forced, modes = a.vehicle, whole(command.p2) == FORCE, a.flavour.modes
+        if whole(command.p1) == 1:
+            if vehicle.armed or forced or (a.ready and vehicle.mode in modes.armable):
+                vehicle.arm()
+                return (ACCEPTED,)
+            for reason in a.flavour.arming(a) or (mode.format(modes.name(vehicle.mode)),):
+                a.say(mavlink.MAV_SEVERITY_CRITICAL, f"{arming}: {reason}")
+            return (refused,)
+        if whole(command.p1) != 0:
+            return (UNSUPPORTED,)
+        if vehicle.in_air and not forced:
+            if landing:
+                a.say(mavlink.MAV_SEVERITY_CRITICAL, landing)
+            return (refused,)
+        vehicle.disarm()
+        return (ACCEPTED,)
+
+    return handle
+
+
+def shared(*, mode: int, stream: int, says_why: bool, message: int, needs_one: bool) -> dict[int, Handler]:
+    """The handlers, by command; `mode`, `stream` and `message` are the results when there is none such.
+
+    `says_why`: a text names the stream; `needs_one`: a message without anything to tell is refused, too.
+    """
+    return {
+        mavlink.MAV_CMD_NAV_LAND: _enter(Mode.LAND, mode),
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _enter(Mode.RETURN, mode),
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM: _enter(Mode.LOITER, mode),
+        mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval(stream, says_why),
+        mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message(message, needs_one),
+        mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_version,
+        mavlink.MAV_CMD_GET_HOME_POSITION: _get_home,
+        mavlink.MAV_CMD_RUN_PREARM_CHECKS: _run_checks,
+    }

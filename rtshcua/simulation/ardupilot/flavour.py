@@ -1,0 +1,301 @@
+"""ArduCopter, as recorded from 4.7: its modes, how it comes up, what it refuses, what it does when nobody asks.
+
+It asks for items with the legacy MISSION_REQUEST and takes either form. Slot 0 of a mission is home, whatever was
+uploaded there. Whether a waypoint is outside the fence it asks neither at upload nor at the start.
+"""
+
+from collections.abc import Callable
+from math import inf
+from types import MappingProxyType
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.codec.frames import Message
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
+from rtshcua.simulation.ardupilot.commands import COMMANDS, above_home, enter_number
+from rtshcua.simulation.ardupilot.parameters import HANDLING, PARAMETERS
+from rtshcua.simulation.ardupilot.telemetry import BUILDERS, DEFAULT, GROUPS
+from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
+from rtshcua.simulation.failsafe import FailsafeRules
+from rtshcua.simulation.fence import Area, Breach, Circle, FenceRules, Limits
+from rtshcua.simulation.mission import MissionRules
+from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
+from rtshcua.simulation.place import Home, Point
+from rtshcua.simulation.plans import (
+    FENCE,
+    FENCE_ITEMS,
+    LAND,
+    LOITER,
+    LOITER_TIME,
+    MISSION,
+    RALLY,
+    RETURN,
+    TAKEOFF,
+    WAYPOINT,
+    Item,
+)
+from rtshcua.simulation.sensors import BootPlan
+from rtshcua.simulation.transfer import TransferRules
+from rtshcua.simulation.vehicle import Event, Vehicle
+
+_CRITICAL, _INFO = mavlink.MAV_SEVERITY_CRITICAL, mavlink.MAV_SEVERITY_INFO
+_GUIDED = enums.MAV_MODE_FLAG_GUIDED_ENABLED
+_BASE = (
+    enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    | enums.MAV_MODE_FLAG_STABILIZE_ENABLED
+    | enums.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+)
+"""In every mode; guided in those that hold a place."""
+_REPOSITION_M_S = 1.25
+"""Half of WPNAV_ACCEL, as `land_run_horizontal_control` takes it."""
+
+_CEILING, _CIRCLE, _POLYGON = 1, 2, 4
+"""The bits of FENCE_TYPE; the floor (8) is not in this vehicle."""
+_REPORT, _RETURN, _LAND, _BRAKE = 0, 1, 2, 4
+"""FENCE_ACTION; the smart returns (3, 5) are plain ones here."""
+_GIVE_UP_M = 100.0
+"""So far outside, it lands instead of coming back."""
+_VEL_LIMIT = 2
+
+
+def _limits(value: Callable[[str], float], area: Area) -> Limits | None:
+    """The fence that FENCE_* parameters and the upload make."""
+    kinds = int(value("FENCE_TYPE"))
+    if value("FENCE_ENABLE") < 1:
+        return None
+    included = area.included if kinds & _POLYGON else ()
+    excluded = area.excluded if kinds & _POLYGON else ()
+    if kinds & _CIRCLE:
+        included = (*included, Circle((0.0, 0.0), value("FENCE_RADIUS")))
+    ceiling = value("FENCE_ALT_MAX") if kinds & _CEILING else inf
+    return Limits(Area(included, excluded, every=True), ceiling)
+
+
+def _name(limits: Limits, point: Point) -> str:
+    if point.up > limits.ceiling:
+        return "Max Alt"
+    for shape in limits.area.included:
+        if isinstance(shape, Circle) and shape.centre == (0.0, 0.0) and not shape.holds(point.north, point.east):
+            return "Circle"
+    return "Polygon"
+
+
+_NAMES = {WAYPOINT: "WP", TAKEOFF: "Takeoff", LAND: "Land", RETURN: "RTL", LOITER: "LoitUnlim", LOITER_TIME: "LoitTime"}
+
+
+def _judge(items: tuple[Item, ...], _vehicle: Vehicle, _home: Home, _allows: Callable[[Point], bool]) -> bool:
+    return len(items) > 1
+
+
+def _may_enter(items: tuple[Item, ...], vehicle: Vehicle) -> bool:
+    """Armed and on the ground, only a mission whose first item that takes time is a takeoff."""
+    on_ground = vehicle.armed and not vehicle.in_air
+    return not on_ground or next((item.command for item in items[1:] if item.command in _NAMES), None) == TAKEOFF
+
+
+class ArduCopter(Flavour):
+    """ArduCopter."""
+
+    autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    modes = ModeTable(
+        numbers={
+            Mode.MANUAL: CopterMode.STABILIZE,
+            Mode.ALTITUDE: CopterMode.ALT_HOLD,
+            Mode.MISSION: CopterMode.AUTO,
+            Mode.GUIDED: CopterMode.GUIDED,
+            Mode.LOITER: CopterMode.LOITER,
+            Mode.RETURN: CopterMode.RTL,
+            Mode.LAND: CopterMode.LAND,
+            Mode.POSITION: CopterMode.POSHOLD,
+            Mode.BRAKE: CopterMode.BRAKE,
+        },
+        base={mode: _BASE | (_GUIDED if mode in NEEDS_POSITION or mode is Mode.LAND else 0) for mode in Mode},
+        start=Mode.MANUAL,
+        armable=frozenset({Mode.MANUAL, Mode.ALTITUDE, Mode.GUIDED, Mode.LOITER, Mode.POSITION}),
+        blind=_GUIDED,
+        stands_by=True,
+        names=COPTER_NAMES,
+    )
+    boot = BootPlan(  # the checks pass long before there is a position
+        answers_s=2.5,
+        standby_s=3.0,
+        booting=mavlink.MAV_STATE_BOOT,
+        initialised_s=5.5,
+        attitude_s=6.0,
+        receiver_s=10.0,
+        origin_s=20.0,
+        checks_s=23.5,
+        position_s=41.6,
+        tells_early=True,
+        texts=(
+            (1.9, _INFO, "Barometer 1 calibration complete"),
+            (1.9, _INFO, "Barometer 2 calibration complete"),
+            (2.4, _INFO, "ArduPilot Ready"),
+            (2.4, _INFO, "AHRS: DCM active"),
+            (4.4, _INFO, "EKF3 IMU0 initialised"),
+            (4.4, _INFO, "EKF3 IMU1 initialised"),
+            (4.4, _INFO, "AHRS: EKF3 active"),
+            (5.8, _INFO, "EKF3 IMU0 tilt alignment complete"),
+            (5.8, _INFO, "EKF3 IMU1 tilt alignment complete"),
+            (5.9, _INFO, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
+            (5.9, _INFO, "EKF3 IMU1 MAG0 initial yaw alignment complete"),
+            (9.8, _INFO, "GPS 1: probing for u-blox at 230400 baud"),
+            (9.8, _INFO, "GPS 1: detected u-blox"),
+            (20.0, _INFO, "EKF3 IMU0 origin set"),
+            (20.0, _INFO, "Field Elevation Set: {amsl}m"),
+            (20.2, _INFO, "EKF3 IMU1 origin set"),
+            (41.6, _INFO, "EKF3 IMU0 is using GPS"),
+            (41.6, _INFO, "EKF3 IMU1 is using GPS"),
+        ),
+    )
+    failsafes = FailsafeRules(
+        position=((_CRITICAL, "EKF variance"), (_CRITICAL, "EKF Failsafe: changed to LAND Mode")),
+        position_after_s=0.9,
+        land_pause_s=4.0,
+        position_back=(_CRITICAL, "EKF Failsafe Cleared"),
+        level=(_CRITICAL, "Battery Failsafe"),
+        low_voltage="BATT_LOW_VOLT",
+        low_action="BATT_FS_LOW_ACT",
+        low_text="Battery Failsafe",
+    )
+    texts = MappingProxyType(
+        {
+            Event.ARMED: "Arming motors",
+            Event.DISARMED: "Disarming motors",
+            Event.TOUCHED: "SIM Hit ground at {speed:f} m/s",
+            Event.CRASHED: "Crash: Disarming: AngErr=80>30, Accel=1.0<3.0",
+            Event.AUTO_DISARMED: "Disarming motors",
+        }
+    )
+    texts_need_ground_station = False
+    check_text = "PreArm"
+    beats_on_mode = reminds = tells_fence = True
+    fix = mavlink.GPS_FIX_TYPE_RTK_FIXED
+    coast_s = 7.0
+    handling, parameters = HANDLING, PARAMETERS
+    bytewise = False
+    commands = COMMANDS
+    builders, streams = BUILDERS, DEFAULT
+    transfer = TransferRules(
+        learns_int=False,
+        retry_us=1_000_000,
+        abort_us=8_000_000,
+        on_abort=mavlink.MAV_MISSION_OPERATION_CANCELLED,
+        out_of_order=mavlink.MAV_MISSION_INVALID_SEQUENCE,
+        busy=mavlink.MAV_MISSION_DENIED,
+        opens_downloads=False,
+        capacity={MISSION: 724, FENCE: 84, RALLY: 10},
+        fence_items=FENCE_ITEMS,
+        keeps_home=True,
+    )
+    missions = MissionRules(
+        first=1,
+        judge=_judge,
+        may_enter=_may_enter,
+        judged_us=0,
+        waits_for_start=True,
+        return_is_mode=False,
+        after=None,
+        accept_m=2.0,
+        tells_all=False,
+        text=lambda number, item: f"Mission: {number} {_NAMES.get(item.command, 'Delay')}",
+    )
+    fence = FenceRules(limits=_limits, name=_name, every=True, critical=False)
+
+    def arming(self, a: Autopilot) -> tuple[str, ...]:
+        """What stands against arming. A mode that does without a position can be armed in without one."""
+        found = []
+        if a.vehicle.crashed:
+            found.append("Leaning")
+        if not a.sensors.consistent:
+            found.append("Accels inconsistent")
+        elif a.vehicle.mode in NEEDS_POSITION:
+            if not a.sensors.has_fix:
+                found.append("GPS 1: Bad fix")
+            elif not a.sensors.has_position:
+                found.append("Need Position Estimate")
+        if a.failsafes.low_voltage:
+            found += ["Battery 1 low voltage failsafe", "Battery failsafe"]
+        if a.battery.level <= LOW_TO_ARM:
+            found.append("Battery 1 below minimum arming capacity")
+        if not a.fence.allows(a.here):
+            found.append("Vehicle breaching fence")
+        return tuple(found)
+
+    def insists(self, a: Autopilot) -> bool:
+        """With a key, it always wants signatures."""
+        return True
+
+    def home_item(self, home: Home) -> Item | None:
+        """Slot 0 of every mission."""
+        return Item(WAYPOINT, mavlink.MAV_FRAME_GLOBAL, x=home.latitude, y=home.longitude, z=home.amsl_mm / 1000)
+
+    def on_setup_signing(self, a: Autopilot, message: Message) -> None:
+        """Never while armed, as recorded; not even to switch it off."""
+        if a.vehicle.armed:
+            a.say(mavlink.MAV_SEVERITY_WARNING, "ERROR: Won't setup signing when armed")
+        else:
+            a.signing.set_up(message, a.now_us)
+
+    def on_set_mode(self, a: Autopilot, number: int) -> tuple[int, ...]:
+        """Acknowledged with the message's own number as the command."""
+        return enter_number(a, number)
+
+    def on_position_target(self, a: Autopilot, message: Message) -> None:
+        """Flown to in GUIDED and in the air, ignored in silence else.
+
+        Targets of velocity alone are ignored too: this vehicle does not fly them.
+        """
+        up = above_home(a, message.coordinate_frame, message.alt)
+        if a.vehicle.mode is Mode.GUIDED and up is not None and not message.type_mask & 0b111:
+            target = Point(*a.home.local(message.lat_int, message.lon_int), up)
+            if a.fence.allows(target):
+                a.vehicle.go_to(target)
+
+    def on_data_stream(self, a: Autopilot, stream: int, rate_hz: int) -> None:
+        """Sets every message of the group, whatever SET_MESSAGE_INTERVAL said before."""
+        for number in GROUPS.get(stream, ()):
+            a.streams.set(number, 1_000_000 // rate_hz if rate_hz > 0 else -1)
+
+    def on_plan(self, a: Autopilot, kind: int) -> None:
+        """Tells that a plan was stored, and how many items it has."""
+        if kind == MISSION:
+            a.say(_INFO, "Flight plan received")
+        elif kind == FENCE:
+            a.say(mavlink.MAV_SEVERITY_DEBUG, "Fence Indexed OK")
+        name = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}[kind]
+        a.send(a.parameters.assign(name, len(a.plans.items(kind))))
+
+    def on_sticks(self, a: Autopilot, for_us: int) -> None:
+        """LAND_REPOSITION: moves it aside while it lands, and in the modes that the sticks fly."""
+        vehicle = a.vehicle
+        if vehicle.mode in (Mode.LOITER, Mode.POSITION) or vehicle.descends:
+            vehicle.shift_east(_REPOSITION_M_S * for_us / 1_000_000)
+
+    def on_breach(self, a: Autopilot, breach: Breach) -> None:
+        """Tells of it, and does what FENCE_ACTION asks for, once.
+
+        Whoever changes the mode after that is obeyed for as long as the breach lasts ("Manual recovery"), as recorded.
+        """
+        kind = mavlink.FENCE_BREACH_MAXALT if breach.name == "Max Alt" else mavlink.FENCE_BREACH_BOUNDARY
+        count = min(a.fence.count, 65_535)
+        a.send(mavlink.MAVLink_fence_status_message(1, count, kind, a.boot_ms, _VEL_LIMIT))
+        a.say(mavlink.MAV_SEVERITY_NOTICE, f"{breach.name} fence breached")
+        action, vehicle = a.parameters.value("FENCE_ACTION"), a.vehicle
+        if action == _REPORT:
+            return
+        if action == _LAND or breach.by > _GIVE_UP_M:
+            vehicle.set_mode(Mode.LAND)
+        elif action == _BRAKE:
+            vehicle.set_mode(Mode.BRAKE)
+        else:
+            vehicle.set_mode(Mode.RETURN)
+
+    def on_mode_in_breach(self, a: Autopilot) -> None:
+        """A new mode while the fence is breached counts as the pilot bringing it back."""
+        a.say(_INFO, "Manual recovery started")
+
+    def on_breach_cleared(self, a: Autopilot) -> None:
+        """The vehicle is inside again."""
+        a.say(mavlink.MAV_SEVERITY_NOTICE, "Fence breach cleared")

@@ -1,0 +1,236 @@
+"""PX4, as recorded from v1.16: its modes, how it comes up, what it refuses, and what it does when nobody asks.
+
+An upload is acknowledged before the mission is judged, so the ACK says nothing about whether it will fly; until the
+judgement is there the one before stands, and MISSION_START right behind an upload is denied, as recorded.
+"""
+
+from collections.abc import Callable
+from math import hypot, inf, isfinite, nan
+from types import MappingProxyType
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.codec.frames import Message
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
+from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
+from rtshcua.simulation.failsafe import FailsafeRules
+from rtshcua.simulation.fence import Area, Breach, Circle, FenceRules, Limits
+from rtshcua.simulation.mission import MissionRules
+from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
+from rtshcua.simulation.place import Home, Point
+from rtshcua.simulation.plans import (
+    AMSL_FRAMES,
+    FENCE,
+    FENCE_ITEMS,
+    MISSION,
+    NAVIGATION,
+    RALLY,
+    RELATIVE_FRAMES,
+    RETURN_POINT,
+    Item,
+)
+from rtshcua.simulation.px4.commands import COMMANDS, enter_number
+from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
+from rtshcua.simulation.px4.telemetry import BUILDERS, CONSTANT, DEFAULT, LEAST_US, ONLY_STREAMED
+from rtshcua.simulation.sensors import BootPlan
+from rtshcua.simulation.transfer import ERROR, TransferRules
+from rtshcua.simulation.vehicle import Event, Vehicle
+
+_CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
+_ORBITS = enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | enums.MAV_MODE_FLAG_STABILIZE_ENABLED
+_BY_PILOT = _ORBITS | enums.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+_BY_ITSELF = _ORBITS | enums.MAV_MODE_FLAG_AUTO_ENABLED | enums.MAV_MODE_FLAG_GUIDED_ENABLED
+_AUTOMATIC = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND, Mode.ORBIT})
+
+_WARN, _HOLD, _RETURN, _TERMINATE, _LAND = 1, 2, 3, 4, 5
+"""GF_ACTION; 0 is nothing."""
+
+
+def _limits(value: Callable[[str], float], area: Area) -> Limits | None:
+    """The fence that GF_* parameters and the upload make."""
+    if value("GF_ACTION") == 0:
+        return None
+    across, high = value("GF_MAX_HOR_DIST"), value("GF_MAX_VER_DIST")
+    if area == Area() and not across > 0 and not high > 0:
+        return None
+    if across > 0 and not area.included:  # with areas, the places allowed are those of the areas
+        area = Area((Circle((0.0, 0.0), across),), area.excluded)
+    return Limits(area, high if high > 0 else inf)
+
+
+FARTHEST_FIRST_M = 10_000.0
+"""MIS_DIST_1WP: farther than this from home the first waypoint may not be."""
+
+
+def _judge(items: tuple[Item, ...], _vehicle: Vehicle, home: Home, allows: Callable[[Point], bool]) -> bool:
+    """The feasibility check: every place inside the fence, the first one not too far; else the mission is not flown."""
+    first = True
+    for item in items:
+        if item.command not in NAVIGATION or not item.has_place:
+            continue
+        north, east = home.local(item.x, item.y)
+        up = item.z - home.amsl_mm / 1000 if item.frame in AMSL_FRAMES else item.z
+        if not allows(Point(north, east, up if isfinite(up) else 0.0)):
+            return False
+        if first and hypot(north, east) > FARTHEST_FIRST_M:
+            return False
+        first = False
+    return bool(items)
+
+
+class Px4(Flavour):
+    """PX4."""
+
+    autopilot = mavlink.MAV_AUTOPILOT_PX4
+    modes = ModeTable(
+        numbers={
+            Mode.MANUAL: Px4Mode.MANUAL,
+            Mode.ALTITUDE: Px4Mode.ALTITUDE,
+            Mode.POSITION: Px4Mode.POSITION,
+            Mode.ORBIT: Px4Mode.ORBIT,
+            Mode.TAKEOFF: Px4Mode.TAKEOFF,
+            Mode.LOITER: Px4Mode.HOLD,
+            Mode.MISSION: Px4Mode.MISSION,
+            Mode.RETURN: Px4Mode.RETURN,
+            Mode.LAND: Px4Mode.LAND,
+            Mode.GUIDED: Px4Mode.OFFBOARD,
+        },
+        base=dict.fromkeys(Mode, _BY_ITSELF)
+        | dict.fromkeys((Mode.MANUAL, Mode.ALTITUDE, Mode.POSITION), _BY_PILOT)
+        | {Mode.ORBIT: _ORBITS},
+        start=Mode.LOITER,
+        armable=frozenset(Mode) - {Mode.RETURN, Mode.LAND},
+        names=PX4_NAMES,
+    )
+    boot = BootPlan(
+        answers_s=0.2,
+        standby_s=3.8,
+        booting=mavlink.MAV_STATE_UNINIT,
+        initialised_s=0.5,
+        attitude_s=1.6,
+        receiver_s=0.1,
+        origin_s=1.9,
+        checks_s=5.0,
+        position_s=2.4,
+        tells_early=False,
+    )
+    failsafes = FailsafeRules(
+        position=((_CRITICAL, "Failsafe: no global position, landing blindly\t"),),
+        level=(_CRITICAL, "Emergency battery level, landing immediately\t"),
+    )
+    texts = MappingProxyType(
+        {
+            Event.ARMED: "Armed by external command\t",
+            Event.DISARMED: "Disarmed by external command\t",
+            Event.TAKEOFF: "Takeoff detected\t",
+            Event.RETURN: "Returning to launch\t",
+            Event.RETURN_CLIMB: "RTL: start return at {amsl} m ({up} m above destination)\t",
+            Event.HOME: "RTL: land at destination\t",
+            Event.LANDED: "Landing detected\t",
+            Event.TIPPED: "Attitude failure detected\t",
+            Event.AUTO_DISARMED: "Disarmed by landing\t",
+        }
+    )
+    texts_need_ground_station = True
+    check_text = "Preflight Fail"
+    beats_on_mode = reminds = tells_fence = False
+    fix = mavlink.GPS_FIX_TYPE_3D_FIX
+    coast_s = 5.0
+    handling, parameters = HANDLING, PARAMETERS
+    bytewise = True
+    commands = COMMANDS
+    target_timeout_us = 1_000_000
+    builders, streams = BUILDERS, DEFAULT
+    constant, only_streamed, least_us = CONSTANT, ONLY_STREAMED, LEAST_US
+    transfer = TransferRules(
+        learns_int=True,
+        retry_us=250_000,
+        abort_us=5_000_000,
+        on_abort=None,
+        out_of_order=None,
+        busy=ERROR,
+        opens_downloads=True,
+        capacity={MISSION: 500, FENCE: 64, RALLY: 32},
+        fence_items=FENCE_ITEMS - {RETURN_POINT},
+        keeps_home=False,
+    )
+    missions = MissionRules(
+        first=0,
+        judge=_judge,
+        may_enter=lambda _items, _vehicle: True,
+        judged_us=150_000,
+        waits_for_start=False,
+        return_is_mode=True,
+        after=Mode.LOITER,
+        accept_m=2.0,
+        tells_all=True,
+        text=lambda _number, _item: None,
+    )
+    fence = FenceRules(limits=_limits, name=lambda _limits, _point: "Geofence", every=False, critical=True)
+
+    def arming(self, a: Autopilot) -> tuple[str, ...]:
+        """What stands against arming PX4."""
+        found = []
+        if a.vehicle.crashed:
+            found.append("Attitude failure (roll)")
+        if not a.sensors.consistent:
+            found.append("system is starting up")
+        if a.vehicle.mode in NEEDS_POSITION and not a.sensors.has_position:
+            found.append("no valid global position")
+        if a.sensors.receives and not a.sensors.has_fix:
+            found.append("GPS fix too low")
+        if a.battery.level <= LOW_TO_ARM:
+            found.append("battery too low")
+        if not a.fence.allows(a.here):
+            found.append("vehicle outside geofence")
+        return tuple(found)
+
+    def insists(self, a: Autopilot) -> bool:
+        """MAV_SIGN_CFG: 0, the default, signs what it sends and takes what is not signed; 1 and 2 want signatures."""
+        return a.parameters.value("MAV_SIGN_CFG") > 0
+
+    def on_set_mode(self, a: Autopilot, number: int) -> tuple[int, ...]:
+        """Obeyed, if it can be, and never acknowledged."""
+        enter_number(a, number)
+        return ()
+
+    def on_position_target(self, a: Autopilot, message: Message) -> None:
+        """Kept alive by coming again and again, flown to in OFFBOARD only."""
+        if message.coordinate_frame in AMSL_FRAMES:
+            up = message.alt - a.home.amsl_mm / 1000
+        else:
+            up = message.alt if message.coordinate_frame in RELATIVE_FRAMES else nan
+        if message.type_mask & 0b111 or not isfinite(up):
+            return
+        a.last_target_us = a.now_us
+        if a.vehicle.mode is Mode.GUIDED:
+            a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up))
+
+    def on_sticks(self, a: Autopilot, for_us: int) -> None:
+        """COM_RC_OVERRIDE: sticks leave an automatic mode for Position, or for Altitude without a position."""
+        vehicle = a.vehicle
+        if vehicle.armed and vehicle.mode in _AUTOMATIC:
+            vehicle.set_mode(Mode.POSITION if a.can_enter(Mode.POSITION) else Mode.ALTITUDE)
+
+    def on_breach(self, a: Autopilot, breach: Breach) -> None:
+        """Does what GF_ACTION asks for, once; whoever then commands something else is obeyed, as recorded.
+
+        Holding is at the place where the breach was seen: it comes back to there.
+        """
+        action, vehicle = a.parameters.value("GF_ACTION"), a.vehicle
+        if action == _WARN:
+            a.say(mavlink.MAV_SEVERITY_WARNING, "Geofence exceeded\t")
+        elif action == _RETURN:
+            a.say(_CRITICAL, "Failsafe activated: switching to Return\t")
+            vehicle.set_mode(Mode.RETURN)
+        elif action == _TERMINATE:
+            a.say(mavlink.MAV_SEVERITY_EMERGENCY, "Failsafe activated: terminating\t")
+            vehicle.disarm()
+        elif action == _LAND:
+            a.say(_CRITICAL, "Failsafe activated: switching to Land\t")
+            vehicle.set_mode(Mode.LAND)
+        else:
+            a.say(_CRITICAL, "Failsafe activated: switching to Hold\t")
+            vehicle.set_mode(Mode.LOITER)
+            vehicle.go_to(Point(vehicle.body.north, vehicle.body.east, vehicle.body.up))

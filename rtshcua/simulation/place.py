@@ -6,6 +6,7 @@ from math import copysign, cos, pi, radians
 _METRES_PER_E7 = 6_378_137 * pi / 180e7
 """Metres of one 1e-7 degree of latitude, on a sphere of the equatorial radius: 0.5 % off at most."""
 _HALF_TURN_E7 = 1_800_000_000
+_MOST_E7 = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +35,12 @@ class Home:
         return north, east * _METRES_PER_E7 * self._shrink()
 
     def globe(self, north: float, east: float) -> tuple[int, int]:
-        """Latitude and longitude in 1e-7 degree: the inverse of `local`."""
+        """Latitude and longitude in 1e-7 degree: the inverse of `local`, as far as the 32 bits of messages hold it."""
         longitude = self.longitude + round(east / _METRES_PER_E7 / self._shrink())
         if abs(longitude) > _HALF_TURN_E7:
             longitude -= 2 * _HALF_TURN_E7 if longitude > 0 else -2 * _HALF_TURN_E7
-        return self.latitude + round(north / _METRES_PER_E7), longitude
+        latitude = self.latitude + round(north / _METRES_PER_E7)
+        return max(-_MOST_E7, min(_MOST_E7, latitude)), max(-_MOST_E7, min(_MOST_E7, longitude))
 
     def _shrink(self) -> float:
         return cos(radians(self.latitude / 1e7))

@@ -180,6 +180,15 @@ def test_commands_with_any_parameters_are_answered(pilot: Callable[..., Any], fl
         p.wait(0.02)
 
 
+@pytest.mark.parametrize("degrees", [214.8, 21196.0, 1e9, -1e30])
+def test_reposition_to_no_place_on_earth_is_survived(pilot: Callable[..., Any], flavour: str, degrees: float) -> None:
+    p = pilot(flavour)
+    p.take_off(20)
+    p.long(511, mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, 100_000)
+    p.long(192, -1.0, 1.0, 0.0, float("nan"), degrees, degrees, 20.0 + 488 * (flavour == "px4"))
+    assert "POSITION_TARGET_GLOBAL_INT" in {frame.name for frame in p.wait(2)}
+
+
 def frame_of(number: int, kind: Any, payload: bytes) -> bytes:
     frame = bytes([0xFD, len(payload), 0, 0, 0, 1, 1]) + number.to_bytes(3, "little") + payload
     checksum = mavlink.x25crc(frame[1:])

@@ -110,7 +110,7 @@ class Area:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class FenceLimits:
     """A fence in force: an area, and how high flying is allowed, in metres above home."""
 
     area: Area = Area()
@@ -139,9 +139,9 @@ class Breach:
 class FenceRules:
     """What a flavour does its own way."""
 
-    limits: Callable[[Callable[[str], float], Area], Limits | None]
+    limits: Callable[[Callable[[str], float], Area], FenceLimits | None]
     """From the parameters (by name) and the uploaded area: the fence in force, if there is one."""
-    name: Callable[[Limits, Point], str]
+    name: Callable[[FenceLimits, Point], str]
     """What of the fence is violated there."""
     every: bool
     """Whether every included area must be kept to."""
@@ -158,7 +158,7 @@ class FenceWatch:
         self._home = home
         self._value = value
         self._area = Area()
-        self._limits: Limits | None = None
+        self._limits: FenceLimits | None = None
         self._changed_us = 0
         self._checked_us = -CHECK_US
         self._now_us = 0

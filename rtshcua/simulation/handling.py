@@ -9,7 +9,7 @@ from rtshcua.simulation.modes import Mode
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class Stopping:
     """How it stops, from any ground speed (m/s)."""
 
     approach: Approach
@@ -44,11 +44,11 @@ class Agility:
     acceleration: float
     approach: Approach
     """How it slows down in front of a target."""
-    stop: Stop
+    stop: Stopping
     """How it stops when told to stay."""
-    brake: Stop
+    brake: Stopping
     """The same in BRAKE."""
-    land: Stop
+    land: Stopping
     """The same when told to land."""
     climb_acceleration: float
     climb_approach: Approach

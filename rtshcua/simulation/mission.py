@@ -18,7 +18,7 @@ _ARRIVED_UP_M = 1.0
 _IN_MISSION, _SUSPENDED = 1, 2
 
 
-class State(IntEnum):
+class MissionState(IntEnum):
     """MISSION_CURRENT.mission_state (MISSION_STATE)."""
 
     UNKNOWN = 0
@@ -33,25 +33,25 @@ class State(IntEnum):
 class MissionRules:
     """What a flavour does its own way."""
 
-    first: int
-    """The slot of the first item that is flown."""
     judge: Callable[[tuple[Item, ...], Vehicle, Home, Callable[[Point], bool]], bool]
     """Whether a mission can be flown; the last argument says what the fence allows."""
-    may_enter: Callable[[tuple[Item, ...], Vehicle], bool]
+    first: int = 0
+    """The slot of the first item that is flown."""
+    may_enter: Callable[[tuple[Item, ...], Vehicle], bool] = lambda _items, _vehicle: True
     """Whether the mode may be entered, the mission being one that can be flown."""
-    judged_us: int
+    judged_us: int = 0
     """How long after an upload the judgement comes; until then the one before stands."""
-    waits_for_start: bool
+    waits_for_start: bool = False
     """Whether on the ground only MISSION_START begins it, not the mode alone."""
-    return_is_mode: bool
+    return_is_mode: bool = False
     """Whether an item that returns changes the mode."""
-    after: Mode | None
+    after: Mode | None = None
     """The mode after the last item, in the air; None keeps the mode and holds."""
-    accept_m: float
+    accept_m: float = 2.0
     """How near a waypoint counts as reached, if it does not say so itself."""
-    tells_all: bool
+    tells_all: bool = False
     """Whether MISSION_ITEM_REACHED is sent for items too that take no time."""
-    text: Callable[[int, Item], str | None]
+    text: Callable[[int, Item], str | None] = lambda _number, _item: None
     """What is said when an item that takes time begins."""
 
 
@@ -86,7 +86,7 @@ class Mission:
         """The item that is flown, or would be next."""
         self.valid = False
         """Whether the vehicle would fly it."""
-        self.state = State.NO_MISSION
+        self.state = MissionState.NO_MISSION
         stored.listeners.append(self._plan_changed)
 
     # -------------------------------------------------------------------------------------------- from outside
@@ -99,7 +99,7 @@ class Mission:
     @property
     def running(self) -> bool:
         """Whether it is flown now."""
-        return self._vehicle.mode is Mode.MISSION and self.state is State.ACTIVE
+        return self._vehicle.mode is Mode.MISSION and self.state is MissionState.ACTIVE
 
     def may_enter(self) -> bool:
         """Whether the mode may be entered now."""
@@ -109,7 +109,7 @@ class Mission:
         """MISSION_START: lets it leave the ground, from item `first`, if given. False if there is none to start."""
         if not self.valid or (first is not None and not self.select(first)):
             return False
-        if self.state is State.COMPLETE:
+        if self.state is MissionState.COMPLETE:
             self._rewind()
         self._started = True
         return True
@@ -120,8 +120,8 @@ class Mission:
             return False
         self.current = max(number, self._rules.first)
         self._begun, self._arrived_us = False, None
-        if self.state is State.COMPLETE:
-            self.state = State.NOT_STARTED
+        if self.state is MissionState.COMPLETE:
+            self.state = MissionState.NOT_STARTED
         self._send(self.message())
         return True
 
@@ -145,16 +145,16 @@ class Mission:
             self._judge_at_us = self._now_us + self._rules.judged_us
             if not self._rules.judged_us:
                 self._judge()
-        elif kind == FENCE and self._rules.judged_us and self.state in (State.UNKNOWN, State.NOT_STARTED):
+        elif kind == FENCE and self._rules.judged_us and self.state in (MissionState.UNKNOWN, MissionState.NOT_STARTED):
             self._judge_at_us = self._now_us + self._rules.judged_us
 
     def _judge(self) -> None:
         self._judge_at_us = None
         self.valid = self._rules.judge(self.items, self._vehicle, self._home, self._allows)
         if len(self.items) <= self._rules.first:
-            self.state = State.NO_MISSION
+            self.state = MissionState.NO_MISSION
         else:
-            self.state = State.NOT_STARTED if self.valid else State.UNKNOWN
+            self.state = MissionState.NOT_STARTED if self.valid else MissionState.UNKNOWN
         if not self.valid and self._vehicle.mode is Mode.MISSION:
             self._vehicle.set_mode(Mode.LOITER)
         self._send(self.message())
@@ -163,8 +163,8 @@ class Mission:
         self.current = min(self._rules.first, max(0, len(self.items) - 1))
         self._begun, self._arrived_us, self._started = False, None, False
         self._jumps.clear()
-        if self.state is State.COMPLETE:
-            self.state = State.NOT_STARTED
+        if self.state is MissionState.COMPLETE:
+            self.state = MissionState.NOT_STARTED
 
     # ------------------------------------------------------------------------------------------------- in time
 
@@ -176,23 +176,23 @@ class Mission:
         vehicle = self._vehicle
         if vehicle.mode is not Mode.MISSION:
             self._entered = False
-            if self.state is State.ACTIVE:
-                self.state = State.PAUSED
+            if self.state is MissionState.ACTIVE:
+                self.state = MissionState.PAUSED
                 self._begun, self._arrived_us = False, None
                 self._send(self.message())
             return
         if not self._entered:
             self._entered = True
-            if self.state is State.COMPLETE:
+            if self.state is MissionState.COMPLETE:
                 self._rewind()
-        if not vehicle.armed or self.state is State.COMPLETE:
+        if not vehicle.armed or self.state is MissionState.COMPLETE:
             return
         if not self.valid:
             return
         if not vehicle.in_air and not self._begun and self._rules.waits_for_start and not self._started:
             return
-        if self.state is not State.ACTIVE:
-            self.state = State.ACTIVE
+        if self.state is not MissionState.ACTIVE:
+            self.state = MissionState.ACTIVE
             self._send(self.message())
         here = where()
         for _ in range(len(self.items)):
@@ -223,7 +223,7 @@ class Mission:
             self.current = following
             self._send(self.message())
             return True
-        self.state = State.COMPLETE
+        self.state = MissionState.COMPLETE
         self._started = False
         if self._vehicle.in_air and self._vehicle.mode is Mode.MISSION:
             if self._rules.after is not None:

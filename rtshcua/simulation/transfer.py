@@ -4,35 +4,20 @@ What PX4 and ArduCopter do differently is in `TransferRules`. An upload takes ef
 as a whole when its last item has come.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
-from rtshcua.simulation.plans import (
-    ALL,
-    AMSL_FRAMES,
-    FENCE,
-    FLOWN,
-    KINDS,
-    MISSION,
-    PLACELESS_FRAME,
-    RALLY,
-    RELATIVE_FRAMES,
-    WAYPOINTS,
-    Item,
-    Plans,
-    draws_no_fence,
-    from_message,
-    to_message,
-)
+from rtshcua.simulation import plans
+from rtshcua.simulation.plans import FENCE, KINDS, MISSION, PLACELESS_FRAME, Item, Plans, draws_no_fence
 
 ACCEPTED: int = mavlink.MAV_MISSION_ACCEPTED
 ERROR: int = mavlink.MAV_MISSION_ERROR
 UNSUPPORTED: int = mavlink.MAV_MISSION_UNSUPPORTED
 UNSUPPORTED_FRAME: int = mavlink.MAV_MISSION_UNSUPPORTED_FRAME
-_FRAMES = AMSL_FRAMES | RELATIVE_FRAMES | {PLACELESS_FRAME}
+_FRAMES = plans.AMSL_FRAMES | plans.RELATIVE_FRAMES | {PLACELESS_FRAME}
 
 Peer = tuple[int, int]
 """(system, component) of the other end."""
@@ -42,22 +27,23 @@ Peer = tuple[int, int]
 class TransferRules:
     """How a flavour speaks the protocol."""
 
-    learns_int: bool
-    """Whether it asks with MISSION_REQUEST_INT once it has seen an item of that form; else always the legacy way."""
     retry_us: int
     abort_us: int
-    on_abort: int | None
-    """What it acknowledges an upload with that it gives up; None for silence."""
-    out_of_order: int | None
-    """What it answers an item that it did not ask for; None for silence."""
     busy: int
     """What it answers a second upload with, by another sender."""
-    opens_downloads: bool
-    """Whether items can be asked for only after MISSION_REQUEST_LIST, and are then sent again unasked if need be."""
-    capacity: Mapping[int, int]
+    capacity: tuple[int, int, int]
+    """How many items of each kind there is room for: missions, fences, rally points."""
     fence_items: frozenset[int]
     """The commands that a fence may be made of."""
-    keeps_home: bool
+    on_abort: int | None = None
+    """What it acknowledges an upload with that it gives up; None for silence."""
+    out_of_order: int | None = None
+    """What it answers an item that it did not ask for; None for silence."""
+    learns_int: bool = False
+    """Whether it asks with MISSION_REQUEST_INT once it has seen an item of that form; else always the legacy way."""
+    opens_downloads: bool = False
+    """Whether items can be asked for only after MISSION_REQUEST_LIST, and are then sent again unasked if need be."""
+    keeps_home: bool = False
     """Whether slot 0 of a mission is home, and not looked at."""
 
     def check(self, kind: int, number: int, item: Item) -> int:
@@ -66,8 +52,8 @@ class TransferRules:
             return UNSUPPORTED_FRAME
         if self.keeps_home and kind == MISSION and number == 0:
             return ACCEPTED
-        known = {MISSION: FLOWN, FENCE: self.fence_items, RALLY: {mavlink.MAV_CMD_NAV_RALLY_POINT}}[kind]
-        if item.command not in known or (item.frame == PLACELESS_FRAME and item.command in WAYPOINTS):
+        known = {MISSION: plans.FLOWN, FENCE: self.fence_items, plans.RALLY: {mavlink.MAV_CMD_NAV_RALLY_POINT}}[kind]
+        if item.command not in known or (item.frame == PLACELESS_FRAME and item.command in plans.WAYPOINTS):
             return UNSUPPORTED
         return ACCEPTED
 
@@ -98,13 +84,13 @@ class Transfer:
     def __init__(
         self,
         rules: TransferRules,
-        plans: Plans,
+        kept: Plans,
         send: Callable[[Message], None],
         stored: Callable[[int], tuple[Item, ...]],
         may_clear: Callable[[int], bool],
     ) -> None:
         self._rules = rules
-        self._plans = plans
+        self._plans = kept
         self._send = send
         self._stored = stored
         self._may_clear = may_clear
@@ -139,7 +125,7 @@ class Transfer:
                 self._ack(peer, rules.out_of_order, kind)
             return
         self._asks_int = rules.learns_int and message.get_type() == "MISSION_ITEM_INT"
-        item = from_message(message)
+        item = plans.from_message(message)
         result = mavlink.MAV_MISSION_INVALID_PARAM5_X if item is None else rules.check(kind, message.seq, item)
         if item is None or result != ACCEPTED:
             self._upload = None
@@ -162,11 +148,11 @@ class Transfer:
     def clear_all(self, peer: Peer, message: Message, now_us: int) -> None:
         """MISSION_CLEAR_ALL."""
         kind = message.mission_type
-        if kind != ALL and kind not in KINDS:
+        if kind != plans.ALL and kind not in KINDS:
             return self._ack(peer, UNSUPPORTED, kind)
         if self._upload is not None:
             return self._ack(peer, self._rules.busy, kind)
-        return self._clear(peer, KINDS if kind == ALL else (kind,), kind)
+        return self._clear(peer, KINDS if kind == plans.ALL else (kind,), kind)
 
     def _clear(self, peer: Peer, kinds: tuple[int, ...], named: int) -> None:
         allowed = all(self._may_clear(kind) for kind in kinds)
@@ -223,7 +209,7 @@ class Transfer:
             self._upload = None
 
     def _send_item(self, peer: Peer, kind: int, number: int, whole: bool) -> None:
-        self._send(to_message(self._stored(kind)[number], number, kind, peer, whole))
+        self._send(plans.to_message(self._stored(kind)[number], number, kind, peer, whole))
 
     # ----------------------------------------------------------------------------------------------- time
 

@@ -13,28 +13,17 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
+from rtshcua.simulation import plans
 from rtshcua.simulation.ardupilot.commands import COMMANDS, above_home, enter_number
 from rtshcua.simulation.ardupilot.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.ardupilot.telemetry import BUILDERS, DEFAULT, GROUPS
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
-from rtshcua.simulation.fence import Area, Breach, Circle, FenceRules, Limits
+from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
 from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import (
-    FENCE,
-    FENCE_ITEMS,
-    LAND,
-    LOITER,
-    LOITER_TIME,
-    MISSION,
-    RALLY,
-    RETURN,
-    TAKEOFF,
-    WAYPOINT,
-    Item,
-)
+from rtshcua.simulation.plans import Item
 from rtshcua.simulation.sensors import BootPlan
 from rtshcua.simulation.transfer import TransferRules
 from rtshcua.simulation.vehicle import Event, Vehicle
@@ -59,7 +48,7 @@ _GIVE_UP_M = 100.0
 _VEL_LIMIT = 2
 
 
-def _limits(value: Callable[[str], float], area: Area) -> Limits | None:
+def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
     """The fence that FENCE_* parameters and the upload make."""
     kinds = int(value("FENCE_TYPE"))
     if value("FENCE_ENABLE") < 1:
@@ -69,10 +58,10 @@ def _limits(value: Callable[[str], float], area: Area) -> Limits | None:
     if kinds & _CIRCLE:
         included = (*included, Circle((0.0, 0.0), value("FENCE_RADIUS")))
     ceiling = value("FENCE_ALT_MAX") if kinds & _CEILING else inf
-    return Limits(Area(included, excluded, every=True), ceiling)
+    return FenceLimits(Area(included, excluded, every=True), ceiling)
 
 
-def _name(limits: Limits, point: Point) -> str:
+def _name(limits: FenceLimits, point: Point) -> str:
     if point.up > limits.ceiling:
         return "Max Alt"
     for shape in limits.area.included:
@@ -81,7 +70,14 @@ def _name(limits: Limits, point: Point) -> str:
     return "Polygon"
 
 
-_NAMES = {WAYPOINT: "WP", TAKEOFF: "Takeoff", LAND: "Land", RETURN: "RTL", LOITER: "LoitUnlim", LOITER_TIME: "LoitTime"}
+_NAMES = {
+    plans.WAYPOINT: "WP",
+    plans.TAKEOFF: "Takeoff",
+    plans.LAND: "Land",
+    plans.RETURN: "RTL",
+    plans.LOITER: "LoitUnlim",
+    plans.LOITER_TIME: "LoitTime",
+}
 
 
 def _judge(items: tuple[Item, ...], _vehicle: Vehicle, _home: Home, _allows: Callable[[Point], bool]) -> bool:
@@ -91,7 +87,7 @@ def _judge(items: tuple[Item, ...], _vehicle: Vehicle, _home: Home, _allows: Cal
 def _may_enter(items: tuple[Item, ...], vehicle: Vehicle) -> bool:
     """Armed and on the ground, only a mission whose first item that takes time is a takeoff."""
     on_ground = vehicle.armed and not vehicle.in_air
-    return not on_ground or next((item.command for item in items[1:] if item.command in _NAMES), None) == TAKEOFF
+    return not on_ground or next((item.command for item in items[1:] if item.command in _NAMES), None) == plans.TAKEOFF
 
 
 class ArduCopter(Flavour):
@@ -150,7 +146,7 @@ class ArduCopter(Flavour):
         ),
     )
     failsafes = FailsafeRules(
-        position=((_CRITICAL, "EKF variance"), (_CRITICAL, "EKF Failsafe: changed to LAND Mode")),
+        position=((_CRITICAL, "EKF variance"), (_CRITICAL, "EKF Failsafe: changed to plans.LAND Mode")),
         position_after_s=0.9,
         land_pause_s=4.0,
         position_back=(_CRITICAL, "EKF Failsafe Cleared"),
@@ -178,27 +174,20 @@ class ArduCopter(Flavour):
     commands = COMMANDS
     builders, streams = BUILDERS, DEFAULT
     transfer = TransferRules(
-        learns_int=False,
         retry_us=1_000_000,
         abort_us=8_000_000,
         on_abort=mavlink.MAV_MISSION_OPERATION_CANCELLED,
         out_of_order=mavlink.MAV_MISSION_INVALID_SEQUENCE,
         busy=mavlink.MAV_MISSION_DENIED,
-        opens_downloads=False,
-        capacity={MISSION: 724, FENCE: 84, RALLY: 10},
-        fence_items=FENCE_ITEMS,
+        capacity=(724, 84, 10),
+        fence_items=plans.FENCE_ITEMS,
         keeps_home=True,
     )
     missions = MissionRules(
         first=1,
         judge=_judge,
         may_enter=_may_enter,
-        judged_us=0,
         waits_for_start=True,
-        return_is_mode=False,
-        after=None,
-        accept_m=2.0,
-        tells_all=False,
         text=lambda number, item: f"Mission: {number} {_NAMES.get(item.command, 'Delay')}",
     )
     fence = FenceRules(limits=_limits, name=_name, every=True, critical=False)
@@ -229,7 +218,7 @@ class ArduCopter(Flavour):
 
     def home_item(self, home: Home) -> Item | None:
         """Slot 0 of every mission."""
-        return Item(WAYPOINT, mavlink.MAV_FRAME_GLOBAL, x=home.latitude, y=home.longitude, z=home.amsl_mm / 1000)
+        return Item(plans.WAYPOINT, mavlink.MAV_FRAME_GLOBAL, x=home.latitude, y=home.longitude, z=home.amsl_mm / 1000)
 
     def on_setup_signing(self, a: Autopilot, message: Message) -> None:
         """Never while armed, as recorded; not even to switch it off."""
@@ -260,11 +249,11 @@ class ArduCopter(Flavour):
 
     def on_plan(self, a: Autopilot, kind: int) -> None:
         """Tells that a plan was stored, and how many items it has."""
-        if kind == MISSION:
+        if kind == plans.MISSION:
             a.say(_INFO, "Flight plan received")
-        elif kind == FENCE:
+        elif kind == plans.FENCE:
             a.say(mavlink.MAV_SEVERITY_DEBUG, "Fence Indexed OK")
-        name = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}[kind]
+        name = {plans.MISSION: "MIS_TOTAL", plans.FENCE: "FENCE_TOTAL", plans.RALLY: "RALLY_TOTAL"}[kind]
         a.send(a.parameters.assign(name, len(a.plans.items(kind))))
 
     def on_sticks(self, a: Autopilot, for_us: int) -> None:

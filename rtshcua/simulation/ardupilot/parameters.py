@@ -1,6 +1,6 @@
 """ArduCopter's parameters, as far as this vehicle has them, and how it flies."""
 
-from rtshcua.simulation.handling import Agility, Handling, Stop
+from rtshcua.simulation.handling import Agility, Handling, Stopping
 from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.parameters import INT8, INT16, INT32, Parameter
 
@@ -46,9 +46,9 @@ def _brake(speed: float) -> float:
     return speed * (0.0487 * speed + 1.555)
 
 
-_LOITER = Stop(Approach(braking=5.5, gain=2.6), hardest=6.5, ahead=_loiter, told=_loiter)
+_LOITER = Stopping(Approach(braking=5.5, gain=2.6), hardest=6.5, ahead=_loiter, told=_loiter)
 """Measured from 10.1 m/s: 18 m, below 0.4 m/s after 3.0 s."""
-_BRAKE = Stop(Approach(braking=3.0, gain=0.75), hardest=3.6, ahead=_brake, told=_brake)
+_BRAKE = Stopping(Approach(braking=3.0, gain=0.75), hardest=3.6, ahead=_brake, told=_brake)
 """Measured from 10.1 m/s: 20.7 m, below 0.4 m/s after 4.6 s; recorded from 4.0 m/s: 7 m, 3.5 s."""
 
 
@@ -56,7 +56,7 @@ def _land(speed: float) -> float:
     return speed * (0.1 * speed + 2.3)
 
 
-_LAND = Stop(Approach(braking=2.2, gain=0.8), hardest=3.0, ahead=_land, told=_land)
+_LAND = Stopping(Approach(braking=2.2, gain=0.8), hardest=3.0, ahead=_land, told=_land)
 """Recorded from 6.9 m/s: 21 m, 4.3 s."""
 _AGILITY = Agility(
     acceleration=2.5,

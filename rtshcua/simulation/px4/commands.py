@@ -36,6 +36,15 @@ def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
+def _target(a: Autopilot, command: Command) -> Point:
+    """The place and the height that it names, each that of the vehicle where it does not."""
+    here, up = a.here, command.altitude - a.home.amsl_mm / 1000
+    north, east = here.north, here.east
+    if command.latitude is not None and command.longitude is not None:
+        north, east = a.home.local(command.latitude, command.longitude)
+    return Point(north, east, up if isfinite(up) else here.up)
+
+
 def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     """As `Navigator::run` and `Commander::handle_command` of v1.16 do it. The ACK is for the mode alone.
 
@@ -52,25 +61,22 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     if not vehicle.in_air:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Reposition ignored: not flying")
         return (ACCEPTED,)
-    here, up = a.here, command.altitude - a.home.amsl_mm / 1000
-    north, east = here.north, here.east  # without a place, the fence is asked about its own
-    placed = command.latitude is not None and command.longitude is not None
-    if command.latitude is not None and command.longitude is not None:
-        north, east = a.home.local(command.latitude, command.longitude)
-    if not a.fence.allows(Point(north, east, up if isfinite(up) else here.up)):
+    target = _target(a, command)  # without a place, the fence is asked about its own
+    placed, raised = None not in (command.latitude, command.longitude), isfinite(command.altitude)
+    if not a.fence.allows(target):
         a.say(mavlink.MAV_SEVERITY_CRITICAL, "Reposition is outside geofence\t")
         return (ACCEPTED,)
     if command.p1 > 0:
         vehicle.speed = command.p1
-    if not placed and not isfinite(up) and not isfinite(command.p4):
+    if not placed and not raised and not isfinite(command.p4):
         if taking_off:  # it comes back to where it was, without a braking distance
-            vehicle.go_to(here)
+            vehicle.go_to(target)
         else:
             vehicle.hold()
         return (ACCEPTED,)
     if not placed and kept is not None:
-        north, east = kept.north, kept.east
-    vehicle.go_to(Point(north, east, up if isfinite(up) else here.up))
+        target = Point(kept.north, kept.east, target.up)
+    vehicle.go_to(target)
     if isfinite(command.p4):
         vehicle.turn_to(command.p4)
     return (ACCEPTED,)
@@ -92,14 +98,9 @@ def _orbit(a: Autopilot, command: Command) -> tuple[int, ...]:
     if not a.can_enter(Mode.ORBIT) or not vehicle.in_air:
         return (TEMPORARILY_REJECTED,)
     vehicle.set_mode(Mode.ORBIT)
-    here, up = a.here, command.altitude - a.home.amsl_mm / 1000
-    north, east = here.north, here.east
-    if command.latitude is not None and command.longitude is not None:
-        north, east = a.home.local(command.latitude, command.longitude)
     if command.p2 > 0:
         vehicle.speed = command.p2
-    centre = Point(north, east, up if isfinite(up) else here.up)
-    vehicle.circle(centre, command.p1 if isfinite(command.p1) and command.p1 else _ORBIT_M)
+    vehicle.circle(_target(a, command), command.p1 if isfinite(command.p1) and command.p1 else _ORBIT_M)
     return (ACCEPTED,)
 
 

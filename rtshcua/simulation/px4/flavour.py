@@ -15,21 +15,11 @@ from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
-from rtshcua.simulation.fence import Area, Breach, Circle, FenceRules, Limits
+from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
 from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import (
-    AMSL_FRAMES,
-    FENCE,
-    FENCE_ITEMS,
-    MISSION,
-    NAVIGATION,
-    RALLY,
-    RELATIVE_FRAMES,
-    RETURN_POINT,
-    Item,
-)
+from rtshcua.simulation.plans import AMSL_FRAMES, FENCE_ITEMS, NAVIGATION, RELATIVE_FRAMES, RETURN_POINT, Item
 from rtshcua.simulation.px4.commands import COMMANDS, enter_number
 from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.px4.telemetry import BUILDERS, CONSTANT, DEFAULT, LEAST_US, ONLY_STREAMED
@@ -47,7 +37,7 @@ _WARN, _HOLD, _RETURN, _TERMINATE, _LAND = 1, 2, 3, 4, 5
 """GF_ACTION; 0 is nothing."""
 
 
-def _limits(value: Callable[[str], float], area: Area) -> Limits | None:
+def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
     """The fence that GF_* parameters and the upload make."""
     if value("GF_ACTION") == 0:
         return None
@@ -56,7 +46,7 @@ def _limits(value: Callable[[str], float], area: Area) -> Limits | None:
         return None
     if across > 0 and not area.included:  # with areas, the places allowed are those of the areas
         area = Area((Circle((0.0, 0.0), across),), area.excluded)
-    return Limits(area, high if high > 0 else inf)
+    return FenceLimits(area, high if high > 0 else inf)
 
 
 FARTHEST_FIRST_M = 10_000.0
@@ -147,25 +137,17 @@ class Px4(Flavour):
         learns_int=True,
         retry_us=250_000,
         abort_us=5_000_000,
-        on_abort=None,
-        out_of_order=None,
         busy=ERROR,
         opens_downloads=True,
-        capacity={MISSION: 500, FENCE: 64, RALLY: 32},
+        capacity=(500, 64, 32),
         fence_items=FENCE_ITEMS - {RETURN_POINT},
-        keeps_home=False,
     )
     missions = MissionRules(
-        first=0,
         judge=_judge,
-        may_enter=lambda _items, _vehicle: True,
         judged_us=150_000,
-        waits_for_start=False,
         return_is_mode=True,
         after=Mode.LOITER,
-        accept_m=2.0,
         tells_all=True,
-        text=lambda _number, _item: None,
     )
     fence = FenceRules(limits=_limits, name=lambda _limits, _point: "Geofence", every=False, critical=True)
 

@@ -1,6 +1,6 @@
 """PX4's parameters, as far as this vehicle has them, and how it flies."""
 
-from rtshcua.simulation.handling import Agility, Handling, Stop
+from rtshcua.simulation.handling import Agility, Handling, Stopping
 from rtshcua.simulation.kinematics import Approach
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.parameters import INT32, Parameter
@@ -47,7 +47,7 @@ def _breaking_distance(speed: float) -> float:
     return speed * (speed / (2 * _MPC_ACC_HOR) + _SPREAD)
 
 
-_STOP = Stop(
+_STOP = Stopping(
     Approach(braking=3.0, gain=0.75),
     hardest=3.6,
     ahead=lambda speed: speed * (0.207 * speed + 0.778),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.simulation.config import HOME
-from rtshcua.simulation.fence import Area, Circle, Limits, Polygon
+from rtshcua.simulation.fence import Area, Circle, FenceLimits, Polygon
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 from rtshcua.simulation.plans import draws_no_fence, from_message
@@ -85,7 +85,7 @@ def test_areas(area: Area, inside: tuple[float, float], outside: tuple[float, fl
 
 
 def test_the_ceiling() -> None:
-    limits = Limits(Area(), 50)
+    limits = FenceLimits(Area(), 50)
     assert limits.holds(Point(0, 0, 50))
     assert not limits.holds(Point(0, 0, 50.1))
 
@@ -312,4 +312,4 @@ def test_the_fence_shows_in_the_vehicles_status(pilot: Pilots) -> None:
 
 
 def test_no_ceiling_is_infinite() -> None:
-    assert Limits().ceiling == inf
+    assert FenceLimits().ceiling == inf

@@ -125,7 +125,7 @@ class Flavour(ABC):
         return None
 
     def on_data_stream(self, a: "Autopilot", stream: int, rate_hz: int) -> None:  # noqa: B027
-        """Obeys REQUEST_DATA_STREAM: (stream, rate in Hz, 0 to stop)."""
+        """Obeys REQUEST_DATA_STREAM: (stream, rate in Hz, 0 to stop). PX4 does not know it; its streams run unasked."""
 
     def on_plan(self, a: "Autopilot", kind: int) -> None:  # noqa: B027
         """Tells of a plan of this kind (MAV_MISSION_TYPE) that was stored."""

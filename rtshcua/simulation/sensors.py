@@ -15,7 +15,7 @@ FAST_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class BootPlan:
-    """When what is there, as recorded; a text is (time, severity, text); `{amsl}` is home's height."""
+    """When what is there, in seconds from the start, as recorded; a text is (time, severity, text); `{amsl}` is home's height."""
 
     answers_s: float
     """Sensors answer: SYS_STATUS, and a position if only of zeros."""
@@ -39,7 +39,7 @@ class BootPlan:
 
     @property
     def all_s(self) -> float:
-        """All that it takes."""
+        """How long all of it takes."""
         return max(
             self.answers_s, self.standby_s, self.initialised_s, self.attitude_s, self.receiver_s, self.origin_s,
             self.checks_s, self.position_s,

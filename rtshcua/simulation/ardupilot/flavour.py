@@ -146,7 +146,7 @@ class ArduCopter(Flavour):
         ),
     )
     failsafes = FailsafeRules(
-        position=((_CRITICAL, "EKF variance"), (_CRITICAL, "EKF Failsafe: changed to plans.LAND Mode")),
+        position=((_CRITICAL, "EKF variance"), (_CRITICAL, "EKF Failsafe: changed to LAND Mode")),
         position_after_s=0.9,
         land_pause_s=4.0,
         position_back=(_CRITICAL, "EKF Failsafe Cleared"),

@@ -14,6 +14,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from hashlib import file_digest
 from multiprocessing import get_context
 from pathlib import Path
@@ -29,9 +30,8 @@ from reference import generated_logs
 from rtshcua.adapters.archive.adding import Check, Done, add, verify
 from rtshcua.adapters.archive.asking import Asker, Conditions, canned
 from rtshcua.adapters.archive.entry import RECORDS, Examined
-from rtshcua.adapters.archive.examine import Task
-from rtshcua.adapters.archive.folder import Folder
-from rtshcua.adapters.archive.workers import Processes
+from rtshcua.adapters.archive.examine import Processes, Task
+from rtshcua.adapters.archive.folder import Folder, Source
 
 FLIGHTS = 20
 ADD_LIMIT, VERIFY_LIMIT = 30, 16  # times the SHA-256 of the files, in time of processors
@@ -105,7 +105,7 @@ class Timed(Processes):
 def checked(work: Callable[[Check], Iterator[Done]], jobs: int) -> tuple[Cost, Cost]:
     """What it costs, and what the verification in it does, by so many processes; if what comes of it is what should."""
     start = spent()
-    with Timed(jobs) as workers:
+    with closing(Timed(jobs)) as workers:
         done = list(work(Check(generated_logs.ROOT_KEY, RECORDS, 0, workers)))
     cost = start.since()
     counts = Counter(each.entry.status for each in done)
@@ -180,7 +180,7 @@ def main() -> int:
             )
             return ratio > limit
 
-        added, verified = checked(lambda check: add(folder, logs, check), max(2, CORES))
+        added, verified = checked(lambda check: add(folder, map(Source, logs), check), max(2, CORES))
         failed |= told("add, verified and indexed", added, ADD_LIMIT)
         failed |= told("verification in it", verified, VERIFY_LIMIT)
         if not whole:

@@ -9,11 +9,12 @@ that is taken up here is only bytes; the enforcement boundary says whether it is
 import errno
 import os
 import socket
-from base64 import b64decode
+import time
+from base64 import b64decode, b64encode
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -106,26 +107,21 @@ class AgentSocket:
     def __init__(self, path: Path, greeting: Callable[[], bytes]) -> None:
         self.path = path
         self._greeting = greeting
-        self._readers: list[_Reader] = []
+        self.readers: list[_Reader] = []
         self._senders: dict[int, tuple[_Reader, int]] = {}
         self._count = 0
         self._next_us = 0
         self._listener = _listen(path)
 
-    @property
-    def readers(self) -> int:
-        """How many follow the flight now."""
-        return len(self._readers)
-
     def poll(self, now_us: int) -> Presented | None:
         """The next document, if one came in: one of each reader in turn, and at most one in `GAP_US`."""
         self._welcome()
-        for reader in list(self._readers):
+        for reader in list(self.readers):
             if not reader.flush():
                 self._drop(reader)
         if now_us < self._next_us:
             return None
-        for reader in list(self._readers):
+        for reader in list(self.readers):
             try:
                 line = reader.line()
             except OSError:
@@ -133,28 +129,27 @@ class AgentSocket:
                 continue
             if line is not None:
                 self._next_us = now_us + GAP_US
-                self._readers.remove(reader)
-                self._readers.append(reader)  # the others come first the next time
+                self.readers.remove(reader)
+                self.readers.append(reader)  # the others come first the next time
                 return self._taken(reader, line, now_us)
         return None
 
     def tell(self, line: bytes) -> None:
         """Tell every reader a line, newline included."""
-        for reader in list(self._readers):
-            if not reader.tell(line):
-                self._drop(reader)
+        for reader in list(self.readers):
+            self._send(reader, line)
 
     def answer(self, sender: int, slug: str, text: str) -> None:
         """Tell the reader that handed a document in what became of it."""
         reader, number = self._senders.pop(sender, (None, 0))
-        if reader is not None and not reader.tell(_answer(number, slug, text)):
-            self._drop(reader)
+        if reader is not None:
+            self._send(reader, _answer(number, slug, text))
 
     def close(self) -> None:
         """Hang up on all readers, after a last try to send what waits, and take the path away. Twice does nothing."""
         if self._listener.fileno() < 0:
             return
-        for reader in list(self._readers):
+        for reader in list(self.readers):
             reader.flush()
             self._drop(reader)
         self._listener.close()
@@ -168,30 +163,31 @@ class AgentSocket:
             except OSError:
                 return
             link.setblocking(False)
-            if len(self._readers) >= MOST_READERS:
-                self._drop(self._readers[0])  # the one that was quiet for longest: a recall must not find it full
+            if len(self.readers) >= MOST_READERS:
+                self._drop(self.readers[0])  # the one that was quiet for longest: a recall must not find it full
             reader = _Reader(link)
-            self._readers.append(reader)
-            if not reader.tell(self._greeting()):
-                self._drop(reader)
+            self.readers.append(reader)
+            self._send(reader, self._greeting())
 
     def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Presented | None:
         try:
             handed = _read(line)
             document = b64decode(handed.document, validate=True)
         except (ValueError, msgspec.DecodeError):
-            if not reader.tell(
-                _answer(_number(line), "malformed", "not a line of the kind {id, document}, document in base64")
-            ):
-                self._drop(reader)
+            text = "not a line of the kind {id, document}, document in base64"
+            self._send(reader, _answer(_number(line), "malformed", text))
             return None
         self._count += 1
         self._senders[self._count] = (reader, handed.id)
         return Presented(now_us, document, self._count)
 
+    def _send(self, reader: _Reader, line: bytes) -> None:
+        if not reader.tell(line):
+            self._drop(reader)
+
     def _drop(self, reader: _Reader) -> None:
-        if reader in self._readers:
-            self._readers.remove(reader)
+        if reader in self.readers:
+            self.readers.remove(reader)
             self._senders = {key: value for key, value in self._senders.items() if value[0] is not reader}
             reader.link.close()
 
@@ -242,3 +238,51 @@ def _answers(path: Path) -> bool:
         except OSError:
             return True
         return True
+
+
+# -------------------------------------------------------------------------------- the end of who hands in
+
+
+class Answered(NamedTuple):
+    """What the flight said: `accepted`, or why not, and a text for a person."""
+
+    slug: str
+    text: str
+
+
+class _Line(msgspec.Struct):
+    """What is read of a line; most are records of the log."""
+
+    type: str = ""
+    id: int = 0
+    slug: str = ""
+    text: str = ""
+
+
+_read_line = msgspec.json.Decoder(_Line).decode
+_NUMBER = 1
+
+
+def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answered:
+    """Hand a document to the flight that listens at `path`. Raises OSError, TimeoutError without an answer."""
+    line = msgspec.json.encode({"id": _NUMBER, "document": b64encode(document).decode()}) + b"\n"
+    until_s = time.monotonic() + patience_s
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.settimeout(patience_s)
+        try:
+            link.connect(str(path))
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from None
+        link.sendall(line)
+        waiting = b""
+        while (left_s := until_s - time.monotonic()) > 0:
+            link.settimeout(left_s)
+            chunk = link.recv(_CHUNK)
+            if not chunk:
+                raise ConnectionResetError("the flight hung up: it is over, or it did not take the document")
+            *lines, waiting = (waiting + chunk).split(b"\n")
+            for each in lines:
+                said = _read_line(each)
+                if said.type == "answer" and said.id in (0, _NUMBER):
+                    return Answered(said.slug, said.text)
+    raise TimeoutError("the flight did not answer")

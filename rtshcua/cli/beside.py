@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from rtshcua.adapters.files.anchors import read_anchors, read_named, unreadable
+from rtshcua.adapters.files.logs import read_anchors, read_named, unreadable
 from rtshcua.adapters.files.runs import BUNDLE, LOG, SUMMARY, TELEMETRY
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.raw_frames import RawFrames

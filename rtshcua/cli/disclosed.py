@@ -3,8 +3,7 @@
 from itertools import islice
 from pathlib import Path
 
-from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.secret import SECRET, SecretError, read_secret
+from rtshcua.adapters.files.logs import SECRET, SecretError, lines, read_secret
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.beside import run_folder
 from rtshcua.evidence.finding import Claim, Finding

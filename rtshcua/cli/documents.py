@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from rtshcua.adapters.agent_client import hand_in
+from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.store.reading import read_regular

@@ -150,7 +150,7 @@ def exit_code_of(error: OSError) -> ExitCode:
     if error.errno in _LINK or (isinstance(error, (ConnectionError, TimeoutError)) and error.errno not in _FULL):
         return ExitCode.LINK
     if isinstance(error, PermissionError):
-        from rtshcua.adapters.store.faults import NotWritten
+        from rtshcua.adapters.store.writing import NotWritten
 
         return ExitCode.FULL if isinstance(error, NotWritten) else ExitCode.INPUT
     return ExitCode.INPUT if error.errno in _INPUT else ExitCode.FULL

@@ -8,8 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock, StepWatch
+from rtshcua.adapters.files.logs import disclosure_of
 from rtshcua.adapters.files.runs import LOG, RunFolder
-from rtshcua.adapters.files.secret import disclosure_of
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, Loop
 from rtshcua.adapters.vehicle.udp import UdpVehicle

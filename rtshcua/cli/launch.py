@@ -9,8 +9,8 @@ from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore, read_root
+from rtshcua.adapters.files.logs import write_secret
 from rtshcua.adapters.files.runs import RunFolder
-from rtshcua.adapters.files.secret import write_secret
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError

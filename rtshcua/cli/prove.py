@@ -7,14 +7,11 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.files.anchors import read_anchors
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.logs import begins_as_log, lines
+from rtshcua.adapters.files.logs import SECRET, begins_as_log, lines, read_anchors, read_secret
 from rtshcua.adapters.files.runs import LOG
-from rtshcua.adapters.files.secret import SECRET, read_secret
-from rtshcua.adapters.store.faults import NotRegular
-from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
 from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.outcome import CUT_AT_FIRST

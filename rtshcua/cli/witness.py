@@ -11,9 +11,8 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
-from rtshcua.adapters.files.witness import FileWitness, WitnessError, WitnessStore
+from rtshcua.adapters.files.witness import Cosigned, FileWitness, NotCosigned, WitnessError, WitnessStore, drop, logs_in
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.witness_drop import Cosigned, NotCosigned, drop, logs_in
 from rtshcua.adapters.witness_link import WitnessLink
 from rtshcua.cli.faults import as_json as saying_json
 from rtshcua.cli.faults import distrust, exit_code_of, fail, refuse, untrusted

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address
-from rtshcua.adapters.witness_client import Anchor, WitnessClient
+from rtshcua.adapters.witness_link import Anchor, WitnessClient
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.ports import Anchored, Event, Noted

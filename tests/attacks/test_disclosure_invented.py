@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from reference.forgery import ROOT_KEY, captured, edit, flight, prove, read, seed_of, signers
-from rtshcua.adapters.files.secret import SECRET, write_secret
+from rtshcua.adapters.files.logs import SECRET, write_secret
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw

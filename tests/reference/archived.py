@@ -8,7 +8,7 @@ from typing import Any
 from reference import generated_logs
 from rtshcua.adapters.archive.adding import Check
 from rtshcua.adapters.archive.entry import RECORDS
-from rtshcua.adapters.archive.workers import Processes
+from rtshcua.adapters.archive.examine import Processes
 
 NOW_US = 1_760_000_000_000_000
 CHECK = Check(generated_logs.ROOT_KEY, RECORDS, NOW_US, Processes(1))

@@ -17,8 +17,7 @@ from tempfile import TemporaryDirectory
 from typing import NoReturn
 
 from reference.crashed import LOG_KEY, signer, unverified, writes
-from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.port import SYSTEM, LogFile, SystemDisk, SystemFile
+from rtshcua.adapters.files.evidence import SYSTEM, Disk, EvidenceFile, LogFile, SystemFile
 from rtshcua.adapters.files.recovery import examine, recover
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.store.writing import open_new
@@ -40,7 +39,7 @@ class Piecemeal(SystemFile):
         self.write = lambda data: os.write(handle, data[:101])
 
 
-class PiecemealDisk(SystemDisk):
+class PiecemealDisk(Disk):
     """A disk of such files."""
 
     def create(self, path: Path) -> LogFile:

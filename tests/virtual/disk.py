@@ -4,9 +4,7 @@ from pathlib import Path
 
 from reference.faulty_disk import FaultyDisk
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.keeper import Keeper
-from rtshcua.adapters.files.lateness import Lateness
-from rtshcua.adapters.files.writer import SYNC_S
+from rtshcua.adapters.files.writer import SYNC_S, Keeper, Lateness
 from rtshcua.virtual.vehicle import VirtualClock
 
 

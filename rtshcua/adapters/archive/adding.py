@@ -8,12 +8,10 @@ from typing import NamedTuple
 import duckdb
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive import catalogue
 from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined
-from rtshcua.adapters.archive.examine import Task, missing
-from rtshcua.adapters.archive.folder import Folder
-from rtshcua.adapters.archive.parts import ingest, lay_out
-from rtshcua.adapters.archive.workers import Workers
+from rtshcua.adapters.archive.examine import Task, Workers, missing
+from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.index import forget_unfinished, ingest, lay_out, read_catalogue, write_catalogue
 from rtshcua.wire.keys import PUBLIC_BYTES, Duty, key_id
 
 #: octets of logs that are taken in at once: what a crash has to be done again
@@ -45,46 +43,40 @@ class Done(NamedTuple):
     known: bool
 
 
-def add(folder: Folder, sources: Iterable[Path], check: Check) -> Iterator[Done]:
+def add(folder: Folder, sources: Iterable[Source], check: Check) -> Iterator[Done]:
     """Takes logs in, verifies them and indexes those that are to be believed.
 
     What was given is done when the iterator says so: a crash before leaves the archive as it was then. Raises OSError
     where a file cannot be read, with all before it done.
     """
     with folder.writing():
-        entries = catalogue.read(folder)
-        catalogue.forget_unfinished(folder, entries)
+        entries = read_catalogue(folder)
+        forget_unfinished(folder, entries)
         lay_out(folder)
-        batch: dict[str, tuple[Path, Entry]] = {}
+        batch = _Batch(folder, entries, check)
         for source in sources:
             try:
                 digest, size, new = folder.take_in(source)
             except OSError:
-                yield from _settle(folder, entries, batch, check)
+                yield from batch.settle()
                 raise
             held = entries.get(digest)
-            if digest in batch or (held is not None and not new and _no_less(held, check)):
-                yield Done(source, held or batch[digest][1], known=True)
+            if digest in batch.logs or (held is not None and not new and _no_less(held, check)):
+                yield Done(source.path, held or batch.logs[digest][1], known=True)
                 continue
-            batch[digest] = source, _asked(held, digest, size, str(source), check)
-            if _enough(batch):
-                yield from _settle(folder, entries, batch, check)
-                batch.clear()
-        yield from _settle(folder, entries, batch, check)
+            yield from batch.put(source.path, _asked(held, digest, size, str(source.path), check))
+        yield from batch.settle()
 
 
 def verify(folder: Folder, check: Check) -> Iterator[Done]:
     """Verifies the logs of an archive once more, where they lie: those that were verified under this root."""
     with folder.writing():
-        entries = catalogue.read(folder)
-        catalogue.forget_unfinished(folder, entries)
-        chosen = [entry for entry in entries.values() if entry.pinned == check.root]
-        for first in range(0, len(chosen), _MOST):
-            some = chosen[first : first + _MOST]
-            batch = {
-                each.log: (folder.log(each.log), _asked(each, each.log, each.bytes, each.name, check)) for each in some
-            }
-            yield from _settle(folder, entries, batch, check)
+        entries = read_catalogue(folder)
+        forget_unfinished(folder, entries)
+        batch = _Batch(folder, entries, check)
+        for each in [entry for entry in entries.values() if entry.pinned == check.root]:
+            yield from batch.put(folder.log(each.log), _asked(each, each.log, each.bytes, each.name, check))
+        yield from batch.settle()
 
 
 def reindex(folder: Folder, check: Check) -> Iterator[Done]:
@@ -95,29 +87,20 @@ def reindex(folder: Folder, check: Check) -> Iterator[Done]:
     """
     with folder.writing():
         try:
-            old = catalogue.read(folder)
+            old = read_catalogue(folder)
         except duckdb.Error:
             old = {}
         for part in folder.parts():
             part.unlink()
         lay_out(folder)
-        entries: dict[str, Entry] = {}
-        catalogue.write(folder, ())
-        batch: dict[str, tuple[Path, Entry]] = {}
+        write_catalogue(folder, ())
+        batch = _Batch(folder, {}, check)
         here = {path.parent.name: path for path in folder.logs()}
         gone = {log: folder.log(log) for log in sorted(old.keys() - here.keys()) if _DIGEST.fullmatch(log)}
         for log, path in (here | gone).items():
             size = path.stat().st_size if log in here else old[log].bytes
-            batch[log] = path, replace(_asked(old.get(log), log, size, str(path), check), part="")
-            if _enough(batch):
-                yield from _settle(folder, entries, batch, check)
-                batch.clear()
-        yield from _settle(folder, entries, batch, check)
-
-
-def _enough(batch: dict[str, tuple[Path, Entry]]) -> bool:
-    """Whether these are to be done before more are taken in."""
-    return len(batch) >= _MOST or sum(entry.bytes for _, entry in batch.values()) >= _BATCH
+            yield from batch.put(path, replace(_asked(old.get(log), log, size, str(path), check), part=""))
+        yield from batch.settle()
 
 
 def _no_less(held: Entry, check: Check) -> bool:
@@ -140,23 +123,39 @@ def _asked(held: Entry | None, digest: str, size: int, name: str, check: Check) 
     )
 
 
-def _settle(
-    folder: Folder, entries: dict[str, Entry], batch: dict[str, tuple[Path, Entry]], check: Check
-) -> Iterator[Done]:
-    if not batch:
-        return
-    asked = [entry for _, entry in sorted(batch.values(), key=lambda each: -each[1].bytes)]
-    gone = {entry.log for entry in asked if not folder.log(entry.log).exists()}  # asked here: others may see no file
-    tasks = [Task(folder.log(entry.log), entry, check.pinned) for entry in asked if entry.log not in gone]
-    examined = list(check.workers.examine(tasks)) if tasks else []
-    examined += [missing(entry) for entry in asked if entry.log in gone]
-    fresh: list[Examined] = []
-    for each in examined:
-        if each.entry.part:
-            entries[each.entry.log] = each.entry  # its records are indexed already, and cannot have changed
-        else:
-            fresh.append(each)
-    entries.update((entry.log, entry) for entry in ingest(folder, fresh))
-    catalogue.write(folder, entries.values())
-    for digest, (path, _) in batch.items():
-        yield Done(path, entries[digest], known=False)
+class _Batch:
+    """Logs that are verified and indexed together. `entries`, the rows by log, follow what came of them."""
+
+    def __init__(self, folder: Folder, entries: dict[str, Entry], check: Check) -> None:
+        self.logs: dict[str, tuple[Path, Entry]] = {}
+        self._folder = folder
+        self._entries = entries
+        self._check = check
+
+    def put(self, path: Path, entry: Entry) -> Iterator[Done]:
+        """One more log; what came of all, where they are enough to be done before more are taken in."""
+        self.logs[entry.log] = path, entry
+        if len(self.logs) >= _MOST or sum(entry.bytes for _, entry in self.logs.values()) >= _BATCH:
+            yield from self.settle()
+
+    def settle(self) -> Iterator[Done]:
+        """What came of those that wait: verified, indexed, and in the catalogue."""
+        if not self.logs:
+            return
+        folder, entries = self._folder, self._entries
+        asked = [entry for _, entry in sorted(self.logs.values(), key=lambda each: -each[1].bytes)]
+        gone = {entry.log for entry in asked if not folder.log(entry.log).exists()}  # here: others may see no file
+        tasks = [Task(folder.log(entry.log), entry, self._check.pinned) for entry in asked if entry.log not in gone]
+        examined = list(self._check.workers.examine(tasks)) if tasks else []
+        examined += [missing(entry) for entry in asked if entry.log in gone]
+        fresh: list[Examined] = []
+        for each in examined:
+            if each.entry.part:
+                entries[each.entry.log] = each.entry  # its records are indexed already, and cannot have changed
+            else:
+                fresh.append(each)
+        entries.update((entry.log, entry) for entry in ingest(folder, fresh))
+        write_catalogue(folder, entries.values())
+        for digest, (path, _) in self.logs.items():
+            yield Done(path, entries[digest], known=False)
+        self.logs.clear()

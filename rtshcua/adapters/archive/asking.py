@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 import duckdb
 
-from rtshcua.adapters.archive.catalogue import quoted
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
+from rtshcua.adapters.archive.index import quoted
 from rtshcua.wire.untrusted import Untrusted
 
 #: what an archive holds, by status of its logs

@@ -28,10 +28,6 @@ class Cluster:
         futures = self._client.map(examine, tasks, pure=False)
         yield from self._client.gather(futures)
 
-    def workers(self) -> int:
-        """How many there are now."""
-        return len(self._client.scheduler_info(n_workers=-1)["workers"])
-
     def close(self) -> None:
         """Leaves the cluster."""
         self._client.close()

@@ -1,12 +1,9 @@
 """What an archive knows of one log: a row of its catalogue, and what its records are explained with."""
 
-from typing import Final
-
 import msgspec
 
 #: how deep a log was verified: the chain, seals and anchors of typed records; or each decision derived again too
 RECORDS, AUDIT = "records", "audit"
-DEPTHS: Final = (RECORDS, AUDIT)
 
 #: `verified`: whole up to its signed close. `incomplete`: sound as far as it goes. `failed`: not to be believed
 VERIFIED, INCOMPLETE, FAILED = "verified", "incomplete", "failed"

@@ -1,22 +1,37 @@
-"""The verification of one log of an archive, in whatever process: octets, trust, records, seals, anchors."""
+"""The verification of the logs of an archive, in whatever process: octets, trust, records, seals, anchors."""
 
-import gc
-from hashlib import file_digest, sha256
+import os
+from base64 import b64decode
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from hashlib import file_digest
+from multiprocessing import get_context
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple, Protocol
 
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined
-from rtshcua.adapters.archive.steps import Steps
-from rtshcua.adapters.files.anchors import read_anchors
-from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined, Step
+from rtshcua.adapters.files.logs import read_anchors
+from rtshcua.adapters.files.verification import follow
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.records import AnyRecord, Effect, Genesis
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.ground.auditor.audit import Audit, Auditor
+from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire import cose, names
+from rtshcua.wire.bundle import Bundle, envelopes, parse
+from rtshcua.wire.replacement import ReplacementDocument
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.untrusted import Untrusted
 
-_BLOCK = 1 << 16
+_END = 1 << 62
+#: octets of logs for which it is not worth it to start processes
+_LITTLE = 4 << 20
 
 
 class Task(NamedTuple):
@@ -30,55 +45,44 @@ class Task(NamedTuple):
 def examine(task: Task) -> Examined:
     """Verifies a log. Whatever it holds, the answer is a row; OSError where it cannot be read."""
     entry = task.entry
+    replacements: list[Effect] = []
+    last = b""
+
+    def take(line: bytes, record: AnyRecord) -> None:
+        nonlocal last
+        last = line
+        if isinstance(record, Effect) and record.event == "replacement":
+            replacements.append(record)
+
     with open_regular(task.path) as file:
         found = file_digest(file, "sha256").hexdigest()
         if found != entry.log:
             text = "the file in the archive is not the one that was taken in: it was changed where it lies"
             return _failed(entry, Finding("archive/changed", 0, text, found, entry.log))
         file.seek(0)
-        audit, steps = _audit(file, task)
-        report, described = audit.report, _described(entry, audit)
-        if report.failure is not None:
-            return _failed(described, report.failure)
-        last = _last_line(file)
+        auditor = Auditor(task.pinned, derive=entry.checked == AUDIT, anchors=read_anchors(task.path))
+        audit = follow(file, auditor, take)
+    report, described = audit.report, _described(entry, audit)
+    if report.failure is not None:
+        return _failed(described, report.failure)
     assert audit.basis is not None
-    finding = report.shortfall
     described = replace(
-        described,
-        status=report.verdict.value,
-        finding=None if finding is None else finding.slug,
-        finding_record=None if finding is None else finding.record,
-        finding_text=None if finding is None else finding.text,
+        _with_finding(described, report.verdict.value, report.shortfall),
         records=report.records,
         indexed=report.records if report.verdict is Verdict.VERIFIED else report.sealed,
         anchored=report.anchored,
         recoveries=report.counts.get("recover", 0),
-        last_leaf=sha256(b"\0" + last).hexdigest(),
+        last_leaf=leaf_hash(last).hex(),
         root=report.root.hex(),
     )
-    return Examined(described, steps.all(entry.log, audit.basis.bundle))
+    assert report.genesis is not None
+    return Examined(described, _steps(entry.log, audit.basis.bundle, report.genesis, replacements))
 
 
 def missing(entry: Entry) -> Examined:
     """What comes of a log that does not lie in the archive any more."""
     text = "the archive does not have the log any more: it was taken away from where it lay"
     return _failed(entry, Finding("archive/missing", 0, text, "no file", entry.log))
-
-
-def _audit(file: BinaryIO, task: Task) -> tuple[Audit, Steps]:
-    auditor = Auditor(task.pinned, derive=task.entry.checked == AUDIT, anchors=read_anchors(task.path))
-    steps = Steps()
-    enabled = gc.isenabled()
-    gc.disable()  # nothing here makes cycles, and looking for them costs a tenth
-    try:
-        for line in lines(file):
-            if not auditor.take(line):
-                break
-            steps.follow(line)
-    finally:
-        if enabled:
-            gc.enable()
-    return auditor.audit(), steps
 
 
 def _described(entry: Entry, audit: Audit) -> Entry:
@@ -114,26 +118,99 @@ def _lasted_us(report: Report) -> int | None:
 
 def _failed(entry: Entry, finding: Finding) -> Examined:
     """Nothing of such a log is indexed; what it said of its flight stays, where that much was to be trusted."""
-    return Examined(
-        replace(
-            entry,
-            status=FAILED,
-            finding=finding.slug,
-            finding_record=finding.record,
-            finding_text=finding.text,
-        )
+    return Examined(_with_finding(entry, FAILED, finding))
+
+
+def _with_finding(entry: Entry, status: str, finding: Finding | None) -> Entry:
+    if finding is None:
+        return replace(entry, status=status)
+    return replace(entry, status=status, finding=finding.slug, finding_record=finding.record, finding_text=finding.text)
+
+
+# --------------------------------------------------- which skill the steps and links of a log stand for
+
+
+def _steps(log: str, bundle: Bundle, genesis: Genesis, replacements: Sequence[Effect]) -> tuple[Step, ...]:
+    """The steps and links of a log that verified, each for the records in which its mission was in force.
+
+    `bundle` is that of the log, with or without what replaced its mission later.
+    """
+    missions = [(0, bundle.mission)]
+    if replacements:
+        mission = cose.unverified(envelopes(b64decode(genesis.bundle))[1]).payload
+        missions = [(0, parse(names.MISSION, mission, Mission))]
+    for record in replacements:
+        replaced = _replacing(missions[-1][1], record)
+        if replaced is not None:
+            missions.append((record.seq, replaced))
+    ends = [first for first, _ in missions[1:]] + [_END]
+    return tuple(
+        Step(log, first, until, *row)
+        for (first, mission), until in zip(missions, ends, strict=True)
+        for row in _rows(bundle.policy, mission)
     )
 
 
-def _last_line(file: BinaryIO) -> bytes:
-    """The last whole line of a log that verified."""
-    size, length = file.seek(0, 2), _BLOCK
-    while True:
-        start = max(0, size - length)
-        file.seek(start)
-        tail = file.read()
-        end = tail.rfind(b"\n")
-        before = tail.rfind(b"\n", 0, max(end, 0))
-        if before >= 0 or not start:
-            return tail[before + 1 : end + 1]
-        length *= 4
+def _replacing(mission: Mission, record: Effect) -> Mission | None:
+    """The mission after a replacement was recorded; None where the record makes no sense, which an audit says."""
+    try:
+        said = parse(names.REPLACEMENT, cose.unverified(b64decode(record.detail)).payload, ReplacementDocument)
+    except (Untrusted, ValueError):
+        return None
+    kept = max(said.kept, 0)
+    return replace(said.mission, invocations=(*mission.invocations[:kept], *said.mission.invocations[kept:]))
+
+
+def _rows(policy: Policy, mission: Mission) -> Iterator[tuple[int, int, int, str, str]]:
+    yield from _links(CONTINGENCY_LINK, -1, policy.contingency, policy)
+    for number, step in enumerate(mission.invocations):
+        yield STEP, number, -1, _skill(policy, step.skill), step.text
+        yield from _links(FALLBACK_LINK, number, step.contract.fallback, policy)
+
+
+def _links(kind: int, step: int, chain: tuple[Link, ...], policy: Policy) -> Iterator[tuple[int, int, int, str, str]]:
+    for number, link in enumerate(chain):
+        yield kind, step, number, _skill(policy, link.skill), link.text
+
+
+def _skill(policy: Policy, index: int) -> str:
+    return policy.contracts[index].name if 0 <= index < len(policy.contracts) else ""
+
+
+# ------------------------------------------------------------------------------------------ who verifies
+
+
+class Workers(Protocol):
+    """Whoever verifies logs; the answers come in the order of the tasks."""
+
+    def examine(self, tasks: Sequence[Task]) -> Iterator[Examined]:
+        """Verifies these logs."""
+
+    def close(self) -> None:
+        """Lets them go."""
+
+
+class Processes:
+    """As many processes as there are cores, or `jobs`; they start with the first work that is worth it."""
+
+    def __init__(self, jobs: int | None = None) -> None:
+        self._jobs = jobs or _cores()
+        self._pool: ProcessPoolExecutor | None = None
+
+    def examine(self, tasks: Sequence[Task]) -> Iterator[Examined]:
+        """Verifies these logs, the largest first."""
+        if self._jobs == 1 or len(tasks) == 1 or (self._pool is None and sum(t.entry.bytes for t in tasks) < _LITTLE):
+            return map(examine, tasks)
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(self._jobs, mp_context=get_context("spawn"))
+        return self._pool.map(examine, tasks)
+
+    def close(self) -> None:
+        """Ends the processes."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+
+def _cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -11,19 +11,27 @@ The logs are what is kept; the index is worked out from them and can be thrown a
 
 import json
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from hashlib import file_digest, sha256
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, NamedTuple
 
-from rtshcua.adapters.files.anchors import SUFFIX, beside
+from rtshcua.adapters.files.logs import SUFFIX, beside
 from rtshcua.adapters.files.runs import LOG
-from rtshcua.adapters.store.faults import NotRegular, naming
-from rtshcua.adapters.store.folders import make_folder
-from rtshcua.adapters.store.locking import lock
-from rtshcua.adapters.store.reading import open_regular, read_regular
-from rtshcua.adapters.store.writing import PUBLIC_FILE, UNFINISHED, open_new, publish, replace, write_new
+from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
+from rtshcua.adapters.store.writing import (
+    PUBLIC_FILE,
+    UNFINISHED,
+    lock,
+    make_folder,
+    naming,
+    open_new,
+    publish,
+    replace,
+    write_new,
+)
 from rtshcua.wire.untrusted import Untrusted
 
 FORMAT, VERSION = "rtshcua/archive", 1
@@ -36,6 +44,13 @@ _MARK: Final = "archive.json"
 _BLOCK: Final = 1 << 20
 _MOST_ANCHORS: Final = 16 << 20  # octets of a file of anchors
 _PATTERN: Final = frozenset("*?[]{}")  # the engine would take a path with these for a pattern
+
+
+class Source(NamedTuple):
+    """A log to take in. Below `root`, the folder that somebody gave it in, no link is followed."""
+
+    path: Path
+    root: Path | None = None
 
 
 class Folder:
@@ -99,17 +114,20 @@ class Folder:
         """Holds off everyone else who wants to change the archive. Raises BlockingIOError if somebody does."""
         with os.fdopen(lock(self.path / "lock", mode=PUBLIC_FILE), "rb"):
             for left in self.scratch.iterdir():
-                remove(left)
+                if left.is_dir() and not left.is_symlink():
+                    shutil.rmtree(left)
+                else:
+                    left.unlink()
             yield
 
-    def take_in(self, source: Path) -> tuple[str, int, bool]:
+    def take_in(self, source: Source) -> tuple[str, int, bool]:
         """Copies a log in, with the anchors beside it, unless it is there. Its SHA-256, its octets, and whether
         anything is new.
         """
         scratch = self.scratch / f"{os.getpid()}.taken"
         try:
             with (
-                open_regular(source) as reader,
+                open_regular(*source) as reader,
                 naming(self.path),
                 os.fdopen(open_new(scratch, mode=0o444), "wb") as writer,
             ):
@@ -123,13 +141,14 @@ class Folder:
             scratch.unlink(missing_ok=True)
         return digest, size, self._take_anchors(source, digest) or new
 
-    def _take_anchors(self, source: Path, digest: str) -> bool:
+    def _take_anchors(self, source: Source, digest: str) -> bool:
         """Those beside a log that is named as in a run's folder are its own; else those that bear its name."""
-        found = source.parent.glob(f"*{SUFFIX}") if source.name == LOG else [beside(source)]
+        log, root = source
+        found = log.parent.glob(f"*{SUFFIX}") if log.name == LOG else [beside(log)]
         new = False
         for path in found:
             try:
-                data = read_regular(path, _MOST_ANCHORS, path.parent)
+                data = read_regular(path, _MOST_ANCHORS, root or path.parent)
             except (FileNotFoundError, NotRegular):
                 continue
             if len(data) > _MOST_ANCHORS:
@@ -147,16 +166,6 @@ def _holds(place: Path, digest: str, size: int) -> bool:
             return os.fstat(file.fileno()).st_size == size and file_digest(file, "sha256").hexdigest() == digest
     except OSError:
         return False
-
-
-def remove(path: Path) -> None:
-    """Removes something unfinished, a file or a folder."""
-    if path.is_dir() and not path.is_symlink():
-        for below in path.iterdir():
-            remove(below)
-        path.rmdir()
-    else:
-        path.unlink()
 
 
 def _copy(reader: BinaryIO, writer: BinaryIO) -> tuple[str, int]:

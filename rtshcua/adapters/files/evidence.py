@@ -1,14 +1,79 @@
-"""The file that evidence lines go to; who must not wait for the disk writes to it through `writer`."""
+"""The file that evidence lines go to, and the door between the evidence and the disk, in which tests put faults.
 
+Whatever of the evidence is written while it flies goes through that door: the log, and the raw frames. Who must not
+wait for the disk writes to it through `writer`.
+"""
+
+import os
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from typing import Protocol
 
-from rtshcua.adapters.files.port import SYSTEM, Disk
+from rtshcua.adapters.store.writing import open_existing, open_new, sync_data, sync_folder
 from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST
 from rtshcua.evidence.records import is_signed
 
 #: as many buffered lines are written together at the latest
 MOST_BUFFERED = 256
+
+
+class LogFile(Protocol):
+    """An open file. Each method raises OSError when the system refuses."""
+
+    def write(self, data: bytes | memoryview, /) -> int:
+        """Appends bytes, as many as the system takes at once; how many that were."""
+
+    def sync(self) -> None:
+        """Returns when what was written is on the disk."""
+
+    def truncate(self, length: int, /) -> None:
+        """Cuts the file off after `length` bytes."""
+
+    def close(self) -> None:
+        """Closes it; what was not synced may be lost with the power."""
+
+
+class SystemFile:
+    """A file of the operating system, by its descriptor."""
+
+    __slots__ = ("_handle", "sync", "truncate", "write")
+
+    def __init__(self, handle: int) -> None:
+        self._handle = handle
+        self.write = partial(os.write, handle)  # no call of ours in between: this is where most of the time goes
+        self.sync = partial(sync_data, handle)
+        self.truncate = partial(os.ftruncate, handle)
+
+    def close(self) -> None:
+        """Closes it."""
+        os.close(self._handle)
+
+
+class Disk:
+    """The disks of this machine; a test's does worse."""
+
+    def create(self, path: Path) -> LogFile:
+        """A file that did not exist before, its name on the disk. Raises FileExistsError, and OSError."""
+        return SystemFile(open_new(path))
+
+    def reopen(self, path: Path) -> LogFile:
+        """A file that exists, to be gone on with at its end. Raises FileNotFoundError, and OSError."""
+        return SystemFile(open_existing(path))
+
+    def sync_folder(self, folder: Path) -> None:
+        """Returns when the names in `folder` are on the disk."""
+        sync_folder(folder)
+
+
+SYSTEM = Disk()
+
+
+def write_all(file: LogFile, data: bytes) -> None:
+    """Writes every byte, however often the system takes only some of them."""
+    view = memoryview(data)
+    while view:
+        view = view[file.write(view) :]
 
 
 class EvidenceFile:

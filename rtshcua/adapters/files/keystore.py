@@ -10,10 +10,9 @@ from pathlib import Path
 
 from msgspec import UNSET
 
-from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
 from rtshcua.adapters.store.laying import appearing
 from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, write_new
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
 from rtshcua.wire import cose
 from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import ANY, Duty, SigningKey

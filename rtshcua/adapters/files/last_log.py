@@ -7,21 +7,30 @@ null until it was closed. It is written when the log was made and is empty yet, 
 """
 
 import json
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 from urllib.parse import quote
 
+import msgspec
+
 from rtshcua.adapters.files.recovery import InUse, Recovered
-from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
-from rtshcua.adapters.store.reading import read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, replace
+from rtshcua.adapters.store.reading import read_if_there
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace
 from rtshcua.evidence.recovery import State
 
-_HASH = re.compile(r"[0-9a-f]{64}")
 _LARGEST = 1 << 16  # octets of the file
+
+_Hash = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+
+
+class _Kept(msgspec.Struct):
+    """The file."""
+
+    log: str
+    before: _Hash | None = None
+    last: _Hash | None = None
 
 
 class Earlier(NamedTuple):
@@ -47,11 +56,11 @@ class LastLog:
             return Earlier(None, f"it is not known which log came before: `{self.path}`: {_words(error)}")
         if known is None:
             return Earlier(None)
-        log, before, last = known
-        if last is not None:
-            return Earlier(last)
+        if known.last is not None:
+            return Earlier(known.last)
+        log = Path(known.log)
         try:
-            return _told(log, before, recover(log))
+            return _told(log, known.before, recover(log))
         except (OSError, InUse) as error:
             return Earlier(None, f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}")
 
@@ -71,24 +80,22 @@ class LastLog:
 
 def known_end(state: Path, log: Path) -> str | None:
     """The hash of the last line of a log that a vehicle here wrote last, if it was closed; None where nobody knows."""
-    where = log.resolve()
+    where = str(log.resolve())
     for path in sorted((state / "logs").glob("vehicle-*")):
         with suppress(OSError, ValueError):
             known = _remembered(path)
-            if known is not None and known[0] == where and known[2] is not None:
-                return known[2]
+            if known is not None and known.log == where and known.last is not None:
+                return known.last
     return None
 
 
-def _remembered(path: Path) -> tuple[Path, str | None, str | None] | None:
-    """The last log, what it names, and how it ends. Raises OSError, and ValueError for what was not written by this."""
+def _remembered(path: Path) -> _Kept | None:
+    """What is kept of the last log. Raises OSError, and ValueError for what was not written by this."""
+    data = read_if_there(path, _LARGEST)
     try:
-        told = json.loads(read_regular(path, _LARGEST))
-    except FileNotFoundError:
-        return None
-    if not isinstance(told, dict) or not isinstance(told.get("log"), str):
-        raise ValueError("it is damaged")
-    return Path(told["log"]), _hash(told.get("before")), _hash(told.get("last"))
+        return None if data is None else msgspec.json.decode(data, type=_Kept)
+    except msgspec.DecodeError:
+        raise ValueError("it is damaged") from None
 
 
 def _told(log: Path, before: str | None, done: Recovered) -> Earlier:
@@ -103,14 +110,6 @@ def _told(log: Path, before: str | None, done: Recovered) -> Earlier:
     reason = "" if found.reason is None else f" (record {found.reason.record}: {found.reason.text})"
     what = "was tampered with" if found.state is State.TAMPERED else "is of another log key"
     return Earlier(done.last, f"the log before, `{log}`, {what} and is left as it is{reason}")
-
-
-def _hash(value: object) -> str | None:
-    if value is None:
-        return None
-    if not isinstance(value, str) or not _HASH.fullmatch(value):
-        raise ValueError("it is damaged")
-    return value
 
 
 def _words(error: Exception) -> str:

@@ -1,10 +1,14 @@
 """What `lint` remembers from run to run: one file an entry, in a folder that may be deleted at any time.
 
 The folder lies in a checkout, where others may write too, so each entry bears a code (HMAC-SHA256, RFC 2104) over its
-name and its content under a secret of this user (`lint_secret`). One that was cut, moved, half written, or made by
-anybody else is no entry. It is written beside its place and moved there, so that runs at the same time read either the
-old one or the new one. Whatever cannot be read or written is as if it were not there: a cache is never a reason to
-fail. Nothing is followed or written through a link, and a folder that is there and is no cache is left alone.
+name and its content. One that was cut, moved, half written, or made by anybody else is no entry. It is written beside
+its place and moved there, so that runs at the same time read either the old one or the new one. Whatever cannot be read
+or written is as if it were not there: a cache is never a reason to fail. Nothing is followed or written through a link,
+and a folder that is there and is no cache is left alone.
+
+The codes are made with a secret of this user: 32 random octets that are kept outside of any checkout. Whoever may write
+to a checkout (a pull request, an archive, another user) may write to the cache in it; without the secret nothing that
+they write there is believed. It guards nothing else, so one that was lost is made anew: the cache is cold for one run.
 """
 
 import hmac
@@ -13,14 +17,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from rtshcua.adapters.store.folders import make_folder, opened_folder
-from rtshcua.adapters.store.reading import read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, replace, write_new
+from rtshcua.adapters.store.reading import exposed, open_regular, opened_folder, read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, write_new
 
 FOLDER: Final = ".rtshcua_cache"
+SECRET: Final = "lint.secret"
 #: of the form of entries; what has another is not looked at
 _FORM: Final = "2"
 _LARGEST: Final = 16 << 20
+_SECRET_BYTES: Final = 32
 _TAG: Final = (
     "Signature: 8a477f597d28d172789f06886806bc55\n"
     "# This is a cache of `rtshcua lint`: see https://bford.info/cachedir/. It may be deleted at any time.\n"
@@ -89,3 +94,30 @@ class LintCache:
             with suppress(FileExistsError):
                 write_new(self._folder / name, text.encode(), root=self._root)
         self._prepared = True
+
+
+def lint_secret(folder: Path) -> bytes | None:
+    """The secret that is kept in a folder, made if there is none that its owner alone may read; None where the system
+    does not let us.
+    """
+    place = folder / SECRET
+    try:
+        found = _read_secret(place)
+        if found is None:
+            make_folder(folder, mode=PRIVATE_FOLDER)
+            replace(place, os.urandom(_SECRET_BYTES), mode=PRIVATE_FILE, synced=False)
+            found = _read_secret(place)  # of two that make one at the same time the later
+    except OSError:
+        return None
+    return found
+
+
+def _read_secret(place: Path) -> bytes | None:
+    """The secret; None where it is not there, is no file of ours, may be read by others, or has another length."""
+    try:
+        with open_regular(place, place.parent) as file:
+            foreign = exposed(file) or os.fstat(file.fileno()).st_uid != os.geteuid()
+            data = file.read(_SECRET_BYTES + 1)
+    except OSError:
+        return None
+    return data if len(data) == _SECRET_BYTES and not foreign else None

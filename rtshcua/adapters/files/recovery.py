@@ -8,18 +8,20 @@ In this order, each on the disk before the next: the copy of what is discarded, 
 is deleted but `log.recovering`, at last.
 """
 
+import errno
 import fcntl
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import os
+import stat
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import chain, islice
+from hashlib import sha256
+from itertools import chain, count, islice
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.port import SYSTEM, Disk
-from rtshcua.adapters.files.recovering import digest, end, forget, keep, places, plan_of, write
-from rtshcua.adapters.files.secret import disclosure_of
+from rtshcua.adapters.files.evidence import SYSTEM, Disk, LogFile, write_all
+from rtshcua.adapters.files.logs import disclosure_of, lines
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.reading import read
@@ -28,6 +30,7 @@ from rtshcua.evidence.recovery import RECOVERABLE, Examination, Examined, State,
 from rtshcua.model.flat.situation import Now
 
 _LONGEST_PLAN = 1 << 16
+_CHUNK = 1 << 20
 
 
 class InUse(Exception):
@@ -87,17 +90,17 @@ def recover(path: Path, signer: Signer, *, disk: Disk = SYSTEM) -> Recovered:
     with alone(path):
         begun = _begun(path, signer.public)
         if begun is not None:
-            return _finish(path, begun, disk)
+            return _finish(path, *begun, disk)
         found = examine(path, signer.public)
         if found.state not in RECOVERABLE:
             return Recovered(found, False, None, found.head.prev)
-        discarded = keep(path, found.kept, disk) if found.discarded else None
+        discarded = _keep(path, found.kept, disk) if found.discarded else None
         tail = ending(
             found, signer.now(), signer.certify, signer.public, signer.draw, partial(_disclosed, path, found, signer)
         )
-        write(plan_of(path), tail, disk)
-        end(path, found.kept, tail, disk)
-        return Recovered(found, True, discarded, leaf_hash(tail.partition(b"\n")[2]).hex())
+        _write_plan(_plan_of(path), tail, disk)
+        _end(path, found.kept, tail, disk)
+        return Recovered(found, True, discarded, _last(tail))
 
 
 def _disclosed(path: Path, found: Examined, signer: Signer, recover: bytes) -> bytes | None:
@@ -110,17 +113,11 @@ def _disclosed(path: Path, found: Examined, signer: Signer, recover: bytes) -> b
 # ------------------------------------------------------------------------------------------ what was begun
 
 
-class _Begun(NamedTuple):
-    """What an earlier recovery meant to do, if it got far enough: what it found, what it keeps, and the two lines."""
-
-    found: Examined
-    tail: bytes
-
-
-def _begun(path: Path, public: bytes) -> _Begun | None:
-    if not plan_of(path).is_file():
+def _begun(path: Path, public: bytes) -> tuple[Examined, bytes] | None:
+    """What an earlier recovery found and the two lines that it meant to append, if it got far enough."""
+    if not _plan_of(path).is_file():
         return None
-    tail = read_regular(plan_of(path), _LONGEST_PLAN, path.parent)
+    tail = read_regular(_plan_of(path), _LONGEST_PLAN, path.parent)
     first, newline, second = tail.partition(b"\n")
     recover, close = read(first + newline), read(second)
     if not isinstance(recover, Recover) or not isinstance(close, Close):
@@ -136,26 +133,30 @@ def _begun(path: Path, public: bytes) -> _Begun | None:
     if recover.discarded_bytes:
         discarded = bytes.fromhex(recover.discarded_digest)
         found = found._replace(state=State.TORN, discarded=recover.discarded_bytes, discarded_digest=discarded)
-    return _Begun(found, tail)
+    return found, tail
 
 
-def _finish(path: Path, begun: _Begun, disk: Disk) -> Recovered:
-    found, tail = begun
+def _finish(path: Path, found: Examined, tail: bytes, disk: Disk) -> Recovered:
     discarded = _kept_before(path, found) if found.discarded else None
     with open_regular(path) as file:
         file.seek(found.kept)
         behind = file.read(len(tail) + 1)
     if behind == tail:
-        forget(path, disk)
+        _forget(path, disk)
     else:
         if not tail.startswith(behind) and not _same(path, found.kept, found):
-            keep(path, found.kept, disk, besides=discarded)  # what the power left of the two lines
-        end(path, found.kept, tail, disk)
-    return Recovered(found, True, discarded, leaf_hash(tail.partition(b"\n")[2]).hex())
+            _keep(path, found.kept, disk, besides=discarded)  # what the power left of the two lines
+        _end(path, found.kept, tail, disk)
+    return Recovered(found, True, discarded, _last(tail))
+
+
+def _last(tail: bytes) -> str:
+    """The hash of the second of the two lines."""
+    return leaf_hash(tail.partition(b"\n")[2]).hex()
 
 
 def _kept_before(path: Path, found: Examined) -> Path | None:
-    for place in places(path):
+    for place in _places(path):
         if not place.exists():
             return None
         if _same(place, 0, found):
@@ -166,4 +167,98 @@ def _kept_before(path: Path, found: Examined) -> Path | None:
 def _same(path: Path, start: int, found: Examined) -> bool:
     """Whether the file, from there on, is what is discarded."""
     size = path.stat().st_size - start
-    return size == found.discarded and digest(path, start, size) == found.discarded_digest
+    return size == found.discarded and _digest(path, start, size) == found.discarded_digest
+
+
+# --------------------------- the steps, each on the disk when it returns, and to be taken again if it was broken off
+
+
+def _plan_of(path: Path) -> Path:
+    """Where the end of a log lies until it is written."""
+    return path.with_suffix(".recovering")
+
+
+def _places(path: Path) -> Iterator[Path]:
+    """Where what is discarded of a log may lie, the first place first."""
+    first = path.with_suffix(".discarded")
+    yield first
+    for number in count(2):
+        yield first.with_name(f"{first.name}.{number}")
+
+
+def _keep(path: Path, kept: int, disk: Disk, *, besides: Path | None = None) -> Path:
+    """Copies what stands behind the first `kept` octets; where that is now. A copy that was begun is written anew, but
+    nothing that is another, nor what is kept in `besides`.
+    """
+    size = path.stat().st_size - kept
+    for place in _places(path):
+        if place == besides:
+            continue
+        try:
+            found = place.lstat()
+        except FileNotFoundError:
+            file = disk.create(place)
+            break
+        there = found.st_size
+        if _own(found) and there <= size and _digest(place, 0, there) == _digest(path, kept, there):
+            file = disk.reopen(place)  # ours, whole or torn
+            break
+    _write(file, _chunks(path, kept, size))
+    return place
+
+
+def _write_plan(path: Path, data: bytes, disk: Disk) -> None:
+    """The file with this content, on the disk once this returns; until then it may hold anything."""
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    there = path.exists()
+    if there and not _own(path.lstat()):
+        raise OSError(errno.EEXIST, "something else lies there", str(path))
+    _write(disk.reopen(path) if there else disk.create(path), [data])
+
+
+def _end(path: Path, kept: int, tail: bytes, disk: Disk) -> None:
+    """Cuts the log off after so many octets, and appends its end."""
+    _write(disk.reopen(path), [tail], kept)
+    _forget(path, disk)
+
+
+def _write(file: LogFile, chunks: Iterable[bytes], kept: int = 0) -> None:
+    """Puts these behind the first `kept` octets of a file, in the place of what is there, and closes it."""
+    try:
+        file.truncate(kept)
+        if kept:
+            file.sync()  # else the power could leave what was cut behind what is appended
+        for chunk in chunks:
+            write_all(file, chunk)
+        file.sync()
+    finally:
+        file.close()
+
+
+def _forget(path: Path, disk: Disk) -> None:
+    """What was begun is done. If this fails, who comes next finds the log closed, and tries again."""
+    with suppress(OSError):
+        _plan_of(path).unlink()
+        disk.sync_folder(path.parent)
+
+
+def _own(found: os.stat_result) -> bool:
+    """Whether it is a file that has no other name: another's content is not written over."""
+    return stat.S_ISREG(found.st_mode) and found.st_nlink == 1
+
+
+def _digest(path: Path, start: int, size: int) -> bytes:
+    """SHA-256 of so many octets of a file, or of as many as there are."""
+    hasher = sha256()
+    for chunk in _chunks(path, start, size):
+        hasher.update(chunk)
+    return hasher.digest()
+
+
+def _chunks(path: Path, start: int, size: int) -> Iterator[bytes]:
+    with open_regular(path) as file:
+        file.seek(start)
+        while size > 0 and (chunk := file.read(min(size, _CHUNK))):
+            size -= len(chunk)
+            yield chunk

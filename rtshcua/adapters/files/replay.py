@@ -15,9 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder, opened_folder, sync_folder
-from rtshcua.adapters.store.reading import read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, UNFINISHED, replace, write_new
+from rtshcua.adapters.store.reading import opened_folder, read_if_there, read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, sync_folder, write_new
 from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
@@ -85,17 +84,13 @@ def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version:
 
 
 def _floor(folder: Path) -> int:
-    try:
-        return int(read_regular(folder / _FLOOR, _LARGEST))
-    except FileNotFoundError:
-        return -1
+    data = read_if_there(folder / _FLOOR, _LARGEST)
+    return -1 if data is None else int(data)
 
 
 def _versions(folder: Path) -> dict[str, int]:
-    try:
-        return dict(json.loads(read_regular(folder / _POLICIES, _LARGEST)))
-    except FileNotFoundError:
-        return {}
+    data = read_if_there(folder / _POLICIES, _LARGEST)
+    return {} if data is None else dict(json.loads(data))
 
 
 @contextmanager
@@ -108,9 +103,8 @@ def _alone(folder: Path) -> Iterator[None]:
 
 def _expiry(marker: Path) -> int | None:
     """When a marker's bundle expires; None for one that a crash left without it: it is kept for ever."""
-    if marker.name.startswith((_FLOOR, UNFINISHED)):
-        return None
     try:
+        bytes.fromhex(marker.name)  # what else lies here, floors and unfinished files, is no marker
         return int(read_regular(marker, _LARGEST))
     except ValueError:
         return None

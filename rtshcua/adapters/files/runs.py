@@ -5,12 +5,9 @@ from pathlib import Path
 
 import msgspec
 
-from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.port import SYSTEM, Disk
+from rtshcua.adapters.files.evidence import SYSTEM, Disk, EvidenceFile
 from rtshcua.adapters.files.telemetry import TelemetryFile
-from rtshcua.adapters.store.faults import naming
-from rtshcua.adapters.store.folders import make_folder, sync_folder
-from rtshcua.adapters.store.writing import replace, write_new
+from rtshcua.adapters.store.writing import make_folder, naming, replace, sync_folder, write_new
 
 BUNDLE, LOG, TELEMETRY, SUMMARY = "mission.bundle", "log.jsonl", "telemetry.tlog", "summary.json"
 

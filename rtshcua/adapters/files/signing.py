@@ -18,10 +18,8 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
-from rtshcua.adapters.store.folders import PRIVATE_FOLDER, make_folder
-from rtshcua.adapters.store.locking import lock
-from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, replace, write_new
+from rtshcua.adapters.store.reading import exposed, open_regular, read_if_there
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, lock, make_folder, replace, write_new
 from rtshcua.mavlink.signing import KEY_OCTETS, UNIT_US, SignedLink, State
 
 EVERY_S: Final = 1.0
@@ -81,9 +79,8 @@ class LinkStore:
 
     def load(self) -> State:
         """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""
-        try:
-            data = read_regular(self.path, _LARGEST)
-        except FileNotFoundError:
+        data = read_if_there(self.path, _LARGEST)
+        if data is None:
             return State(0, {})
         try:
             kept = json.loads(data)

@@ -8,7 +8,7 @@ from hashlib import file_digest
 from pathlib import Path
 from threading import Event, Thread
 
-from rtshcua.adapters.files.port import SYSTEM, Disk
+from rtshcua.adapters.files.evidence import SYSTEM, Disk, write_all
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.mavlink import tlog
 
@@ -91,9 +91,7 @@ class TelemetryFile:
                 continue
             try:
                 self._look_for_room()
-                data = memoryview(b"".join(tlog.encode(utc_us, frame) for utc_us, frame in batch))
-                while data:
-                    data = data[self._file.write(data) :]
+                write_all(self._file, b"".join(tlog.encode(utc_us, frame) for utc_us, frame in batch))
             except OSError as error:
                 self.error = error
 

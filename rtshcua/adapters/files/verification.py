@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from hashlib import sha256
 from itertools import repeat
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import BinaryIO, Final, NamedTuple
 
 from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.store.reading import open_regular
@@ -52,17 +52,27 @@ def verify_carefully(
     records.
     """
     auditor = Auditor(asked.pinned, bundle=asked.bundle, derive=derive, anchors=asked.anchors, frames=frames)
+    with open_regular(path) as file:
+        return follow(file, auditor, None if each is None else lambda _, record: each(record), progress)
+
+
+def follow(
+    file: BinaryIO,
+    auditor: Auditor,
+    each: Callable[[bytes, AnyRecord], None] | None = None,
+    progress: Progress = lambda _: None,
+) -> Audit:
+    """What an auditor says of the lines of an open log. `each` takes its sound records, with their lines."""
     collecting = gc.isenabled()
     gc.disable()  # nothing here makes cycles, and looking for them costs a tenth
     try:
-        with open_regular(path) as file:
-            for number, line in enumerate(lines(file)):
-                if not number & 0xFFF:
-                    progress(file.tell())
-                if not auditor.take(line):
-                    break
-                if each is not None and auditor.record is not None:
-                    each(auditor.record)
+        for number, line in enumerate(lines(file)):
+            if not number & 0xFFF:
+                progress(file.tell())
+            if not auditor.take(line):
+                break
+            if each is not None and auditor.record is not None:
+                each(line, auditor.record)
     finally:
         if collecting:
             gc.enable()

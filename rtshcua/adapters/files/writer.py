@@ -1,14 +1,15 @@
 """Evidence off the reflex path: a thread that owns the evidence file, fed without waiting (docs/adr/0016)."""
 
 import errno
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from time import monotonic
 
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.keeper import SYNC_AFTER_S, Keeper
-from rtshcua.adapters.files.lateness import STUCK_S, Lateness
+from rtshcua.evidence.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
+from rtshcua.evidence.records import is_signed
 
 #: More lines than this that are not kept mean that the disk does not keep up, and evidence fails. They are not dropped,
 #: for the chain has no holes: it goes on, while the flight comes down, up to `TIMES_MOST` times as many.
@@ -18,6 +19,12 @@ TIMES_MOST = 64
 SYNC_S = 0.2
 #: a disk that hangs is waited for this long at the end, in seconds
 CLOSE_S = 10.0
+#: A line of class `SYNCED` is synced this long after it was taken at the latest, in seconds: half of what is promised,
+#: for the sync takes its time too.
+SYNC_AFTER_S = SYNC_US / 1e6 / 2
+#: A line that was to be on the disk within `SYNC_US` and is not is told; when it is not after this time, in seconds,
+#: the disk counts as failed: it hangs.
+STUCK_S = 5.0
 
 _BEHIND = OSError(errno.ENOBUFS, "the disk does not keep up")
 _OVER = OSError(errno.ENOSPC, "the disk did not keep up, and the log ends before this")
@@ -80,19 +87,19 @@ class EvidenceWriter:
 
     def trouble(self) -> str | None:
         """Why lines are not kept, once for each failure of the disk."""
-        keeper = self._keeper
-        if not keeper.troubles.empty():  # nobody else takes from it
-            return keeper.troubles.get_nowait()
-        if keeper.failing or self._lateness.kept(keeper.synced):
-            return None
-        return self._lateness.stuck(keeper.synced, monotonic())
+        if not self._keeper.troubles.empty():  # nobody else takes from it
+            return self._keeper.troubles.get_nowait()
+        return self._overdue(self._lateness.stuck)
 
     def late(self) -> str | None:
         """That a line was not on the disk in time, once for each time that it falls behind."""
+        return self._overdue(self._lateness.late)
+
+    def _overdue(self, judge: Callable[[int, float], str | None]) -> str | None:
         keeper = self._keeper
         if keeper.failing or self._lateness.kept(keeper.synced):
             return None
-        return self._lateness.late(keeper.synced, monotonic())
+        return judge(keeper.synced, monotonic())
 
     def settle(self) -> None:
         """Waits until all that was given is on the disk. Raises OSError when it is not, or not in time."""
@@ -149,3 +156,144 @@ class EvidenceWriter:
                 item = self._queue.get_nowait()
             return batch, False
         return batch, True
+
+
+class Keeper:
+    """Feeds one evidence file. `written` and `synced` count lines from the first on, and never more than is certain.
+
+    They may be read in another thread. `troubles` is what the disk refused, in its words, each refusal once. It neither
+    waits nor looks at a clock: the writer's thread does, or a test.
+    """
+
+    def __init__(self, file: EvidenceFile, *, sync_after_s: float = SYNC_AFTER_S) -> None:
+        self.file = file
+        self.written = self.synced = 0
+        self.troubles: SimpleQueue[str] = SimpleQueue()
+        self._sync_after_s = sync_after_s
+        self._taken = 0
+        self._unsynced = False  # something was written since the last sync
+        self._promised_s: float | None = None  # since when a line waits that is to be synced
+        self._refused = False  # lines wait that the disk did not take
+        self._doubtful = False  # a sync failed: what is durable is not known any more
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is left to be written or synced."""
+        return self._unsynced or self.file.waiting > 0
+
+    @property
+    def failing(self) -> bool:
+        """Whether the disk refused something, and not all of that was made good."""
+        return self._doubtful or self._refused
+
+    def take(self, batch: Sequence[tuple[bytes, int]], now_s: float) -> None:
+        """Takes lines over, each with its class of durability, in their order; syncs if one asks for it, or it is time.
+
+        Without lines: nothing came for a while, and all that is left is written and synced.
+        """
+        self._taken += len(batch)
+        highest = WRITTEN
+        refused: OSError | None = None
+        for line, durability in batch:
+            highest = max(highest, durability)
+            if durability == SYNCED_FIRST and is_signed(line):
+                self.file.settle()
+            try:
+                self.file.append(line, min(durability, WRITTEN))
+            except OSError as error:
+                refused = error
+        if not batch:
+            with suppress(OSError):  # it was told when it was refused first
+                self.file.flush()
+        if refused is not None:
+            self._tell(refused)
+        self._refused = self.file.waiting > 0 and (self._refused or refused is not None)
+        self._unsynced = self._unsynced or bool(batch)
+        if highest >= SYNCED and self._promised_s is None:
+            self._promised_s = now_s
+        self._count()
+        if highest == SYNCED_FIRST or not batch or self._overdue(now_s):
+            self._sync(now_s)
+
+    def fail(self, reason: str) -> None:
+        """Nothing that comes from here on can be believed."""
+        self._doubtful = True
+        self.troubles.put(reason)
+
+    def close(self) -> None:
+        """Writes and syncs what it can, and closes the file. Raises OSError."""
+        try:
+            self.file.close()
+        finally:
+            self._count()
+        if not self._doubtful:
+            self.synced = self.written
+
+    def _overdue(self, now_s: float) -> bool:
+        return self._promised_s is not None and now_s - self._promised_s >= self._sync_after_s
+
+    def _sync(self, now_s: float) -> None:
+        if not self._unsynced:
+            return
+        waiting = self.file.waiting
+        try:
+            self.file.sync()
+        except OSError as error:
+            if not self._doubtful:
+                self._tell(error)
+            self._doubtful = True
+        self._unsynced = waiting > 0
+        self._promised_s = now_s if waiting and self._promised_s is not None else None
+        if not self._doubtful:
+            self.synced = self.written
+
+    def _count(self) -> None:
+        if not self._doubtful:
+            self.written = self._taken - self.file.waiting
+
+    def _tell(self, error: OSError) -> None:
+        self.troubles.put(error.strerror or str(error))
+
+
+class Lateness:
+    """Watches over the sync of lines, one at a time: the next is the last that was given when the one before came true.
+
+    Times are in seconds of the caller's clock, which never goes back.
+    """
+
+    def __init__(self, late_s: float = SYNC_US / 1e6, stuck_s: float = STUCK_S) -> None:
+        self._late_s, self._stuck_s = late_s, stuck_s
+        self._promised = 0  # the last line that is to be synced,
+        self._watched = 0  # the one that is watched,
+        self._since_s = 0.0  # since when,
+        self._told_s = 0.0  # and after how long it was told to be late
+
+    def given(self, number: int, durability: int) -> None:
+        """Line `number`, counted from 1, was given to the disk."""
+        if durability >= SYNCED:
+            self._promised = number
+
+    def kept(self, synced: int) -> bool:
+        """Whether all that was promised came true: then neither `late` nor `stuck` has anything to say."""
+        return self._promised <= synced
+
+    def late(self, synced: int, now_s: float) -> str | None:
+        """That a line is late, once for each time that the disk falls behind; `synced` lines are on it."""
+        if self._told_s or self._waited_s(synced, now_s) <= self._late_s:
+            return None
+        self._told_s = self._late_s
+        return f"what was to be on the disk within {SYNC_US // 1_000} ms is not"
+
+    def stuck(self, synced: int, now_s: float) -> str | None:
+        """That the disk hangs, once for each time that it does."""
+        if self._waited_s(synced, now_s) <= self._stuck_s or self._told_s >= self._stuck_s:
+            return None
+        self._told_s = self._stuck_s
+        return f"the disk has not answered for {self._stuck_s:g} s"
+
+    def _waited_s(self, synced: int, now_s: float) -> float:
+        if self._promised <= synced:
+            return 0.0
+        if self._watched <= synced:
+            self._watched, self._since_s, self._told_s = self._promised, now_s, 0.0
+        return now_s - self._since_s

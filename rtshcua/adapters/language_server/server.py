@@ -2,24 +2,51 @@
 
 import gc
 import logging
+import os
 import socket
 import sys
 from collections.abc import Callable
-from typing import Any
+from threading import Timer
+from typing import Any, BinaryIO
 
 from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
+from pygls.protocol import LanguageServerProtocol
 
 from rtshcua import __version__
-from rtshcua.adapters.language_server import changes, convert, features, wide
-from rtshcua.adapters.language_server.ending import Watched
-from rtshcua.adapters.language_server.protocol import Protocol
+from rtshcua.adapters.language_server import features
+from rtshcua.adapters.language_server.disk import path_of
 from rtshcua.adapters.language_server.searching import Shown
 from rtshcua.adapters.language_server.session import Session
-from rtshcua.adapters.language_server.uris import path_of
+from rtshcua.adapters.language_server.texts import place
 from rtshcua.ground.editor.positions import Change, Encoding
 
+GRACE = 5.0
+"""Seconds from the end of the editor's stream until the process ends, whatever still runs in it."""
 _WATCHED = "**/*.{rts,geojson,json,toml}"
+
+
+def _change(change: lsp.TextDocumentContentChangeEvent) -> Change:
+    if isinstance(change, lsp.TextDocumentContentChangePartial):
+        return Change(place(change.range.start), place(change.range.end), change.text)
+    return Change(None, None, change.text)
+
+
+#: what the editor tells, and what the session does then
+_NOTICES: dict[str, Callable[[Session, Any], None]] = {
+    lsp.TEXT_DOCUMENT_DID_OPEN: lambda session, told: session.open(
+        told.text_document.uri, told.text_document.version, told.text_document.text
+    ),
+    lsp.TEXT_DOCUMENT_DID_CHANGE: lambda session, told: session.change(
+        told.text_document.uri, told.text_document.version, [_change(each) for each in told.content_changes]
+    ),
+    lsp.TEXT_DOCUMENT_DID_CLOSE: lambda session, told: session.close(told.text_document.uri),
+    lsp.TEXT_DOCUMENT_DID_SAVE: lambda session, _: session.reread(),
+    lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES: lambda session, _: session.reread(),
+    lsp.SHUTDOWN: lambda session, _: session.end(),
+}
+#: what it asks: the method, the answer, and what the server says that it can
 _QUESTIONS = (
     (lsp.TEXT_DOCUMENT_HOVER, features.hovered, None),
     (lsp.TEXT_DOCUMENT_DEFINITION, features.defined, None),
@@ -29,15 +56,17 @@ _QUESTIONS = (
     (lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL, features.outline, None),
     (lsp.TEXT_DOCUMENT_FOLDING_RANGE, features.folded, None),
     (lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, features.coloured_all, features.LEGEND),
-    (lsp.TEXT_DOCUMENT_PREPARE_RENAME, changes.may_rename, None),
-    (lsp.TEXT_DOCUMENT_FORMATTING, changes.laid_out, None),
-    (lsp.TEXT_DOCUMENT_CODE_ACTION, changes.offered, lsp.CodeActionOptions(
+    (lsp.TEXT_DOCUMENT_PREPARE_RENAME, features.may_rename, None),
+    (lsp.TEXT_DOCUMENT_FORMATTING, features.laid_out, None),
+    (lsp.TEXT_DOCUMENT_CODE_ACTION, features.offered, lsp.CodeActionOptions(
         [lsp.CodeActionKind.QuickFix, lsp.CodeActionKind.SourceFixAll])),
 )  # fmt: skip
+#: what is asked of the whole workspace, besides with a title for the progress
 _SEARCHES = (
-    (lsp.TEXT_DOCUMENT_REFERENCES, wide.referred, "looking for uses", lsp.ReferenceOptions(work_done_progress=True)),
-    (lsp.WORKSPACE_SYMBOL, wide.symbols, "looking for names", lsp.WorkspaceSymbolOptions(work_done_progress=True)),
-    (lsp.TEXT_DOCUMENT_RENAME, wide.renamed, "renaming", lsp.RenameOptions(True, work_done_progress=True)),
+    (lsp.TEXT_DOCUMENT_REFERENCES, features.referred, "looking for uses",
+     lsp.ReferenceOptions(work_done_progress=True)),
+    (lsp.WORKSPACE_SYMBOL, features.symbols, "looking for names", lsp.WorkspaceSymbolOptions(work_done_progress=True)),
+    (lsp.TEXT_DOCUMENT_RENAME, features.renamed, "renaming", lsp.RenameOptions(True, work_done_progress=True)),
 )  # fmt: skip
 
 
@@ -74,7 +103,7 @@ def _over(server: LanguageServer, host: str, port: int) -> None:
 
 def _is_a_fault(record: logging.LogRecord) -> bool:
     """A request that is refused with a reason is no fault of the server's, so nothing is logged of it."""
-    return not (record.exc_info and isinstance(record.exc_info[1], changes.NotDone))
+    return not (record.exc_info and isinstance(record.exc_info[1], features.NotDone))
 
 
 def make(library: str) -> tuple[LanguageServer, Session]:
@@ -82,7 +111,8 @@ def make(library: str) -> tuple[LanguageServer, Session]:
     server = LanguageServer("rtshcua", __version__, protocol_cls=Protocol)
     session = Session(library, server.text_document_publish_diagnostics, _saying(server))
     _lifecycle(server, session)
-    _documents(server, session)
+    for notice, act in _NOTICES.items():
+        server.feature(notice)(_asked(act, session))
     for method, answer, options in _QUESTIONS:
         server.feature(method, options)(_asked(answer, session))
     for method, search, title, told in _SEARCHES:
@@ -101,6 +131,56 @@ def _saying(server: LanguageServer) -> Callable[[str], None]:
             server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, text))
 
     return say
+
+
+class Protocol(LanguageServerProtocol):
+    """The protocol of pygls, which logs what it cannot read, and with an answer (-32602, `Invalid params`): an editor
+    waits for each of its requests.
+    """
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        """A message; None for a request that was malformed, and is answered. Raises JsonRpcException for any other."""
+        try:
+            return super().structure_message(data)
+        except JsonRpcException as error:
+            asked, number = data.get("method"), data.get("id")
+            if not isinstance(asked, str) or not isinstance(number, int | str):
+                raise
+            why = f"these are no parameters of `{asked}`"
+            self._send_response(number, error=JsonRpcInvalidParams(message=why, data=str(error)).to_response_error())
+            return None
+
+    def handle_message(self, message: Any) -> None:
+        """Hands a message to its feature, unless it is answered already."""
+        if message is not None:
+            super().handle_message(message)
+
+
+class Watched:
+    """What comes from the editor. Where that ends, the process does too, by itself or by force: a check that cannot be
+    interrupted, or a process that is just being started, holds up nobody's end.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+
+    def readline(self) -> bytes:
+        """One line; a part of one, or nothing, at the end."""
+        data = self._stream.readline()
+        return self._seen(data, ended=not data.endswith(b"\n"))
+
+    def read(self, size: int) -> bytes:
+        """So many bytes; fewer at the end."""
+        data = self._stream.read(size)
+        return self._seen(data, ended=len(data) < size)
+
+    def _seen(self, data: bytes, *, ended: bool) -> bytes:
+        # Told by what is cut off, too: whoever cannot answer it, for nobody listens any more, reads no further.
+        if ended:
+            forced = Timer(GRACE, os._exit, (0,))
+            forced.daemon = True
+            forced.start()
+        return data
 
 
 def _asked(answer: Any, session: Session) -> Any:
@@ -146,41 +226,6 @@ def _lifecycle(server: LanguageServer, session: Session) -> None:
         added = [path for each in params.event.added if (path := path_of(each.uri)) is not None]
         session.folders = [*(each for each in session.folders if each not in gone), *added]
 
-    def shutdown(_params: None) -> None:
-        session.end()
-
     server.feature(lsp.INITIALIZE)(initialize)
     server.feature(lsp.INITIALIZED)(initialized)
     server.feature(lsp.WORKSPACE_DID_CHANGE_WORKSPACE_FOLDERS)(folders)
-    server.feature(lsp.SHUTDOWN)(shutdown)
-
-
-def _documents(server: LanguageServer, session: Session) -> None:
-    def opened(params: lsp.DidOpenTextDocumentParams) -> None:
-        document = params.text_document
-        session.open(document.uri, document.version, document.text)
-
-    def changed(params: lsp.DidChangeTextDocumentParams) -> None:
-        made = [_change(each) for each in params.content_changes]
-        session.change(params.text_document.uri, params.text_document.version, made)
-
-    def closed(params: lsp.DidCloseTextDocumentParams) -> None:
-        session.close(params.text_document.uri)
-
-    def saved(_params: lsp.DidSaveTextDocumentParams) -> None:
-        session.reread()
-
-    def watched(_params: lsp.DidChangeWatchedFilesParams) -> None:
-        session.reread()
-
-    server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)(opened)
-    server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)(changed)
-    server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)(closed)
-    server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)(saved)
-    server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)(watched)
-
-
-def _change(change: lsp.TextDocumentContentChangeEvent) -> Change:
-    if isinstance(change, lsp.TextDocumentContentChangePartial):
-        return Change(convert.place(change.range.start), convert.place(change.range.end), change.text)
-    return Change(None, None, change.text)

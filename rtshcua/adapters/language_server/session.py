@@ -12,12 +12,10 @@ from collections.abc import Callable
 
 from lsprotocol import types as lsp
 
-from rtshcua.adapters.language_server import convert
-from rtshcua.adapters.language_server.disk import desk
-from rtshcua.adapters.language_server.proving import Found, Proving
+from rtshcua.adapters.language_server.disk import desk, name_of
+from rtshcua.adapters.language_server.prover import Found, Proving
 from rtshcua.adapters.language_server.searching import Searching
-from rtshcua.adapters.language_server.texts import Opened, Texts
-from rtshcua.adapters.language_server.uris import name_of
+from rtshcua.adapters.language_server.texts import Opened, Texts, diagnostic
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.compiler.program import check_declared
 from rtshcua.ground.editor.moved import moved_finding
@@ -180,7 +178,7 @@ class Session(Texts):
     def _publish_one(self, name: str, *, always: bool = True) -> None:
         lines = self.lines(name)
         found = [] if lines is None else [
-            convert.diagnostic(each, lines, self.locate, self.page) for each in self.findings(name)
+            diagnostic(each, lines, self.locate, self.page) for each in self.findings(name)
         ]  # fmt: skip
         if always or self._last.get(name, []) != found:
             opened = self.opened.get(name)

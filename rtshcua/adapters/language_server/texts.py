@@ -1,25 +1,52 @@
-"""The texts of an editor's session, and where things are in them; a copy of it is what a long search works on."""
+"""The texts of an editor's session, and where things are in them, in the terms of the protocol.
 
-from collections.abc import Iterator
+A copy of them is what a long search works on.
+"""
+
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from lsprotocol import types as lsp
 
 from rtshcua.adapters.files.project import Project, Projects
-from rtshcua.adapters.language_server import convert
-from rtshcua.adapters.language_server.disk import sources
-from rtshcua.adapters.language_server.uris import name_of, uri_of
-from rtshcua.diagnostics.codes import Code
+from rtshcua.adapters.language_server.disk import name_of, sources, uri_of
+from rtshcua.diagnostics.codes import Code, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.positions import Encoding, Lines
+from rtshcua.ground.editor.positions import Encoding, Lines, Place
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import FormatSettings
 from rtshcua.mavlink.dialect import Dialect
+
+SOURCE = "rtshcua"
+_SEVERITIES = {
+    Severity.ERROR: lsp.DiagnosticSeverity.Error,
+    Severity.WARNING: lsp.DiagnosticSeverity.Warning,
+    Severity.NOTE: lsp.DiagnosticSeverity.Information,
+}
+#: findings on what is there for nothing, which editors show faded
+_UNNECESSARY = frozenset({"E1301", "E1305", "E0720", "E0721", "E0722"})
+
+SYMBOLS = {
+    "enum": lsp.SymbolKind.Enum, "signal": lsp.SymbolKind.Variable, "zone": lsp.SymbolKind.Object,
+    "vehicle": lsp.SymbolKind.Struct, "skill": lsp.SymbolKind.Function, "template": lsp.SymbolKind.Interface,
+    "policy": lsp.SymbolKind.Class, "mission": lsp.SymbolKind.Module, "nominal": lsp.SymbolKind.Constant,
+    "test": lsp.SymbolKind.Method, "member": lsp.SymbolKind.EnumMember, "phase": lsp.SymbolKind.Namespace,
+    "parameter": lsp.SymbolKind.Field,
+}  # fmt: skip
+ITEMS = {
+    "keyword": lsp.CompletionItemKind.Keyword, "skill": lsp.CompletionItemKind.Function,
+    "signal": lsp.CompletionItemKind.Variable, "zone": lsp.CompletionItemKind.Class,
+    "parameter": lsp.CompletionItemKind.Property, "member": lsp.CompletionItemKind.EnumMember,
+    "unit": lsp.CompletionItemKind.Unit, "file": lsp.CompletionItemKind.File, "field": lsp.CompletionItemKind.Field,
+    "type": lsp.CompletionItemKind.TypeParameter, "policy": lsp.CompletionItemKind.Module,
+    "template": lsp.CompletionItemKind.Interface, "vehicle": lsp.CompletionItemKind.Struct,
+}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -44,6 +71,15 @@ class Opened:
         return self.quick if self.whole is None else self.whole
 
 
+class Spot(NamedTuple):
+    """Where an editor points: a program, the name and the lines of its first file, and the character in these."""
+
+    view: View
+    name: str
+    lines: Lines
+    offset: int
+
+
 @dataclass(eq=False)
 class Texts:
     """What is open, over what is on the disk, and how the editor counts and calls it."""
@@ -62,14 +98,17 @@ class Texts:
         desk = self.desk.with_texts({})
         return Texts(desk, self.library, self.dialect, self.encoding, list(self.folders), self.versioned, opened)
 
-    def view(self, uri: str) -> tuple[View, str]:
-        """The program of a text, and its name."""
+    def spot(self, uri: str, at: lsp.Position) -> Spot | None:
+        """A place in a text; None where there is no such text."""
         name = name_of(uri)
-        return self.desk.view(name), name
+        lines = self.lines(name)
+        return None if lines is None else Spot(self.desk.view(name), name, lines, lines.offset(place(at)))
 
-    def cut(self, uri: str) -> Cut | None:
-        """A text that is open."""
-        return self.desk.open.get(name_of(uri))
+    def cut(self, uri: str) -> tuple[Cut, Lines] | None:
+        """A text that is open, and its lines."""
+        cut = self.desk.open.get(name_of(uri))
+        lines = None if cut is None else self.lines(cut.source.file)
+        return None if cut is None or lines is None else (cut, lines)
 
     def workspace(self) -> Iterator[str]:
         """The names of all sources of the workspace."""
@@ -101,8 +140,43 @@ class Texts:
     def locate(self, span: Span) -> lsp.Location | None:
         """A place in any file; None where the file is gone."""
         lines = self.lines(span.file)
-        return None if lines is None else lsp.Location(self.uri(span.file), convert.range_of(lines, *span[1:]))
+        return None if lines is None else lsp.Location(self.uri(span.file), range_of(lines, *span[1:]))
 
     def page(self, code: Code) -> str | None:
         """Where a code is explained."""
         return uri_of(f"{self.library}/docs/codes/{code.id}.md")
+
+
+def position(place: Place) -> lsp.Position:
+    """A place."""
+    return lsp.Position(place.line, place.column)
+
+
+def place(at: lsp.Position) -> Place:
+    """A place of the editor's."""
+    return Place(at.line, at.character)
+
+
+def range_of(lines: Lines, start: int, end: int) -> lsp.Range:
+    """A range of characters."""
+    return lsp.Range(position(lines.place(start)), position(lines.place(end)))
+
+
+def diagnostic(
+    found: Diagnostic, lines: Lines, locate: Callable[[Span], lsp.Location | None], page: Callable[[Code], str | None]
+) -> lsp.Diagnostic:
+    """A finding in the file of `lines`; one without a place is at its beginning. `page` is where a code is told."""
+    span = found.span
+    further = [lsp.DiagnosticRelatedInformation(at, label.text) for label in found.labels
+               if (at := locate(label.span)) is not None]  # fmt: skip
+    href = page(found.code)
+    return lsp.Diagnostic(
+        range=range_of(lines, *(span.start, span.end) if span is not None else (0, 0)),
+        message=found.message if found.help is None else f"{found.message}\nhelp: {found.help}",
+        severity=_SEVERITIES[found.severity],
+        code=found.code.id,
+        code_description=None if href is None else lsp.CodeDescription(href),
+        source=SOURCE,
+        tags=[lsp.DiagnosticTag.Unnecessary] if found.code.id in _UNNECESSARY else None,
+        related_information=further or None,
+    )

@@ -8,8 +8,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import NamedTuple
 
-from rtshcua.adapters.store.folders import sync_folder
-from rtshcua.adapters.store.writing import COMMON_FILE, UNFINISHED
+from rtshcua.adapters.store.writing import COMMON_FILE, UNFINISHED, sync_folder
 from rtshcua.adapters.store.writing import replace as put
 
 

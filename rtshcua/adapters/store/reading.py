@@ -2,16 +2,20 @@
 
 import os
 import stat
-from errno import ELOOP, ENXIO
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from errno import EINVAL, ELOOP, ENXIO
 from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from rtshcua.adapters.store.faults import NotRegular
-from rtshcua.adapters.store.folders import opened_folder
-
 #: without O_NONBLOCK a pipe without a writer would be waited for; with O_NOCTTY no terminal becomes ours
 UNAWAITED: Final = os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+_FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+
+
+class NotRegular(OSError):
+    """Something else than a regular file: a pipe, a device, a socket, a folder; or a link where none is followed."""
 
 
 def open_regular(path: str | Path, root: Path | None = None) -> BufferedReader:
@@ -45,6 +49,14 @@ def read_regular(path: str | Path, most: int, root: Path | None = None) -> bytes
         return file.read(most + 1)
 
 
+def read_if_there(path: Path, most: int) -> bytes | None:
+    """What `read_regular` gives; None where there is no file."""
+    try:
+        return read_regular(path, most)
+    except FileNotFoundError:
+        return None
+
+
 def expect_regular(handle: int, path: str | Path) -> None:
     """Closes a descriptor that is not of a regular file, and raises `NotRegular`."""
     if not stat.S_ISREG(os.fstat(handle).st_mode):
@@ -56,3 +68,27 @@ def exposed(file: BinaryIO) -> str | None:
     """The mode of an open file that others than its owner may read, write or run, as in `0644`; else None."""
     mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
     return f"{mode:04o}" if mode & 0o077 else None
+
+
+@contextmanager
+def opened_folder(folder: Path, root: Path | None = None, *, make: int | None = None) -> Iterator[int]:
+    """A descriptor of a folder. Below `root` no link is followed, whoever puts one there and whenever, and, where a
+    mode is given to `make` them with, folders that are missing are made, each synced.
+
+    Without a root, links are followed. Raises OSError.
+    """
+    handle = os.open(root or folder, _FOLDER)
+    try:
+        for part in folder.relative_to(root).parts if root else ():
+            if part == "..":
+                raise OSError(EINVAL, "`..` leads out of a folder", str(folder))
+            if make is not None:
+                with suppress(FileExistsError):
+                    os.mkdir(part, make, dir_fd=handle)
+                    os.fsync(handle)
+            below = os.open(part, _FOLDER | os.O_NOFOLLOW, dir_fd=handle)
+            os.close(handle)
+            handle = below
+        yield handle
+    finally:
+        os.close(handle)

@@ -4,6 +4,7 @@ Nothing is written through a link: one that stands where a file is to go is repl
 """
 
 import errno
+import fcntl
 import os
 import stat
 from collections.abc import Iterator
@@ -11,14 +12,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from rtshcua.adapters.store.faults import Changed, naming
-from rtshcua.adapters.store.folders import opened_folder, sync_folder
-from rtshcua.adapters.store.reading import UNAWAITED, expect_regular, open_regular, read_regular
+from rtshcua.adapters.store.reading import UNAWAITED, expect_regular, open_regular, opened_folder, read_regular
 
 #: modes, from which the umask takes away
 PRIVATE_FILE: Final = 0o600
 PUBLIC_FILE: Final = 0o644
 COMMON_FILE: Final = 0o666
+PRIVATE_FOLDER: Final = 0o700
+PUBLIC_FOLDER: Final = 0o755
 #: what the names of files begin with that are not finished; a loss of power may leave one
 UNFINISHED: Final = ".rtshcua-"
 
@@ -27,6 +28,27 @@ _MORE: Final = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | UNAWAITE
 
 #: syncs a file's bytes, and of its metadata only what reading them back needs
 sync_data = getattr(os, "fdatasync", os.fsync)
+
+
+class NotWritten(PermissionError):
+    """A file that may not be written where it was asked for."""
+
+
+class Changed(OSError):
+    """The file was written by somebody else meanwhile, so it is left alone."""
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """An error of writing names the file that was asked for, whatever the system was doing."""
+    try:
+        yield
+    except PermissionError as error:
+        raise NotWritten(error.errno, error.strerror, str(path)) from None
+    except OSError as error:
+        if error.errno is not None:
+            error.filename = str(path)
+        raise
 
 
 def write_all(handle: int, data: bytes) -> None:
@@ -124,6 +146,13 @@ def open_new(path: Path, *, mode: int = PUBLIC_FILE) -> int:
     return handle
 
 
+def open_existing(path: Path) -> int:
+    """A descriptor of a regular file that is there, or a link to one, to be appended to. Raises OSError."""
+    handle = os.open(path, os.O_RDWR | os.O_APPEND | UNAWAITED)
+    expect_regular(handle, path)
+    return handle
+
+
 def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, root: Path | None = None) -> None:
     """Creates a file with its content, synced. Raises FileExistsError; leaves nothing behind when it fails."""
     with naming(path), opened_folder(path.parent, root) as folder:
@@ -153,3 +182,32 @@ def append(path: Path, data: bytes, root: Path | None = None) -> None:
         finally:
             os.close(handle)
         os.fsync(folder)
+
+
+def make_folder(folder: Path, *, mode: int = PUBLIC_FOLDER, root: Path | None = None) -> None:
+    """Makes a folder and those above it that are missing, each synced; one that is there stays as it is."""
+    with naming(folder):
+        above = root or next(each for each in (folder, *folder.parents) if each.exists())
+        with opened_folder(folder, above, make=mode):
+            pass
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes the names in a folder survive a crash."""
+    with opened_folder(folder) as handle:
+        os.fsync(handle)
+
+
+def lock(path: Path, *, mode: int = PRIVATE_FILE) -> int:
+    """A descriptor that holds a file, made where it is missing, until it is closed or its holder dies.
+
+    Raises BlockingIOError where somebody holds it, and OSError.
+    """
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | UNAWAITED, mode)
+    expect_regular(handle, path)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        raise
+    return handle

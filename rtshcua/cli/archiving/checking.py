@@ -5,7 +5,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,8 +22,8 @@ from rtshcua.wire.untrusted import Untrusted
 
 if TYPE_CHECKING:
     from rtshcua.adapters.archive.adding import Check, Done
+    from rtshcua.adapters.archive.examine import Workers
     from rtshcua.adapters.archive.folder import Folder
-    from rtshcua.adapters.archive.workers import Workers
 
 _TOLD = 20  # logs that are told of one by one
 
@@ -52,7 +52,7 @@ def checked(
     folder = Folder(where, make=make)
     done: list[Done] = []
     try:
-        with _workers(jobs, cluster) as workers:
+        with closing(_workers(jobs, cluster)) as workers:
             check = Check(pinned.key, AUDIT if audit else RECORDS, time.time_ns() // 1000, workers)
             for each in work(folder, check):
                 done.append(each)
@@ -70,21 +70,14 @@ def checked(
     return _told(folder, done, skipped, pinned, check.root, as_json=as_json)
 
 
-@contextmanager
-def _workers(jobs: int | None, cluster: str | None) -> "Iterator[Workers]":
-    workers: Workers
+def _workers(jobs: int | None, cluster: str | None) -> "Workers":
     if cluster is not None:
         from rtshcua.adapters.archive.cluster import Cluster
 
-        workers = Cluster(cluster)
-    else:
-        from rtshcua.adapters.archive.workers import Processes
+        return Cluster(cluster)
+    from rtshcua.adapters.archive.examine import Processes
 
-        workers = Processes(jobs)
-    try:
-        yield workers
-    finally:
-        workers.close()
+    return Processes(jobs)
 
 
 def _progress(count: int) -> None:

@@ -5,6 +5,7 @@ from datetime import date
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
+from rtshcua.adapters.archive.folder import Source
 from rtshcua.adapters.files.logs import begins_as_log
 from rtshcua.adapters.files.runs import LOG, logs_of
 from rtshcua.cli.faults import fail
@@ -26,7 +27,7 @@ class Skipped(NamedTuple):
 class Given(NamedTuple):
     """The logs of a command line, and what is no log in the folders that it names."""
 
-    logs: list[Path]
+    logs: list[Source]
     skipped: list[Skipped]
 
 
@@ -37,20 +38,20 @@ def logs_in(given: Iterable[Path]) -> Given | ExitCode:
     """
     found = Given([], [])
     for path in given:
-        named = not path.is_dir()
+        root = path if path.is_dir() else None
         below = logs_of(path)
         if not below:
             return fail(ExitCode.INPUT, f"there is no `{LOG}` in `{path}` or below it")
         for log in below:
             try:
-                wrong = None if begins_as_log(log, None if named else path) else "it is not a log of this program"
+                wrong = None if begins_as_log(log, root) else "it is not a log of this program"
             except OSError as error:
-                if named:
+                if root is None:
                     raise
                 wrong = (error.strerror or str(error)).lower()
             if wrong is None:
-                found.logs.append(log)
-            elif named:
+                found.logs.append(Source(log, root))
+            elif root is None:
                 return fail(ExitCode.INPUT, f"`{log}` is not a log of this program")
             else:
                 found.skipped.append(Skipped(log, wrong))

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from rtshcua.adapters.files.changed import Changes, NoChanges, changed_files
+from rtshcua.adapters.files.git import Changes, NoChanges, changed_files
 from rtshcua.cli.faults import exit_code_of, say, tell, words_of
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.linting.fixing import Fixed, fix

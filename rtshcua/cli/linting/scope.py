@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.files.folders import lint_secret_folder
-from rtshcua.adapters.files.lint_cache import FOLDER, LintCache
-from rtshcua.adapters.files.lint_secret import lint_secret
+from rtshcua.adapters.files.lint_cache import FOLDER, LintCache, lint_secret
 from rtshcua.adapters.files.project import Project, Projects
 from rtshcua.cli.asked import SOURCE, unfolded
 from rtshcua.cli.linting.options import Options

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 
 from rtshcua import library
-from rtshcua.adapters.files.changed import Changes
+from rtshcua.adapters.files.git import Changes
 from rtshcua.cli.linting.examined import Examined
 
 

@@ -10,11 +10,10 @@ from random import Random
 import pytest
 
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Log, log_keys
-from rtshcua.adapters import witness_client
-from rtshcua.adapters.files.anchors import beside, read_anchors
+from rtshcua.adapters import witness_link
+from rtshcua.adapters.files.logs import beside, read_anchors
 from rtshcua.adapters.files.witness import FileWitness, WitnessStore
-from rtshcua.adapters.witness_client import Anchor, Trouble, WitnessClient
-from rtshcua.adapters.witness_link import ANSWER, REQUEST, WitnessLink
+from rtshcua.adapters.witness_link import ANSWER, REQUEST, Anchor, Trouble, WitnessClient, WitnessLink
 from rtshcua.codec.frames import Codec
 from rtshcua.codec.tunnel import answer_name, messages, name_of
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
@@ -131,9 +130,9 @@ class Writer:
 @pytest.fixture(autouse=True)
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same, in less time."""
-    monkeypatch.setattr(witness_client, "EVERY_S", 0.005)
-    monkeypatch.setattr(witness_client, "AGAIN_S", 0.05)
-    monkeypatch.setattr(witness_client, "LONGEST_S", 0.1)
+    monkeypatch.setattr(witness_link, "EVERY_S", 0.005)
+    monkeypatch.setattr(witness_link, "AGAIN_S", 0.05)
+    monkeypatch.setattr(witness_link, "LONGEST_S", 0.1)
 
 
 @pytest.fixture
@@ -355,7 +354,7 @@ def test_strangers_are_not_heard(serve: Callable[..., Served], writer: Writer) -
         with pytest.raises(TimeoutError):
             stranger.recvfrom(1_000)
         client = writer.client(served.address)
-        port = client._socket.getsockname()[1]
+        port = client._tunnel.port
         for message in messages(ANSWER, b"12345678", b"409\n5\n"):
             stranger.sendto(codec.pack(message), (HOST, port))
         until(client, seen(0))

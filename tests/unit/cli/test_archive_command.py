@@ -16,6 +16,7 @@ import pytest
 
 from reference import generated_logs
 from reference.archived import write_fleet
+from rtshcua.adapters.files.logs import begins_as_log
 from rtshcua.cli import app
 from rtshcua.cli.archiving import told
 from rtshcua.diagnostics.exits import ExitCode
@@ -355,3 +356,22 @@ def test_a_link_in_a_folder_is_not_taken_in(runs: Path, capsys: pytest.CaptureFi
     assert archive("add", "flown", *ROOT) == ExitCode.INPUT
     assert "flown/a/log.jsonl: symbolic links are not followed here" in capsys.readouterr().out
     assert archive("add", "flown/a/log.jsonl", *ROOT) == ExitCode.OK
+
+
+def test_a_log_that_becomes_a_link_before_it_is_copied_is_not_taken_in(
+    runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("flown/a").mkdir(parents=True)
+    log = Path("flown/a/log.jsonl")
+    log.write_bytes((runs / "quad-07-1" / "log.jsonl").read_bytes())
+
+    def looked_at_and_replaced(path: Path, root: Path | None = None) -> bool:
+        begins = begins_as_log(path, root)
+        path.unlink()
+        path.symlink_to(runs / "quad-07-0" / "log.jsonl")
+        return begins
+
+    monkeypatch.setattr("rtshcua.cli.archiving.given.begins_as_log", looked_at_and_replaced)
+    assert archive("add", "flown", *ROOT) == ExitCode.INPUT
+    assert "flown/a/log.jsonl: symbolic links are not followed here" in capsys.readouterr().err
+    assert not list(Path("archive/logs").rglob("*.jsonl"))

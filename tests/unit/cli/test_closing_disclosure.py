@@ -10,7 +10,7 @@ from reference.faulty_disk import FaultyDisk
 from reference.sealed_log import LOG_KEY, SECRET, now, sign
 from reference.seeds import epoch_seeds
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.secret import disclosure_of, write_secret
+from rtshcua.adapters.files.logs import disclosure_of, write_secret
 from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.cli import closing

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from reference.forgery import ROOT_KEY, flight
-from rtshcua.adapters.store.faults import NotWritten
-from rtshcua.adapters.store.writing import replace
+from rtshcua.adapters.store.writing import NotWritten, replace
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
 

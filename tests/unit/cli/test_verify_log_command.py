@@ -10,7 +10,7 @@ import pytest
 
 from reference.forgery import edit, flight, signed
 from reference.marked import mark, note_of
-from rtshcua.adapters.files import anchors
+from rtshcua.adapters.files import logs
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli import app, verdict, verify_log
@@ -298,7 +298,7 @@ def test_anchors_that_were_named_are_read_or_it_is_said(
     os.mkfifo(tmp_path / "pipe.anchors")
     (tmp_path / "loop.anchors").symlink_to("loop.anchors")
     (tmp_path / "large.anchors").write_bytes(b"x" * 65)
-    monkeypatch.setattr(anchors, "_LARGEST", 64)
+    monkeypatch.setattr(logs, "_LARGEST", 64)
     for name, reason in (
         ("folder", "no regular file"), ("pipe", "no regular file"), ("loop", ""), ("large", "more than"),
     ):  # fmt: skip

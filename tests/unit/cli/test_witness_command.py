@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from reference.witnessed import Log
-from rtshcua.adapters.files.anchors import read_anchors
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.logs import read_anchors
 from rtshcua.cli import app
 from rtshcua.cli import witness as command
 from rtshcua.diagnostics.exits import ExitCode

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.vehicle.address import Address
-from rtshcua.adapters.witness_client import Anchor, Trouble
+from rtshcua.adapters.witness_link import Anchor, Trouble
 from rtshcua.cli import witnessed
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.witnessed import Witnessing, addresses

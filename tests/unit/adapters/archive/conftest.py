@@ -7,7 +7,7 @@ import pytest
 
 from reference.archived import CHECK, write_fleet
 from rtshcua.adapters.archive.adding import Check, Done, add
-from rtshcua.adapters.archive.folder import Folder
+from rtshcua.adapters.archive.folder import Folder, Source
 
 Add = Callable[..., list[Done]]
 
@@ -31,7 +31,7 @@ def take(folder: Folder) -> Add:
     """Adds logs to that archive."""
 
     def take(logs: Iterable[Path], check: Check = CHECK) -> list[Done]:
-        return list(add(folder, logs, check))
+        return list(add(folder, map(Source, logs), check))
 
     return take
 
@@ -40,5 +40,5 @@ def take(folder: Folder) -> Add:
 def filled(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
     """The archive of the whole fleet, for tests that only ask."""
     folder = Folder(tmp_path_factory.mktemp("filled") / "archive", make=True)
-    list(add(folder, sorted(fleet.glob("*.jsonl")), CHECK))
+    list(add(folder, map(Source, sorted(fleet.glob("*.jsonl"))), CHECK))
     return folder

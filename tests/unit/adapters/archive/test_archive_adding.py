@@ -10,7 +10,7 @@ import pytest
 from reference import documents, forgery, generated_logs
 from reference import world as small_world
 from reference.archived import CHECK, NOW_US, records, refused
-from rtshcua.adapters.archive import adding, catalogue
+from rtshcua.adapters.archive import adding, index
 from rtshcua.adapters.archive.adding import Done, reindex, verify
 from rtshcua.adapters.archive.asking import Asker, canned
 from rtshcua.adapters.archive.entry import AUDIT, Entry
@@ -40,7 +40,7 @@ def question(folder: Folder, name: str) -> list[tuple[object, ...]]:
 
 
 def entries(folder: Folder) -> list[Entry]:
-    return list(catalogue.read(folder).values())
+    return list(index.read_catalogue(folder).values())
 
 
 def test_what_is_known_of_a_log(take: Add, fleet: Path, folder: Folder) -> None:
@@ -183,7 +183,7 @@ def test_a_crash_before_the_catalogue_leaves_nothing_twice(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(adding.catalogue, "write", dies)
+        patch.setattr(adding, "write_catalogue", dies)
         with pytest.raises(KeyboardInterrupt):
             take([fleet / "quad-07-1.jsonl", fleet / "quad-08-0.jsonl"])
     assert question(folder, "refused") == rows, "what the catalogue does not name is not there"

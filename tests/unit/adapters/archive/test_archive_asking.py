@@ -9,7 +9,7 @@ import pytest
 from reference import generated_logs
 from reference.archived import SKILLS, records, refused
 from reference.generated_logs import BEGUN_US
-from rtshcua.adapters.archive import catalogue
+from rtshcua.adapters.archive import index
 from rtshcua.adapters.archive.adding import Done
 from rtshcua.adapters.archive.asking import Asker, Conditions, canned
 from rtshcua.adapters.archive.folder import Folder
@@ -184,4 +184,4 @@ def test_two_flights_after_the_same_one_are_a_fork(take: Add, fleet: Path, folde
     generated_logs.write(tmp_path / "other.jsonl", "quad-07", 5, before=first.entry.last_leaf)
     take([fleet / "quad-07-1.jsonl", tmp_path / "other.jsonl"])
     assert len(rows(folder, "forks")) == 1
-    assert len(catalogue.read(folder)) == 3
+    assert len(index.read_catalogue(folder)) == 3

@@ -3,16 +3,17 @@
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from reference.archived import CHECK
-from rtshcua.adapters.archive import workers
+from rtshcua.adapters.archive import examine
 from rtshcua.adapters.archive.adding import Done, add, verify
 from rtshcua.adapters.archive.entry import Entry
-from rtshcua.adapters.archive.folder import Folder
-from rtshcua.adapters.archive.workers import Processes
+from rtshcua.adapters.archive.examine import Processes
+from rtshcua.adapters.archive.folder import Folder, Source
 
 Add = Callable[..., list[Done]]
 
@@ -22,11 +23,11 @@ def entries(done: Sequence[Done]) -> list[Entry]:
 
 
 def test_processes_come_to_the_same(take: Add, fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "_LITTLE", 0)
+    monkeypatch.setattr(examine, "_LITTLE", 0)
     logs = sorted(fleet.glob("*.jsonl"))
     other = Folder(tmp_path / "other", make=True)
-    with Processes(2) as two:
-        found = list(add(other, logs, CHECK._replace(workers=two)))
+    with closing(Processes(2)) as two:
+        found = list(add(other, map(Source, logs), CHECK._replace(workers=two)))
         again = list(verify(other, CHECK._replace(workers=two)))
     assert entries(found) == entries(take(logs))
     assert sorted(each.entry.log for each in again) == sorted(each.entry.log for each in found)
@@ -39,7 +40,7 @@ from pathlib import Path
 from distributed import LocalCluster
 from rtshcua.adapters.archive.adding import add, verify
 from rtshcua.adapters.archive.cluster import Cluster
-from rtshcua.adapters.archive.folder import Folder
+from rtshcua.adapters.archive.folder import Folder, Source
 from reference.archived import CHECK
 
 if __name__ == "__main__":
@@ -47,10 +48,10 @@ if __name__ == "__main__":
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as local:
         cluster = Cluster(local.scheduler_address)
         check = CHECK._replace(workers=cluster)
-        for work in (add(folder, logs, check), verify(folder, check)):
+        for work in (add(folder, map(Source, logs), check), verify(folder, check)):
             for done in work:
                 print(done.entry.log, done.entry.status, done.entry.records, done.entry.indexed)
-        ran = cluster.workers()
+        ran = len(local.scheduler_info["workers"])
         cluster.close()
     assert ran == 2, ran
 """

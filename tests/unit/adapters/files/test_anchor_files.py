@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from reference.witnessed import WITNESSES, Judge, Log
-from rtshcua.adapters.files import anchors
-from rtshcua.adapters.files.anchors import add_anchors, beside, read_anchors, read_notes
+from rtshcua.adapters.files import logs
+from rtshcua.adapters.files.logs import add_anchors, beside, read_anchors, read_notes
 
 LOG = Log()
 LOG.effects(2)
@@ -49,7 +49,7 @@ def test_what_cannot_be_read_says_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "octets.anchors").write_bytes(b"\xff\xfe\n\n\xe2\x80\x94 \xff\n\n")
     assert [note for note in read_anchors(tmp_path / "log.jsonl") if note in MARKS] == []
     add_anchors(tmp_path / "log.anchors", MARKS)
-    monkeypatch.setattr(anchors, "_LARGEST", len(MARKS[0].encode()) + 1)
+    monkeypatch.setattr(logs, "_LARGEST", len(MARKS[0].encode()) + 1)
     assert read_notes(tmp_path / "log.anchors") == MARKS[:1]
     monkeypatch.setattr(os, "open", lambda *_, **__: (_ for _ in ()).throw(OSError(5, "broken")))
     assert read_notes(tmp_path / "log.anchors") == []

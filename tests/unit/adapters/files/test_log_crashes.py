@@ -12,8 +12,8 @@ import pytest
 from reference.crashed import LOG_KEY, signer, unverified, writes
 from reference.power import Died, PowerDisk
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.keeper import Keeper
 from rtshcua.adapters.files.recovery import examine, recover
+from rtshcua.adapters.files.writer import Keeper
 from rtshcua.evidence.recovery import State
 
 KINDS = ("died", "torn", "late", "failed", "short", "refused")

@@ -12,9 +12,9 @@ import pytest
 from reference.crashed import signer, unverified, writes
 from reference.power import Died, PowerDisk
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.keeper import Keeper
+from rtshcua.adapters.files.logs import write_secret
 from rtshcua.adapters.files.recovery import InUse, alone, recover
-from rtshcua.adapters.files.secret import write_secret
+from rtshcua.adapters.files.writer import Keeper
 from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.records import is_signed
 from rtshcua.evidence.recovery import State

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from reference.sealed_log import SECRET, sealed_log
-from rtshcua.adapters.files import secret
-from rtshcua.adapters.files.secret import SecretError, disclosure_of, read_secret, write_secret
+from rtshcua.adapters.files import logs
+from rtshcua.adapters.files.logs import SecretError, disclosure_of, read_secret, write_secret
 from rtshcua.evidence.proofs.disclosure import disclosure_root
 
 LINES = sealed_log().lines[:-1]
@@ -20,7 +20,7 @@ def log(tmp_path: Path) -> Path:
 
 def test_its_owner_alone_reads_it(log: Path) -> None:
     write_secret(log.parent, SECRET)
-    path = log.parent / secret.SECRET
+    path = log.parent / logs.SECRET
     assert path.stat().st_mode & 0o777 == 0o600
     assert read_secret(path) == SECRET
     path.chmod(0o640)
@@ -36,7 +36,7 @@ def test_a_secret_of_another_length_is_none(tmp_path: Path) -> None:
         folder.mkdir()
         write_secret(folder, bytes(length))
         with pytest.raises(SecretError, match="has not 32 bytes"):
-            read_secret(folder / secret.SECRET)
+            read_secret(folder / logs.SECRET)
 
 
 def test_the_root_of_a_log_on_the_disk(log: Path) -> None:

@@ -5,8 +5,8 @@ from io import BytesIO
 
 import pytest
 
-from rtshcua.adapters.language_server import ending
-from rtshcua.adapters.language_server.ending import GRACE, Watched
+from rtshcua.adapters.language_server import server
+from rtshcua.adapters.language_server.server import GRACE, Watched
 
 
 class Forced:
@@ -25,7 +25,7 @@ class Forced:
 
 @pytest.fixture(autouse=True)
 def started(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    monkeypatch.setattr(ending, "Timer", Forced)
+    monkeypatch.setattr(server, "Timer", Forced)
     Forced.started = []
     return Forced.started
 

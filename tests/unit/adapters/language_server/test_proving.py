@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.language_server.prover import LENGTH
-from rtshcua.adapters.language_server.proving import LARGEST, Found, Proving
+from rtshcua.adapters.language_server.prover import LARGEST, LENGTH, Found, Proving
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.diagnostics.diagnostic import Diagnostic
 

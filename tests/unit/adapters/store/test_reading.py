@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.store.faults import NotRegular
-from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
+from rtshcua.adapters.store.reading import NotRegular, exposed, open_regular, read_regular
 
 
 @pytest.fixture

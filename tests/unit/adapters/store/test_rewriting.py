@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.store.faults import Changed, NotWritten
-from rtshcua.adapters.store.writing import rewrite
+from rtshcua.adapters.store.writing import Changed, NotWritten, rewrite
 
 
 @pytest.fixture

@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.store.faults import NotRegular, NotWritten
-from rtshcua.adapters.store.folders import make_folder
-from rtshcua.adapters.store.locking import lock
+from rtshcua.adapters.store.reading import NotRegular
 from rtshcua.adapters.store.writing import (
     PRIVATE_FILE,
+    NotWritten,
     append,
+    lock,
+    make_folder,
     open_new,
     publish,
     replace,

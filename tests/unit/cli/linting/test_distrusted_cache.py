@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from reference.lint_project import HABITS, POLICY, UNUSED, Lint, put
-from rtshcua.adapters.files import lint_secret
+from rtshcua.adapters.files import lint_cache
 from rtshcua.adapters.files.lint_cache import LintCache
 from rtshcua.cli.linting.examined import decoded
 from rtshcua.diagnostics.exits import ExitCode
@@ -23,7 +23,7 @@ def entries() -> list[Path]:
 
 def forge(result: object, sign: bool, own: Path) -> int:
     """Write another result into all entries; signed as this user would, or as anybody can."""
-    cache = LintCache(Path(), str(FOLDER), lint_secret.lint_secret(own))
+    cache = LintCache(Path(), str(FOLDER), lint_cache.lint_secret(own))
     for file in entries():
         tree = json.loads(file.read_bytes().partition(b"\n")[2]) | {"result": result}
         data = json.dumps(tree).encode()
@@ -58,7 +58,7 @@ def test_a_cache_of_somebody_else_is_none(here: Path, lint: Lint, own: Path) -> 
 
 
 def test_an_entry_in_the_place_of_another_is_none(here: Path, own: Path) -> None:
-    cache = LintCache(Path(), str(FOLDER), lint_secret.lint_secret(own))
+    cache = LintCache(Path(), str(FOLDER), lint_cache.lint_secret(own))
     cache.put("a", b"entry")
     assert cache.get("a") == b"entry"
     (FOLDER / "2" / "a").rename(FOLDER / "2" / "b")
@@ -67,9 +67,9 @@ def test_an_entry_in_the_place_of_another_is_none(here: Path, own: Path) -> None
 
 @pytest.mark.parametrize("harm", ["read by all", "cut", "a link", "a folder"])
 def test_a_secret_that_is_none_is_made_anew(own: Path, harm: str) -> None:
-    first = lint_secret.lint_secret(own)
+    first = lint_cache.lint_secret(own)
     (file,) = own.rglob("lint.secret")
-    assert lint_secret.lint_secret(own) == first
+    assert lint_cache.lint_secret(own) == first
     if harm == "read by all":
         file.chmod(0o644)
     elif harm == "cut":
@@ -77,12 +77,12 @@ def test_a_secret_that_is_none_is_made_anew(own: Path, harm: str) -> None:
     else:
         file.rename(own / "elsewhere")
         (file.mkdir if harm == "a folder" else lambda: file.symlink_to(own / "elsewhere"))()
-    second = lint_secret.lint_secret(own)
+    second = lint_cache.lint_secret(own)
     if harm == "a folder":
         assert second is None
     else:
         assert second not in (None, first)
-        assert lint_secret.lint_secret(own) == second
+        assert lint_cache.lint_secret(own) == second
         assert file.stat().st_mode & 0o777 == 0o600
 
 

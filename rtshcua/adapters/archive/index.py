@@ -1,22 +1,22 @@
-"""From verified logs to rows: DuckDB reads the lines themselves, and writes a part of each table as Parquet.
+"""The index of an archive: the catalogue, a row a log, and the rows of their records, as Parquet files.
 
-Every line was read by the verifier before, in its one canonical form; what is read here is the same octets with
-the same meaning. How many records there are is counted again.
+The catalogue is replaced as a whole by each change. DuckDB reads the lines of verified logs itself, and writes a part
+of each table of records. Every line was read by the verifier before, in its one canonical form; what is read here is
+the same octets with the same meaning. How many records there are is counted again.
 """
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from typing import Final
+from typing import Final, get_args
 
 import duckdb
 import msgspec
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive.catalogue import as_lines, quoted
-from rtshcua.adapters.archive.entry import Entry, Examined
+from rtshcua.adapters.archive.entry import Entry, Examined, Step
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
 from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.store.reading import open_regular
@@ -33,17 +33,7 @@ _FIELDS: Final = {
     "STRUCT(policy_version BIGINT)": ("context",),
     "BIGINT[]": ("clause_at",),
 }  # fmt: skip
-_COLUMNS: Final = ", ".join(f"{name}: '{kind}'" for kind, names in _FIELDS.items() for name in names)
-_OURS: Final = {
-    "entries": {
-        "log": "VARCHAR", "indexed": "BIGINT", "vehicle": "VARCHAR", "boot": "VARCHAR", "mission": "VARCHAR",
-        "policy": "VARCHAR",
-    },
-    "steps": {
-        "log": "VARCHAR", "first": "BIGINT", "until": "BIGINT", "kind": "BIGINT", "step": "BIGINT", "link": "BIGINT",
-        "skill": "VARCHAR", "what": "VARCHAR",
-    },
-}  # fmt: skip
+_KINDS: Final = {name: kind for kind, names in _FIELDS.items() for name in names}
 _LOG: Final = "string_split(filename, '/')[-2]"
 _LONGEST_DETAIL: Final = 1_000  # characters; the log has the rest
 
@@ -70,18 +60,48 @@ _ROWS: Final = {
 }  # fmt: skip
 
 
-def ingest(folder: Folder, examined: Sequence[Examined], *, threads: int | None = None) -> list[Entry]:
+def read_catalogue(folder: Folder) -> dict[str, Entry]:
+    """The rows by log."""
+    if not folder.catalogue.exists():
+        return {}
+    names = ", ".join(Entry.__struct_fields__)
+    with duckdb.connect() as engine:
+        rows = engine.execute(f"SELECT {names} FROM read_parquet(?)", [str(folder.catalogue)]).fetchall()
+    return {row[0]: Entry(*row) for row in rows}
+
+
+def write_catalogue(folder: Folder, entries: Iterable[Entry]) -> None:
+    """Puts these rows in the place of all that were there, in one step."""
+    fresh = folder.scratch / "logs.parquet"
+    with duckdb.connect() as engine:
+        _load(engine, "logs", Entry, entries, folder.scratch)
+        engine.execute(f"COPY (SELECT * FROM logs ORDER BY begun_us, log) TO {quoted(fresh)} (FORMAT parquet)")
+    publish(fresh, folder.catalogue)
+
+
+def forget_unfinished(folder: Folder, entries: dict[str, Entry]) -> None:
+    """Removes the rows of records that a crash left, before the catalogue named them."""
+    parts = {entry.part for entry in entries.values()}
+    for path in folder.parts():
+        if path.stem not in parts and path.stem != NOTHING:
+            path.unlink()
+
+
+def quoted(value: object) -> str:
+    """A text as SQL has it."""
+    return "'" + str(value).replace("'", "''") + "'"
+
+
+def ingest(folder: Folder, examined: Sequence[Examined]) -> list[Entry]:
     """Writes a part with the rows of these logs, and gives their entries, which name it. The catalogue must follow."""
     sound = [each for each in examined if each.entry.indexed]
     if not sound:
         return [each.entry for each in examined]
     part = sha256("".join(sorted(each.entry.log for each in sound)).encode()).hexdigest()[:32]
     with duckdb.connect() as engine:
-        if threads is not None:
-            engine.execute(f"SET threads = {threads}")
         engine.execute(f"SET temp_directory = {quoted(folder.scratch)}")
-        _load(engine, "entries", [each.entry for each in sound], folder.scratch)
-        _load(engine, "steps", [step for each in sound for step in each.steps], folder.scratch)
+        _load(engine, "entries", Entry, (each.entry for each in sound), folder.scratch)
+        _load(engine, "steps", Step, (step for each in sound for step in each.steps), folder.scratch)
         with _files(folder, sound) as files:
             _read(engine, files)
         _count(engine)
@@ -95,9 +115,9 @@ def lay_out(folder: Folder) -> None:
     if all((folder.table(table) / f"{NOTHING}.parquet").exists() for table in TABLES):
         return
     with duckdb.connect() as engine:
-        _load(engine, "entries", [], folder.scratch)
-        _load(engine, "steps", [], folder.scratch)
-        types = ", ".join(f"{name} {kind}" for kind, names in _FIELDS.items() for name in names)
+        _load(engine, "entries", Entry, (), folder.scratch)
+        _load(engine, "steps", Step, (), folder.scratch)
+        types = ", ".join(f"{name} {kind}" for name, kind in _KINDS.items())
         engine.execute(f"CREATE TEMP TABLE raw (log VARCHAR, {types})")
         for table in TABLES:
             _write(engine, folder, table, NOTHING)
@@ -113,7 +133,7 @@ def _read(engine: duckdb.DuckDBPyConnection, files: list[str]) -> None:
     """All that is indexed of the lines, but for the records that no signature covers yet."""
     engine.execute(
         f"CREATE TEMP TABLE raw AS SELECT l.* EXCLUDE (filename) FROM (SELECT *, {_LOG} AS log FROM read_ndjson("
-        f"?, columns={{{_COLUMNS}}}, filename=true, maximum_object_size={LONGEST + 1})) l "
+        f"?, columns={_columns(_KINDS)}, filename=true, maximum_object_size={LONGEST + 1})) l "
         "JOIN entries e ON l.log = e.log WHERE l.seq < e.indexed",
         [files],
     )
@@ -128,22 +148,32 @@ def _count(engine: duckdb.DuckDBPyConnection) -> None:
         raise RuntimeError(f"the engine did not read the records of log {wrong[0]} that were verified")
 
 
-def _load(engine: duckdb.DuckDBPyConnection, name: str, rows: Sequence[msgspec.Struct], scratch: Path) -> None:
-    """A table of ours in the engine."""
-    columns = ", ".join(f"{column}: '{kind}'" for column, kind in _OURS[name].items())
-    read = f"CREATE TEMP TABLE {name} AS SELECT * FROM read_ndjson(?, columns={{{columns}}})"
-    with as_lines(rows, scratch / f"{name}.jsonl") as path:
-        engine.execute(read, [str(path)])
+def _load(
+    engine: duckdb.DuckDBPyConnection, name: str, form: type[msgspec.Struct], rows: Iterable[msgspec.Struct],
+    scratch: Path,
+) -> None:  # fmt: skip
+    """A table of ours in the engine, with a column for each field of its rows."""
+    kinds = {
+        field.name: "BIGINT" if int in (field.type, *get_args(field.type)) else "VARCHAR"
+        for field in msgspec.structs.fields(form)
+    }
+    place = scratch / f"{name}.jsonl"
+    try:
+        _write_lines(place, (msgspec.json.encode(row) + b"\n" for row in rows))
+        read = f"CREATE TEMP TABLE {name} AS SELECT * FROM read_ndjson(?, columns={_columns(kinds)})"
+        engine.execute(read, [str(place)])
+    finally:
+        place.unlink(missing_ok=True)
 
 
-def _copy_whole_lines(log: Path, copy: Path) -> None:
-    """Copies a log but for what stands after its last newline."""
-    with (
-        open_regular(log) as whole,
-        replacing(copy, synced=False) as handle,
-        os.fdopen(handle, "wb", closefd=False) as file,
-    ):
-        file.writelines(line for line in lines(whole) if line.endswith(b"\n"))
+def _columns(kinds: Mapping[str, str]) -> str:
+    """Names and SQL types, as the engine's readers take them."""
+    return "{" + ", ".join(f"{name}: '{kind}'" for name, kind in kinds.items()) + "}"
+
+
+def _write_lines(place: Path, data: Iterable[bytes]) -> None:
+    with replacing(place, synced=False) as handle, os.fdopen(handle, "wb", closefd=False) as file:
+        file.writelines(data)
 
 
 @contextmanager
@@ -156,7 +186,8 @@ def _files(folder: Folder, sound: Sequence[Examined]) -> Iterator[list[str]]:
         if each.entry.finding == "tail/torn":
             copy = folder.scratch / each.entry.log / path.name
             copy.parent.mkdir()
-            _copy_whole_lines(path, copy)
+            with open_regular(path) as whole:
+                _write_lines(copy, (line for line in lines(whole) if line.endswith(b"\n")))
             copies.append(copy)
             path = copy
         files.append(str(path))

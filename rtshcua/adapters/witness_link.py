@@ -14,11 +14,11 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from threading import Event, Thread
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.files.logs import add_anchors, beside
+from rtshcua.adapters.files.logs import add_anchors, anchors_path
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.codec.tunnel import Assembler, Whole, answer_name, messages, name_of
@@ -205,11 +205,7 @@ class WitnessClient:
 
     def news(self) -> list[Anchor | Trouble]:
         """What came since the last call; never waits."""
-        found = []
-        with suppress(Empty):
-            while True:
-                found.append(self._news.get_nowait())
-        return found
+        return [self._news.get_nowait() for _ in range(self._news.qsize())]  # nobody else takes from it
 
     def finish(self, last_s: float = LAST_S) -> list[Trouble]:
         """The log is closed, or nothing more comes: wait up to so long for the witnesses to cosign its end.
@@ -227,7 +223,7 @@ class WitnessClient:
         anchors = [each.note for each in news if isinstance(each, Anchor)]
         try:
             if anchors:
-                add_anchors(beside(self._log), anchors)
+                add_anchors(anchors_path(self._log), anchors)
         except OSError as error:
             troubles.append(Trouble(f"anchors of the log's end are not kept: {(error.strerror or str(error)).lower()}"))
         last = self._submission.last(self._submission.records)

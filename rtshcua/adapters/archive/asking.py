@@ -25,6 +25,13 @@ ORDER BY l.status"""
 
 _HERE: Final = Path(__file__).parent
 VIEWS: Final = ("decided", "happened")
+#: a reason may be the beginning of one, a clause a part of one
+_FORMS: Final = {
+    "reason": "(reason = {0} OR starts_with(reason, {0} || '/'))",
+    "clause": "contains(clause, {0})",
+    "since": "utc_us >= {0}",
+    "until": "utc_us < {0}",
+}
 
 
 class Canned(NamedTuple):
@@ -79,28 +86,15 @@ class Conditions(NamedTuple):
     witness: str | None = None
 
     def sql(self) -> str:
-        """The condition on `decided`; a reason may be the beginning of one, a clause a part of one."""
-        terms = [
-            f"{name} = {quoted(value)}"
-            for name in ("vehicle", "mission", "skill", "outcome", "rule", "policy", "witness")
-            if (value := getattr(self, name)) is not None
-        ]
-        if self.reason is not None:
-            terms.append(f"(reason = {quoted(self.reason)} OR starts_with(reason, {quoted(self.reason + '/')}))")
-        if self.clause is not None:
-            terms.append(f"contains(clause, {quoted(self.clause)})")
-        if self.policy_version is not None:
-            terms.append(f"policy_version = {self.policy_version}")
-        if self.since is not None:
-            terms.append(f"utc_us >= {self.since}")
-        if self.until is not None:
-            terms.append(f"utc_us < {self.until}")
-        return " AND ".join(terms) or "TRUE"
+        """The condition on `decided`."""
+        return matching(**self._asdict())
 
 
-def matching(**values: str | None) -> str:
-    """The condition that columns have these values; None is any."""
-    return " AND ".join(f"{name} = {quoted(value)}" for name, value in values.items() if value is not None) or "TRUE"
+def matching(**values: object) -> str:
+    """The condition that columns have these values; None is any. See `_FORMS` for those that mean something else."""
+    given = {name: value for name, value in values.items() if value is not None}
+    terms = (_FORMS.get(name, f"{name} = {{0}}").format(quoted(value)) for name, value in given.items())
+    return " AND ".join(terms) or "TRUE"
 
 
 class Asker:

@@ -18,7 +18,7 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
 
-from rtshcua.adapters.files.logs import SUFFIX, beside
+from rtshcua.adapters.files.logs import ANCHORS, anchors_path
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
 from rtshcua.adapters.store.writing import (
@@ -144,7 +144,7 @@ class Folder:
     def _take_anchors(self, source: Source, digest: str) -> bool:
         """Those beside a log that is named as in a run's folder are its own; else those that bear its name."""
         log, root = source
-        found = log.parent.glob(f"*{SUFFIX}") if log.name == LOG else [beside(log)]
+        found = log.parent.glob(f"*{ANCHORS}") if log.name == LOG else [anchors_path(log)]
         new = False
         for path in found:
             try:
@@ -154,7 +154,7 @@ class Folder:
             if len(data) > _MOST_ANCHORS:
                 continue
             with suppress(FileExistsError):
-                write_new(self.log(digest).with_name(sha256(data).hexdigest() + SUFFIX), data)
+                write_new(self.log(digest).with_name(sha256(data).hexdigest() + ANCHORS), data)
                 new = True
         return new
 

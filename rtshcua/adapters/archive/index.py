@@ -88,8 +88,8 @@ def forget_unfinished(folder: Folder, entries: dict[str, Entry]) -> None:
 
 
 def quoted(value: object) -> str:
-    """A text as SQL has it."""
-    return "'" + str(value).replace("'", "''") + "'"
+    """A number or a text as SQL has it."""
+    return str(value) if isinstance(value, int) else "'" + str(value).replace("'", "''") + "'"
 
 
 def ingest(folder: Folder, examined: Sequence[Examined]) -> list[Entry]:

@@ -21,7 +21,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 #: what the first line of every log begins with
 START: Final = b'{"_prev":"'
-SUFFIX: Final = ".anchors"
+ANCHORS: Final = ".anchors"
 SECRET: Final = "log.secret"
 #: more of a file of anchors than this, and more files of them than this in a folder, are not looked at
 _LARGEST: Final = 16 << 20
@@ -41,9 +41,9 @@ def lines(file: BinaryIO) -> Iterator[bytes]:
 # ------------------------------------------------------------------------------------------ anchors
 
 
-def beside(log: Path) -> Path:
+def anchors_path(log: Path) -> Path:
     """Where the anchors of a log are put."""
-    return log.with_suffix(SUFFIX)
+    return log.with_suffix(ANCHORS)
 
 
 def read_anchors(log: Path) -> list[str]:
@@ -61,7 +61,7 @@ def unreadable(log: Path) -> list[Path]:
 
 
 def _files(log: Path) -> list[Path]:
-    found = sorted(log.parent.glob(f"*{SUFFIX}"), key=lambda path: (path != beside(log), path.name))
+    found = sorted(log.parent.glob(f"*{ANCHORS}"), key=lambda path: (path != anchors_path(log), path.name))
     return found[:_MOST]
 
 

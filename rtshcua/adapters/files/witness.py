@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from rtshcua.adapters.files.logs import add_anchors, beside, lines, read_notes
+from rtshcua.adapters.files.logs import add_anchors, anchors_path, lines, read_notes
 from rtshcua.adapters.store.reading import open_regular, read_if_there
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, lock, make_folder, replace, write_new
 from rtshcua.evidence.finding import Finding, Flaw
@@ -194,13 +194,13 @@ def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned 
     assert note is not None, "a witness knows its own cosignature"
     fresh = known is None or known < found.size
     if fresh or not _beside(log, split(note)[0], witness.public):
-        add_anchors(beside(log), [note], root)
+        add_anchors(anchors_path(log), [note], root)
     return Cosigned(log, found.records, found.size + 1, fresh)
 
 
 def _beside(log: Path, text: str, public: bytes) -> bool:
     """Whether the anchor of this text by this witness is beside the log."""
-    mine = (cosignatures(each, (public,)) for each in read_notes(beside(log)) if each.startswith(text))
+    mine = (cosignatures(each, (public,)) for each in read_notes(anchors_path(log)) if each.startswith(text))
     return any(not isinstance(found, Flaw) and found[1] for found in mine)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Log, log_keys
 from rtshcua.adapters import witness_link
-from rtshcua.adapters.files.logs import beside, read_anchors
+from rtshcua.adapters.files.logs import anchors_path, read_anchors
 from rtshcua.adapters.files.witness import FileWitness, WitnessStore
 from rtshcua.adapters.witness_link import ANSWER, REQUEST, Anchor, Trouble, WitnessClient, WitnessLink
 from rtshcua.codec.frames import Codec
@@ -197,7 +197,7 @@ def test_each_epoch_and_the_end(serve: Callable[..., Served], writer: Writer) ->
         found += until(client, seen(size))
     writer.close()
     assert client.finish(PATIENCE_S) == []
-    assert beside(writer.path).name == "log.anchors"
+    assert anchors_path(writer.path).name == "log.anchors"
     notes = [each.note for each in found if isinstance(each, Anchor)] + read_anchors(writer.path)
     assert outcome(writer, notes, 1)[:2] == (14, 0)
 
@@ -293,7 +293,7 @@ def test_a_witness_that_the_root_does_not_name(serve: Callable[..., Served], wri
     assert "does not name" in found[0].text  # type: ignore[union-attr]
     (late,) = client.finish(0)
     assert "did not cosign the end" in late.text
-    assert not beside(writer.path).exists()
+    assert not anchors_path(writer.path).exists()
 
 
 def test_a_log_that_the_witness_does_not_know(tmp_path: Path, writer: Writer) -> None:
@@ -418,7 +418,7 @@ def test_it_waits_only_so_long(writer: Writer, port: int) -> None:
 
 
 def test_anchors_that_cannot_be_kept(serve: Callable[..., Served], writer: Writer) -> None:
-    beside(writer.path).mkdir()
+    anchors_path(writer.path).mkdir()
     client = writer.client(serve().address)
     writer.close()
     (trouble,) = client.finish(PATIENCE_S)

@@ -373,5 +373,5 @@ def test_a_log_that_becomes_a_link_before_it_is_copied_is_not_taken_in(
 
     monkeypatch.setattr("rtshcua.cli.archiving.given.begins_as_log", looked_at_and_replaced)
     assert archive("add", "flown", *ROOT) == ExitCode.INPUT
-    assert "flown/a/log.jsonl: symbolic links are not followed here" in capsys.readouterr().err
+    assert "symbolic links are not followed here: `flown/a/log.jsonl`" in capsys.readouterr().err
     assert not list(Path("archive/logs").rglob("*.jsonl"))

@@ -7,7 +7,7 @@ import pytest
 
 from reference.witnessed import WITNESSES, Judge, Log
 from rtshcua.adapters.files import logs
-from rtshcua.adapters.files.logs import add_anchors, beside, read_anchors, read_notes
+from rtshcua.adapters.files.logs import add_anchors, anchors_path, read_anchors, read_notes
 
 LOG = Log()
 LOG.effects(2)
@@ -16,7 +16,7 @@ MARKS = [Judge(key).blindly(note) for key in WITNESSES for note in LOG.notes]
 
 
 def test_notes_one_after_another(tmp_path: Path) -> None:
-    path = beside(tmp_path / "log.jsonl")
+    path = anchors_path(tmp_path / "log.jsonl")
     assert path == tmp_path / "log.anchors"
     assert read_notes(path) == []
     add_anchors(path, MARKS[:2])
@@ -28,7 +28,7 @@ def test_notes_one_after_another(tmp_path: Path) -> None:
 def test_all_files_beside_a_log_are_read_its_own_first(tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     add_anchors(tmp_path / "another.anchors", MARKS[:1])
-    add_anchors(beside(log), MARKS[1:2])
+    add_anchors(anchors_path(log), MARKS[1:2])
     assert read_anchors(log) == [MARKS[1], MARKS[0]]
 
 

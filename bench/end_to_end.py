@@ -26,7 +26,7 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.writer import EvidenceWriter
-from rtshcua.adapters.loop import HELD_WAIT_US, Loop
+from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.onboard.ports import Command, Ending, Event, Succeeded
@@ -117,7 +117,7 @@ def one(
     flight = Flight(bundle, config, vehicle=vehicle)
     vehicle.frames = flight.loaded.executor.frames
     sink = EvidenceWriter(EvidenceFile(folder / "log.jsonl"))
-    flight.loop = Loop(flight.runtime, vehicle, sink, flight.clock, lambda *_: None, 100_000)
+    flight.loop = RunLoop(flight.runtime, vehicle, sink, flight.clock, lambda *_: None, 100_000)
     gc.collect()
     gc.freeze()
     ending = None

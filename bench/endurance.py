@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.loop import Loop
+from rtshcua.adapters.loop import RunLoop
 from rtshcua.evidence.durability import WRITTEN
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan
@@ -75,7 +75,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         flown = flight()
         clock, sink = flown.clock, Sink(Path(name) / "log.jsonl")
-        flown.loop = Loop(flown.runtime, flown.vehicle, sink, clock, lambda *_: None, 100_000)
+        flown.loop = RunLoop(flown.runtime, flown.vehicle, sink, clock, lambda *_: None, 100_000)
         start = process_time()
         marks = []
         for until_us in (HOUR_US // 2, HOURS * HOUR_US):

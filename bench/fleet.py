@@ -13,9 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 
-from rtshcua.adapters.vehicle.driver import COMPONENT
 from rtshcua.mavlink import tlog
 from rtshcua.mavlink.framing import message_id
+from rtshcua.onboard.enforcement.frames import OURS
 
 VEHICLES = 10
 LATE_US = 1_200_000  # between two heartbeats; they are due every second
@@ -55,7 +55,7 @@ def gaps(frames: Path) -> list[int]:
     beats = [
         entry.at_us
         for entry in tlog.read(frames.read_bytes())
-        if entry.frame[_COMPONENT] == COMPONENT and message_id(entry.frame, 0) == 0
+        if entry.frame[_COMPONENT] == OURS and message_id(entry.frame, 0) == 0
     ]
     return [later - earlier for earlier, later in pairwise(beats)]
 

@@ -32,7 +32,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.files.writer import EvidenceWriter
-from rtshcua.adapters.loop import Loop
+from rtshcua.adapters.loop import RunLoop
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
@@ -179,7 +179,7 @@ def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
         policy, mission = flight.loaded.bundle.policy, flight.loaded.bundle.mission
         teller = Teller(policy, mission, clock.now().monotonic_us)
         watch = Watching(feed, teller, flight.runtime.view, lambda: vehicle.driver.unready, live=True)
-    loop = Loop(flight.runtime, vehicle, sink, clock, watch)
+    loop = RunLoop(flight.runtime, vehicle, sink, clock, watch)
     gc.collect()
     gc.freeze()  # as `rtshcua run` does
     print(vehicle.port, flush=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import ClockStepped
+from rtshcua.onboard.ports import Clock, ClockStepped
 
 #: How far UTC may be off where nothing better is known, in us.
 UTC_ERROR_US = 100_000
@@ -15,12 +15,8 @@ def _machine_us() -> tuple[int, int]:
     return time.monotonic_ns() // 1_000, time.time_ns() // 1_000
 
 
-class LinkClock(Protocol):
+class LinkClock(Clock, Protocol):
     """The `Clock` port, with what a link needs of it besides."""
-
-    def now(self) -> Now:
-        """The present moment."""
-        ...
 
     def heard(self, boot_us: int) -> None:
         """A frame of the vehicle said how long it has been up, in us."""

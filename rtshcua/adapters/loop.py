@@ -61,14 +61,7 @@ class _Record(NamedTuple):
     durability: int
 
 
-class _Held(NamedTuple):
-    """A command, and the record that it is held for."""
-
-    dispatch: Dispatch
-    record: _Record
-
-
-class Loop:
+class RunLoop:
     """One run. `watch` sees each step's events and actions, after they were carried out; it must not block."""
 
     def __init__(
@@ -82,7 +75,7 @@ class Loop:
         self._watch = watch
         self._wait_us = wait_us
         self._held_wait_us = min(wait_us, held_wait_us)
-        self._held: _Held | None = None
+        self._held: tuple[Dispatch, _Record] | None = None  # a command, and the record that it is held for
         self._lines = sink.kept  # that were given to the sink
         self._failed: int | None = None  # the sink refused something, when so many lines had been given to it
         self._answers: list[Event] = []
@@ -117,15 +110,15 @@ class Loop:
             self._answers.append(EvidenceKept(self._clock.now().monotonic_us))
         if late is not None:
             self._answers.append(Noted(self._clock.now().monotonic_us, late))
-        held = self._held
-        if held is None:
+        if self._held is None:
             return
+        dispatch, record = self._held
         if reason is not None:
-            self._refuse(held.dispatch, WITHHELD)
-        elif self._recorded(held.record):
-            self._send(held.dispatch)
-        elif self._clock.now().monotonic_us > held.dispatch.not_after_us:
-            self._refuse(held.dispatch, "late")
+            self._refuse(dispatch, WITHHELD)
+        elif self._recorded(record):
+            self._send(dispatch)
+        elif self._clock.now().monotonic_us > dispatch.not_after_us:
+            self._refuse(dispatch, "late")
 
     def _act(self, actions: Sequence[Action], sent: Dispatch | None) -> Ending | None:
         ending: Ending | None = None
@@ -163,14 +156,12 @@ class Loop:
     def _dispatch(self, dispatch: Dispatch, record: _Record | None) -> None:
         """Send a command, or hold it until its record is kept. The one that was held is replaced."""
         self._held = None
-        if not dispatch.needs_record:
-            self._send(dispatch)
-        elif record is None:
+        if dispatch.needs_record and record is None:
             self._refuse(dispatch, WITHHELD)
-        elif self._recorded(record):
+        elif not dispatch.needs_record or record is None or self._recorded(record):
             self._send(dispatch)
         else:
-            self._held = _Held(dispatch, record)
+            self._held = dispatch, record
 
     def _recorded(self, record: _Record) -> bool:
         """Whether a record is as durable as it must be before anything is sent on it."""

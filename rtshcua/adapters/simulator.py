@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Self
 
 START_S = 20.0
@@ -43,11 +42,6 @@ class Simulator:
             raise SimulatorError(f"the simulated vehicle did not start: {reason}")
         self.ready: dict[str, Any] = json.loads(line)
 
-    @property
-    def running(self) -> bool:
-        """Whether the process lives."""
-        return self._process.poll() is None
-
     def wait(self) -> int:
         """Wait until the process ends by itself; its exit code."""
         return self._process.wait()
@@ -72,9 +66,7 @@ class Simulator:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _first_line(self, patience_s: float) -> bytes | None:

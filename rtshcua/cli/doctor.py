@@ -12,9 +12,8 @@ import typer
 
 from rtshcua import library
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.doctor.diagnosis import diagnose
-from rtshcua.adapters.doctor.examination import Examination
-from rtshcua.adapters.doctor.finding import Finding, Verdict
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose
+from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.signing import LinkKeyError
@@ -82,7 +81,7 @@ def doctor(
             return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
         stack.callback(signing.close)
         try:
-            vehicle = Examination(policy, clock, frames, signing.verifier, system)
+            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system)
         except UnknownSource as error:
             return fail(ExitCode.REFUSED, str(error))
         try:
@@ -101,7 +100,7 @@ def doctor(
                 unheard=signing.unheard, named=system is not None,
             )
         )  # fmt: skip
-    code = ExitCode.REFUSED if any(each.verdict is Verdict.STOP for each in findings) else ExitCode.OK
+    code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
     if as_json:
         print(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
     else:
@@ -122,7 +121,7 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None]:
     return opened.policy, opened.mission
 
 
-def _listen(socket: UdpVehicle, vehicle: Examination, clock: SystemClock, seconds: float) -> bool:
+def _listen(socket: UdpVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:
     """Wait for a heartbeat, then listen for so long; whether there was one."""
     begun = time.monotonic()
     until = begun + _HEARTBEAT_S
@@ -145,21 +144,26 @@ def _progress(passed: float | None, whole: float, *, heard: bool) -> None:
     print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
-_MARKS = {Verdict.OK: "ok", Verdict.WARN: "warn", Verdict.STOP: "STOP", Verdict.UNKNOWN: "?"}
+_MARKS = {
+    MissionVerdict.OK: "ok",
+    MissionVerdict.WARN: "warn",
+    MissionVerdict.STOP: "STOP",
+    MissionVerdict.UNKNOWN: "?",
+}
 
 
-def _print(findings: Sequence[Finding]) -> None:
+def _print(findings: Sequence[VehicleFinding]) -> None:
     """A line a finding; what is wrong, with what is needed and what to do about it."""
     width = max(len(each.slug) for each in findings)
     for each in findings:
         print(f"{_MARKS[each.verdict]:<5} {each.slug:<{width}}  {each.found}")
         for label, text in (("needed", each.needed), ("help", each.advice)):
-            if text and each.verdict is not Verdict.OK:
+            if text and each.verdict is not MissionVerdict.OK:
                 print(f"{'':<5} {'':<{width}}  {label}: {text}")
-    stops = sum(each.verdict is Verdict.STOP for each in findings)
-    warns = sum(each.verdict is Verdict.WARN for each in findings)
+    stops = sum(each.verdict is MissionVerdict.STOP for each in findings)
+    warns = sum(each.verdict is MissionVerdict.WARN for each in findings)
     end = f"{stops} would stop a mission" if stops else "nothing would stop a mission"
-    unknown = sum(each.verdict is Verdict.UNKNOWN for each in findings)
+    unknown = sum(each.verdict is MissionVerdict.UNKNOWN for each in findings)
     if unknown and not stops:
         end = "nothing that was learned would stop a mission"
     print(f"{end}; {warns} to know of" + (f"; {unknown} that it did not say" if unknown else ""))

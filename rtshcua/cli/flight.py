@@ -11,7 +11,7 @@ from rtshcua.adapters.clock import LinkClock, StepWatch
 from rtshcua.adapters.files.logs import disclosure_of
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
-from rtshcua.adapters.loop import HELD_WAIT_US, Loop
+from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.closing import close_log, keep_summary
@@ -158,7 +158,7 @@ class Flight:
     def _follow(self) -> Ending:
         wait_us = max(_WAIT_US, self._clock.us_in(_FASTEST_WAIT_S))
         held_wait_us = max(HELD_WAIT_US, self._clock.us_in(HELD_WAIT_US / 1e6))
-        loop = Loop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us, held_wait_us)
+        loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
         while True:
             match self._interrupts.wish():

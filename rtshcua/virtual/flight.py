@@ -8,7 +8,7 @@ from typing import Any, Final, Protocol, Self
 
 import msgspec
 
-from rtshcua.adapters.loop import Loop
+from rtshcua.adapters.loop import RunLoop
 from rtshcua.adapters.packs import manoeuvres, packs_of
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
@@ -170,7 +170,7 @@ class VirtualFlight:
         )
         self.events: list[Event] = []
         self.steps = 0
-        self.loop = Loop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us)
+        self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us)
 
     def fly(self, each: Callable[[Self], Sequence[Event]] = lambda _: (), most_s: int = 3_600) -> FlownFlight:
         """Fly until the end; `each` is called before every turn, and may inject faults or give events.

@@ -8,7 +8,7 @@ import pytest
 from rtshcua.adapters.px4 import flavour as px4
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.flavour import Stage
-from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.evidence.report import Verdict
 from rtshcua.onboard.ports import Command, Ending
 from virtual import case
@@ -27,7 +27,7 @@ def by_force(message: Any) -> None:
 
 @pytest.mark.parametrize(("change", "reason"), [(higher, "not-covered"), (by_force, "forced-arming")])
 def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason: str) -> None:
-    def changed(command: Command, seen: Observed, system: int) -> list[Stage]:
+    def changed(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         stages = px4.stages(command, seen, system)
         for stage in stages:
             if stage.message is not None:

@@ -19,8 +19,8 @@ AUTOPILOT = {"px4": 12, "ardupilot": 3}
 NEW = State(0, {})
 PLAIN = (int, float, str, bytes, type(None))
 COUNTED = ("counts", "damaged", "refused", "unknown", "foreign", "_policy")
-#: that another vehicle is heard, before a flight, is for people to know, and believed of nobody: see `Link.crowd`
-TOLD = ("found",)
+#: that another vehicle is heard, before a flight, is for people to know, and believed of nobody: `VehicleLink.crowd`
+TOLD = ("crowd",)
 
 
 class Target:

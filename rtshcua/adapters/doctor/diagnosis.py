@@ -1,16 +1,50 @@
 """The whole diagnosis: every finding of an examination, in the order in which a person would look."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from enum import StrEnum
+from typing import Final
 
-from rtshcua.adapters.doctor import link, mission, readiness, settings
-from rtshcua.adapters.doctor.examination import Examination
-from rtshcua.adapters.doctor.finding import Finding
+import msgspec
+
+from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.doctor.settings import SETTINGS, Setting
+from rtshcua.adapters.vehicle.source_time import VehicleClock
+from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
+from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import Signal
+from rtshcua.onboard.enforcement.frames import OURS
+from rtshcua.onboard.rehearsal import needed
+
+
+class MissionVerdict(StrEnum):
+    """How a finding bears on a mission."""
+
+    OK = "ok"
+    WARN = "warn"  # it would fly, but somebody should know
+    STOP = "stop"  # a mission would not fly, or not to its end
+    UNKNOWN = "unknown"  # the vehicle did not say
+
+
+OK, WARN, STOP, UNKNOWN = MissionVerdict
+
+
+class VehicleFinding(msgspec.Struct, frozen=True):
+    """What the doctor has to say to one question: a stable slug, what was found, and where something is wrong what is
+    needed and what to do about it.
+    """
+
+    slug: str
+    verdict: MissionVerdict
+    found: str
+    needed: str = ""
+    advice: str = ""
 
 
 def diagnose(
-    vehicle: Examination,
+    vehicle: ExaminingDriver,
     policy: Policy,
     flown: Mission | None,
     *,
@@ -18,21 +52,277 @@ def diagnose(
     utc_error_us: int,
     unheard: frozenset[int] = frozenset(),
     named: bool = False,
-) -> Iterator[Finding]:
+) -> Iterator[VehicleFinding]:
     """What was found. `flown` is the mission that the vehicle is to fly, None where only signals were asked about.
 
-    `unheard` are the slots of signals that cannot come on this link, for nobody signs what carries them. `named`: the
-    operator said which system is meant.
+    `keyed`: a link key was given, and what is not signed with it was dropped. `unheard` are the slots of signals that
+    cannot come on this link, for nobody signs what carries them. `named`: the operator said which system is meant.
 
     Before a heartbeat of an autopilot was heard there is nothing to say.
     """
-    flavour = vehicle.flavour
-    if flavour is None:
+    if vehicle.flavour is None:
         return
-    yield from link.link(vehicle.facts, flavour.name, keyed=keyed, crowd=vehicle.link.crowd, named=named)
-    yield from readiness.readiness(vehicle)
-    yield from mission.signals(vehicle, policy, flown, unheard)
+    flavour = vehicle.flavour.name
+    yield _heartbeat(vehicle, flavour)
+    yield _loss(vehicle)
+    yield _signing(vehicle, keyed=keyed)
+    yield _answers(vehicle)
+    yield from _others(vehicle, named=named)
+    yield _round_trip(vehicle.source.clock)
+    yield from _version(vehicle, flavour)
+    yield from _readiness(vehicle)
+    yield from _signals(vehicle, policy, flown, unheard)
     if flown is not None:
-        yield from mission.bound(vehicle, policy, utc_error_us)
-    if vehicle.parameters is not None:
-        yield from settings.settings(flavour.name, vehicle.parameters)
+        yield _place(vehicle)
+        yield _clock(vehicle, utc_error_us)
+    yield from _settings(vehicle, flavour)
+
+
+def _graded(
+    slug: str, found: str, needed: str = "", advice: str = "", *, warns: bool = False, stops: bool = False
+) -> VehicleFinding:
+    """Where all is well nothing is needed, and nothing is to be done."""
+    if not (warns or stops):
+        return VehicleFinding(slug, OK, found)
+    return VehicleFinding(slug, STOP if stops else WARN, found, needed, advice)
+
+
+# ---------------------------------------------------------------- the link
+
+_SLOW_HEARTBEAT_US: Final = 1_500_000
+_SLOW_US, _TOO_SLOW_US = 200_000, 1_000_000
+#: parts of the frames that are missing, in 1/1000
+_LOSSY, _TOO_LOSSY = 20, 200
+
+
+def _heartbeat(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
+    slug, who = "link/heartbeat", f"{flavour}, system {vehicle.system}"
+    interval_us = vehicle.streams["HEARTBEAT"].interval_us
+    if interval_us is None:
+        return VehicleFinding(slug, UNKNOWN, f"{who}: one heartbeat only")
+    found = f"{who}, a heartbeat every {interval_us // 1_000} ms"
+    return _graded(slug, found, "one a second, at the least", warns=interval_us > _SLOW_HEARTBEAT_US)
+
+
+def _loss(vehicle: ExaminingDriver) -> VehicleFinding:
+    talker = vehicle.talkers[vehicle.system, AUTOPILOT]
+    sent = talker.frames + talker.missing
+    lost = 1_000 * talker.missing // sent
+    found = f"{talker.missing} of {sent} frames are missing ({lost // 10}.{lost % 10} %)"
+    advice = "lower the stream rates, or look at the radio"
+    return _graded("link/loss", found, "less than 2 %", advice, warns=lost >= _LOSSY, stops=lost >= _TOO_LOSSY)
+
+
+def _signing(vehicle: ExaminingDriver, *, keyed: bool) -> VehicleFinding:
+    talker = vehicle.talkers[vehicle.system, AUTOPILOT]
+    signed = f"{talker.signed} of {talker.frames} frames are signed"
+    if keyed:
+        return VehicleFinding("link/signing", OK if talker.signed else STOP, signed)
+    if talker.signed:
+        return VehicleFinding("link/signing", WARN, signed, "", "give its key with `--signing-key`")
+    advice = "whoever reaches this link commands the vehicle: `rtshcua keys link` makes a key for MAVLink 2 signing"
+    return VehicleFinding("link/signing", WARN, "nothing is signed", "", advice)
+
+
+def _answers(vehicle: ExaminingDriver) -> VehicleFinding:
+    answers = vehicle.answered or vehicle.source.clock.answered_us is not None
+    found = "it answers what it is asked" if answers else "it answers nothing that it was asked"
+    advice = "it may demand signed frames (`--signing-key`), or the way there may be closed"
+    return _graded("link/answers", found, "answers", advice, stops=not answers)
+
+
+def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding]:
+    stations, crowd = 0, vehicle.link.crowd  # another vehicle, as a run would refuse it
+    for (system, component), talker in vehicle.talkers.items():
+        if (system, component) == (vehicle.system, OURS):
+            advice = "stop the other one: two that mediate do not see what the other commands"
+            yield VehicleFinding("link/component", STOP, f"another component {OURS} speaks here", "", advice)
+        elif talker.kind == GROUND_STATION:
+            stations += 1
+        elif system != vehicle.system and component == AUTOPILOT and talker.autopilot not in (None, NO_AUTOPILOT):
+            found, advice = f"another vehicle speaks here too, system {system}", "`--system` says which one is meant"
+            yield VehicleFinding("link/other-vehicle", WARN if named else STOP, found, "one vehicle", advice)
+            crowd = None
+        elif system != vehicle.system:
+            yield VehicleFinding("link/other-system", WARN, f"system {system}, component {component} speaks here too")
+    words = "no ground station is heard on this link" if not stations else f"{stations} ground station(s) heard"
+    yield VehicleFinding("link/ground-station", OK, words)
+    if crowd is not None:
+        yield VehicleFinding("link/other-vehicle", STOP, crowd, "one vehicle")
+
+
+def _round_trip(clock: VehicleClock) -> VehicleFinding:
+    slug, median, error = "link/round-trip", clock.round_trip_us, clock.error_us
+    if median is None or error is None:
+        found = "TIMESYNC is not answered, so nobody knows how old its reports are"
+        return VehicleFinding(slug, STOP, found, "answers", "a router on the way may drop TIMESYNC (111)")
+    found = f"{median // 1_000} ms there and back; its clock is known to {-(-error // 1_000)} ms"
+    return _graded(slug, found, "at most 200 ms", warns=median > _SLOW_US, stops=median > _TOO_SLOW_US)
+
+
+# ---------------------------------------------------------------- the autopilot
+
+#: the versions that the recorded answers and flights are of
+_TESTED: Final = {"px4": (1, 16), "ardupilot": (4, 7)}
+#: MAV_PROTOCOL_CAPABILITY that a flight needs, or is better off with
+_CAPABILITIES: Final = {
+    "px4": {0x2000: ("MAVLink 2", STOP), 0x4000: ("a fence by MAVLink", WARN), 0x08: ("COMMAND_INT", STOP)},
+    "ardupilot": {0x2000: ("MAVLink 2", STOP), 0x4000: ("a fence by MAVLink", WARN), 0x100: ("position targets", STOP)},
+}
+
+
+def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]:
+    message = vehicle.latest("AUTOPILOT_VERSION")
+    if message is None:
+        yield VehicleFinding("autopilot/version", UNKNOWN, "it does not tell its version")
+        return
+    number, tested = message.flight_sw_version, _TESTED[flavour]
+    version = (number >> 24 & 0xFF, number >> 16 & 0xFF, number >> 8 & 0xFF)
+    found = f"{flavour} {'.'.join(map(str, version))}"
+    advice = f"the answers that we know were recorded of {'.'.join(map(str, tested))}: fly it in simulation first"
+    yield _graded("autopilot/version", found, "", advice, warns=version[:2] != tested)
+    wanted = _CAPABILITIES[flavour]
+    missing = [each for bit, each in wanted.items() if not message.capabilities & bit]
+    for name, verdict in missing:
+        yield VehicleFinding("autopilot/capability", verdict, f"it says that it cannot do {name}", name)
+    if not missing:
+        yield VehicleFinding("autopilot/capability", OK, ", ".join(name for name, _ in wanted.values()))
+
+
+# ---------------------------------------------------------------- the vehicle as it stands, whatever it is to fly
+
+_ACCURATE_MM: Final = 5_000
+
+
+def _readiness(vehicle: ExaminingDriver) -> Iterator[VehicleFinding]:
+    """Sensors, estimator, battery, and whether it would arm."""
+    seen = vehicle.seen
+    if seen.airborne:
+        yield VehicleFinding("vehicle/airborne", STOP, "it is in the air", "on the ground", "somebody else flies it")
+    elif seen.armed:
+        yield VehicleFinding("vehicle/armed", STOP, "its motors are armed", "disarmed", "somebody else holds it")
+    elif not seen.landed_state:
+        found = "it does not say whether it is on the ground (EXTENDED_SYS_STATE)"
+        yield VehicleFinding("vehicle/down", UNKNOWN, found, "on the ground, disarmed")
+    else:
+        yield VehicleFinding("vehicle/down", OK, "on the ground, disarmed")
+    unready, astray = seen.unready, seen.estimator.missing(seen.now_us)
+    found = unready or "nothing that it tells of stands against arming"
+    yield _graded("vehicle/ready", found, "ready to arm", stops=unready is not None)
+    for name in seen.unwell:
+        yield VehicleFinding("sensor/unwell", STOP, f"{name}: there and in use, and not healthy", "healthy")
+    yield _fix(vehicle)
+    found = astray or "its estimator knows place and height"
+    yield _graded("sensor/estimator", found, "a place and a height", stops=astray is not None)
+    yield _battery(vehicle)
+    for text in vehicle.texts:
+        yield VehicleFinding("vehicle/said", OK, f"it said, for what that is worth: {text}")
+
+
+def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
+    message = vehicle.latest("GPS_RAW_INT")
+    if message is None:
+        return VehicleFinding("sensor/gps", STOP, "no GPS_RAW_INT", "a 3D fix")
+    if message.fix_type < 3:
+        return VehicleFinding("sensor/gps", STOP, f"fix type {message.fix_type}", "a 3D fix", "wait, or move it")
+    accuracy = f", to {message.h_acc} mm" if message.h_acc else ""
+    found = f"fix type {message.fix_type}, {message.satellites_visible} satellites{accuracy}"
+    return _graded("sensor/gps", found, f"to {_ACCURATE_MM} mm", warns=message.h_acc > _ACCURATE_MM)
+
+
+def _battery(vehicle: ExaminingDriver) -> VehicleFinding:
+    message = vehicle.latest("BATTERY_STATUS") or vehicle.latest("SYS_STATUS")
+    if message is None or message.battery_remaining < 0:
+        advice = "set up its battery monitor: an unknown charge permits nothing"
+        return VehicleFinding("sensor/battery", STOP, "it does not know its charge", "a charge in %", advice)
+    return VehicleFinding("sensor/battery", OK, f"{message.battery_remaining} %")
+
+
+# ---------------------------------------------------------------- what a bundle needs
+
+#: a message should come this often within the time to stale of what it carries
+_TIMES: Final = 2
+_CLOCK_US: Final = 1_000_000
+_ADVICE: Final = "a higher stream rate, or another source for the signal in the policy"
+
+
+def _signals(
+    vehicle: ExaminingDriver, policy: Policy, mission: Mission | None, unheard: frozenset[int]
+) -> Iterator[VehicleFinding]:
+    """Whether each signal of the policy is known, and comes often enough to stay so. It stops a mission where a step is
+    not admitted without it, as far as its contract says.
+    """
+    well_known = policy.vehicle.position, policy.vehicle.position + 1, policy.vehicle.height, policy.vehicle.battery
+    wanted = {slot for slot in well_known if slot >= 0}
+    for invocation in () if mission is None else mission.invocations:
+        wanted.update(needed(policy, invocation))
+    for signal in policy.signals:
+        slots = signal.slots
+        bad = WARN if wanted.isdisjoint(slots) else STOP
+        if unheard.isdisjoint(slots):
+            yield _signal(vehicle, signal, slots, bad)
+        else:
+            names = " or ".join(source.message for source in signal.sources)
+            found = f"`{signal.name}` stays unknown: nobody signs {names}, and nothing unsigned is believed here"
+            yield VehicleFinding(f"signal/{signal.name}", bad, found, names, "`--unsigned-radio`, here and for `run`")
+
+
+def _signal(vehicle: ExaminingDriver, signal: Signal, slots: Sequence[int], bad: MissionVerdict) -> VehicleFinding:
+    slug, sources = f"signal/{signal.name}", [source.message for source in signal.sources]
+    heard = next((name for name in sources if name in vehicle.streams), None)
+    if heard is None:
+        names = " or ".join(sources)
+        return VehicleFinding(slug, bad, f"`{signal.name}` stays unknown: no {names}", names, _ADVICE)
+    if any(vehicle.values.get(slot) is None for slot in slots):
+        found = f"`{signal.name}` is unknown now: {heard} comes, and says so or is not vouched for"
+        return VehicleFinding(slug, bad, found, "a value")
+    interval_us, stale_ms = vehicle.streams[heard].interval_us, signal.stale_us // 1_000
+    every = "came once" if interval_us is None else f"every {interval_us // 1_000} ms"
+    found = f"`{signal.name}`: {heard} {every}, stale after {stale_ms} ms"
+    seldom = interval_us is None or interval_us * _TIMES > signal.stale_us
+    return _graded(slug, found, f"twice within {stale_ms} ms", _ADVICE, warns=seldom)
+
+
+def _place(vehicle: ExaminingDriver) -> VehicleFinding:
+    """What stands between this vehicle and a bundle that was made for it."""
+    preflight = vehicle.preflight
+    unknown = preflight.unplaced or preflight.unread
+    if preflight.astray is not None:
+        return VehicleFinding("mission/unready", STOP, preflight.astray, "as the policy has it")
+    if unknown is not None:
+        return VehicleFinding("mission/place", UNKNOWN, unknown, "as the policy has it")
+    return VehicleFinding("mission/place", OK, "home and return altitude are those of the policy")
+
+
+def _clock(vehicle: ExaminingDriver, utc_error_us: int) -> VehicleFinding:
+    ahead_us = vehicle.ahead_us
+    if ahead_us is None:
+        return VehicleFinding("mission/clock", UNKNOWN, "the vehicle does not tell the time (SYSTEM_TIME)")
+    if abs(ahead_us) <= _CLOCK_US + utc_error_us:
+        return VehicleFinding("mission/clock", OK, "the vehicle's clock agrees with this machine's")
+    found = f"the vehicle's clock and this machine's are {abs(ahead_us) // 1_000_000} s apart"
+    advice = "one of them is wrong; validity and times of day are judged by this machine's"
+    return VehicleFinding("mission/clock", WARN, found, "the same time", advice)
+
+
+# ---------------------------------------------------------------- what it does by itself
+
+
+def _settings(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]:
+    """A finding for each parameter that the vehicle has."""
+    if vehicle.parameters is None:
+        return
+    values = vehicle.parameters.values
+    told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
+    for setting in told:
+        yield _setting(setting, values[setting.parameter])
+    if not told:
+        absent = "none of the parameters that were asked for was answered"
+        yield VehicleFinding("settings/unread", UNKNOWN, absent, "what the autopilot does by itself")
+
+
+def _setting(setting: Setting, value: float) -> VehicleFinding:
+    words = setting.words.get(value, f"{value:g}")
+    found = f"{setting.about}: {words} ({setting.parameter} = {value:g})"
+    why = setting.warns.get(value, "")
+    return _graded(f"settings/{setting.parameter.lower()}", found, "", why, warns=bool(why))

@@ -1,19 +1,20 @@
-"""The examination: a driver that also asks the doctor's questions and keeps what everybody says.
+"""The examination: a driver that also asks the doctor's questions and keeps what everybody says, whoever sent it.
 
 It sends what any driver sends before a flight, the fence apart, and questions: each is housekeeping, and passes the
 frame session like all else. Nothing is armed, moved, set or uploaded.
 """
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Final
 
-from rtshcua.adapters.doctor.facts import Facts
 from rtshcua.adapters.doctor.settings import SETTINGS
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.link import Heard
-from rtshcua.adapters.vehicle.parameters import Parameters
-from rtshcua.adapters.vehicle.preflight import Preflight
-from rtshcua.codec.frames import Codec
+from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.codec.frames import Codec, Received
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -21,18 +22,64 @@ from rtshcua.onboard.ports import Clock, Event, Readings, Said
 
 _ASK_US: Final = 1_000_000
 _ONCE: Final = ("AUTOPILOT_VERSION", "HOME_POSITION", "SYSTEM_TIME")
+_MOST_TEXTS: Final = 20
+_MOST_TALKERS: Final = 64
+_LONG_AGO: Final = 64  # a sequence that goes back by less than this came out of order, and nothing is missing
 
 
-class Examination(Driver):
-    """Listens and asks. `facts` and `parameters` hold the answers."""
+@dataclass(slots=True)
+class Talker:
+    """One component of one system: its frames, how many are missing in between, and how many carried a signature."""
+
+    frames: int = 0
+    missing: int = 0
+    signed: int = 0
+    kind: int | None = None  # MAV_TYPE of its heartbeat,
+    autopilot: int | None = None  # and MAV_AUTOPILOT
+    sequence: int | None = None
+
+    def hear(self, frame: Received) -> None:
+        """Count one frame."""
+        if self.sequence is not None:
+            gap = (frame.sequence - self.sequence - 1) % 256
+            self.missing += gap if gap < 256 - _LONG_AGO else 0
+        self.sequence = frame.sequence
+        self.frames += 1
+        self.signed += frame.signed
+        if frame.name == "HEARTBEAT":
+            self.kind, self.autopilot = frame.message.type, frame.message.autopilot
+
+
+@dataclass(slots=True)
+class Stream:
+    """One kind of message of the vehicle: how often it came, when first and last (us), and the last one."""
+
+    count: int
+    first_us: int
+    last_us: int
+    latest: Any
+
+    @property
+    def interval_us(self) -> int | None:
+        """The mean time from one to the next; None for a single one."""
+        return (self.last_us - self.first_us) // (self.count - 1) if self.count > 1 else None
+
+
+class ExaminingDriver(Driver):
+    """Listens and asks. `talkers` by (system, component); `streams` of the vehicle's own components by name."""
 
     def __init__(
         self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None,
         system: int | None = None,
     ) -> None:  # fmt: skip
         super().__init__(policy, frames, fence=False, verifier=verifier, system=system)
-        self.facts = Facts()
-        self.parameters: Parameters | None = None
+        self.talkers: dict[tuple[int, int], Talker] = {}
+        self.streams: dict[str, Stream] = {}
+        self.texts: list[str] = []  # what it said, the first few texts once each
+        self.ahead_us: int | None = None  # how far the vehicle's UTC is ahead of ours
+        self.answered = False  # it answered something that we asked, TIMESYNC apart
+        self.values: dict[int, int | None] = {}  # of the policy's signals, by state slot
+        self.parameters: VehicleParameters | None = None
         self._clock = clock
         self._ears = Codec(0, 0)
         self._asked_us: int | None = None
@@ -40,32 +87,17 @@ class Examination(Driver):
     def receive(self, datagram: bytes, now_us: int) -> Heard:
         """As any driver, and keep what was heard: who speaks, and of what is believed what it says."""
         heard = super().receive(datagram, now_us)
-        self.facts.system = self._system
-        utc_us = self._clock.now().utc_us
-        for frame in self._ears.parse(datagram, now_us):
-            self.facts.meet(frame)
+        self._meet(datagram, now_us)
         for frame in heard.frames:
-            self.facts.hear(frame, now_us, utc_us)
-            if frame.name == "PARAM_VALUE" and frame.system == self._system and self.parameters is not None:
-                self.parameters.take(frame.message)
-        clock = self.source.clock
-        if clock.answered_us is not None:
-            self.facts.answered = True
-            self.facts.round_trip_us, self.facts.clock_error_us = clock.round_trip_us, clock.error_us
+            if frame.system == self.system:
+                self._hear(frame, now_us)
         self._note(heard.events)
         return heard
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
         """Somebody else speaks at this port; under the vehicle's own id that is no talker to be counted."""
         super().overhear(datagram, now_us)
-        for frame in self._ears.parse(datagram, now_us):
-            if frame.system != self._system:
-                self.facts.meet(frame)
-
-    @property
-    def settled(self) -> Preflight | None:
-        """What is compared with the policy; None before a heartbeat."""
-        return self._preflight
+        self._meet(datagram, now_us, but=self.system)
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """As any driver, and ask what is due."""
@@ -75,18 +107,48 @@ class Examination(Driver):
         if flavour is None:
             return events, frames
         if self.parameters is None:
-            self.parameters = Parameters(bytewise=flavour.bytewise)
+            self.parameters = VehicleParameters(bytewise=flavour.bytewise)
             for setting in SETTINGS[flavour.name]:
                 self.parameters.read(setting.parameter)
         send: list[Any] = self.parameters.due(self._system, now_us)
         if self._asked_us is None or now_us - self._asked_us >= _ASK_US:
             self._asked_us = now_us
-            send += [messages.request(self._system, name) for name in _ONCE if name not in self.facts.streams]
+            send += [messages.request(self._system, name) for name in _ONCE if name not in self.streams]
         return events, frames + self._pack(send, now_us, events)
 
-    def _note(self, events: Any) -> None:
+    def latest(self, name: str) -> Any:
+        """The last message of a name; None if there was none."""
+        stream = self.streams.get(name)
+        return None if stream is None else stream.latest
+
+    def _meet(self, datagram: bytes, now_us: int, but: int | None = None) -> None:
+        """Count each good frame, of anybody, believed or not."""
+        for frame in self._ears.parse(datagram, now_us):
+            key = (frame.system, frame.component)
+            if frame.system != but and (key in self.talkers or len(self.talkers) < _MOST_TALKERS):
+                self.talkers.setdefault(key, Talker()).hear(frame)
+
+    def _hear(self, frame: Received, now_us: int) -> None:
+        """Take in what one frame of the vehicle says."""
+        name, message = frame.name, frame.message
+        stream = self.streams.get(name)
+        if stream is None:
+            self.streams[name] = Stream(1, now_us, now_us, message)
+        else:
+            stream.count, stream.last_us, stream.latest = stream.count + 1, now_us, message
+        if name == "PARAM_VALUE" and self.parameters is not None:
+            self.parameters.take(message)
+        if frame.component != AUTOPILOT:
+            return
+        match name:
+            case "COMMAND_ACK" | "PARAM_VALUE" | "AUTOPILOT_VERSION":
+                self.answered = True
+            case "SYSTEM_TIME" if message.time_unix_usec:
+                self.ahead_us = message.time_unix_usec - self._clock.now().utc_us
+
+    def _note(self, events: Iterable[Event]) -> None:
         for event in events:
             if isinstance(event, Readings):
-                self.facts.values.update(event.values)
-            elif isinstance(event, Said):
-                self.facts.say(event.text)
+                self.values.update(event.values)
+            elif isinstance(event, Said) and event.text not in self.texts and len(self.texts) < _MOST_TEXTS:
+                self.texts.append(event.text)

@@ -1,25 +1,27 @@
 """Parameters that make an autopilot act by itself in a flight, or keep it from arming, and what they say in words."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
-
-from rtshcua.adapters.doctor.finding import Finding, Verdict
-from rtshcua.adapters.vehicle.parameters import Parameters
+from typing import Final, NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """A parameter, what it is about, its values in words, and those that somebody should know of."""
+class Setting(NamedTuple):
+    """A parameter, what it is about, its values in words, and why some of them are worth a warning."""
 
     parameter: str
     about: str
-    words: Mapping[int, str]
-    warns: Mapping[int, str]
-    """Why a value is worth a warning."""
+    words: Mapping[float, str]
+    warns: Mapping[float, str]
 
 
-_DATA_LINK: Final = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "lockdown"}
+_Words = Mapping[float, str]
+_DATA_LINK: _Words = {
+    0: "nothing",
+    1: "hold",
+    2: "return",
+    3: "land",
+    5: "terminate",
+    6: "lockdown",
+}
 _MOTORS_OFF: Final = "the motors stop in the air"
 
 SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
@@ -79,24 +81,3 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("DISARM_DELAY", "seconds until it disarms on the ground", {}, {}),
     ),
 }  # fmt: skip
-
-
-def settings(flavour: str, parameters: Parameters) -> list[Finding]:
-    """A finding for each parameter that the vehicle has."""
-    findings: list[Finding] = []
-    for setting in SETTINGS[flavour]:
-        value = parameters.values.get(setting.parameter)
-        if value is not None:
-            findings.append(_finding(setting, value))
-    if not findings:
-        absent = "none of the parameters that were asked for was answered"
-        findings.append(Finding("settings/unread", Verdict.UNKNOWN, absent, "what the autopilot does by itself"))
-    return findings
-
-
-def _finding(setting: Setting, value: float) -> Finding:
-    number = int(value) if value == int(value) else None
-    words = setting.words.get(number, f"{value:g}") if number is not None else f"{value:g}"
-    found = f"{setting.about}: {words} ({setting.parameter} = {value:g})"
-    why = setting.warns.get(number, "") if number is not None else ""
-    return Finding(f"settings/{setting.parameter.lower()}", Verdict.WARN if why else Verdict.OK, found, "", why)

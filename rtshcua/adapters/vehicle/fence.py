@@ -6,9 +6,14 @@ be; each such loss is told. How little a fence protects: docs/adr/0019-what-a-ve
 """
 
 from collections.abc import Iterator, Sequence
-from math import isqrt
-from typing import Final, NamedTuple
+from enum import Enum, auto
+from math import isclose, isqrt
+from typing import Any, Final, NamedTuple
 
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, FenceHabits
+from rtshcua.adapters.vehicle.messages import FENCE, FenceItem, Message
+from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.mavlink import enums
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, Projection, Zone, unproject
@@ -19,27 +24,6 @@ INCLUDE_CIRCLE: Final = enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
 EXCLUDE_CIRCLE: Final = enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
 
 Ring = tuple[int, ...]
-
-
-class FenceHabits(NamedTuple):
-    """How an autopilot takes a fence.
-
-    `frame` (MAV_FRAME) goes with each item. `all_inclusions`: the vehicle must be inside every inclusion; else inside
-    any of them. `switches` are parameters that must have these bits set for the fence to count.
-    """
-
-    frame: int
-    all_inclusions: bool
-    switches: tuple[tuple[str, int], ...]
-
-
-class FenceItem(NamedTuple):
-    """One MISSION_ITEM_INT: the command, a place in 1e-7 degree, and `param1`: corners of its ring, or radius in m."""
-
-    command: int
-    latitude: int
-    longitude: int
-    parameter: float
 
 
 class Fence(NamedTuple):
@@ -61,10 +45,10 @@ def fence_of(policy: Policy, habits: FenceHabits) -> Fence:
         kept.sort(key=_size)
         left_out += [f"`{zone.name}`: this autopilot joins inclusions instead of intersecting" for zone in kept[1:]]
         del kept[1:]
-    items = [item for zone in kept for item in _included(zone, policy.projection)]
+    items = [item for zone in kept for item in _items(zone, policy.projection, inside=True)]
     for zone in (policy.zones[number] for number in airspace.outside):
         if _can_exclude(zone, left_out):
-            items += _excluded(zone, policy.projection)
+            items += _items(zone, policy.projection, inside=False)
     return Fence(tuple(items), tuple(left_out))
 
 
@@ -94,34 +78,18 @@ def _can_exclude(zone: Zone, left_out: list[str]) -> bool:
     return True
 
 
-def _included(zone: Zone, projection: Projection) -> Iterator[FenceItem]:
+def _items(zone: Zone, projection: Projection, *, inside: bool) -> Iterator[FenceItem]:
+    """What includes a zone (a hole of it is an exclusion), or excludes it; outer rings first."""
     if zone.shape == CIRCLE:
-        yield _circle(zone, projection, INCLUDE_CIRCLE, outwards=1)
-        return
-    rings = list(_rings(zone))
-    for ring in sorted(rings, key=_is_outer, reverse=True):
-        yield from _polygon(ring, projection, INCLUDE_VERTEX if _is_outer(ring) else EXCLUDE_VERTEX)
-
-
-def _excluded(zone: Zone, projection: Projection) -> Iterator[FenceItem]:
-    if zone.shape == CIRCLE:
-        yield _circle(zone, projection, EXCLUDE_CIRCLE, outwards=0)
-        return
-    for ring in _rings(zone):
-        yield from _polygon(ring, projection, EXCLUDE_VERTEX)
-
-
-def _circle(zone: Zone, projection: Projection, command: int, outwards: int) -> FenceItem:
-    """A radius in whole centimetres, so that a 32-bit float says the same everywhere."""
-    x, y, square = zone.data
-    centimetres = isqrt(square) // 10 + outwards
-    return FenceItem(command, *unproject(projection, x, y), centimetres / 100)
-
-
-def _polygon(ring: Ring, projection: Projection, command: int) -> Iterator[FenceItem]:
-    corners = len(ring) // 2
-    for x, y in zip(ring[::2], ring[1::2], strict=True):
-        yield FenceItem(command, *unproject(projection, x, y), float(corners))
+        x, y, square = zone.data
+        # whole centimetres, so that a 32-bit float says the same everywhere, rounded away from the airspace
+        centimetres = isqrt(square) // 10 + inside
+        command = INCLUDE_CIRCLE if inside else EXCLUDE_CIRCLE
+        yield FenceItem(command, *unproject(projection, x, y), centimetres / 100)
+    for ring in sorted(_rings(zone), key=_is_outer, reverse=True):
+        command = INCLUDE_VERTEX if inside and _is_outer(ring) else EXCLUDE_VERTEX
+        for x, y in zip(ring[::2], ring[1::2], strict=True):
+            yield FenceItem(command, *unproject(projection, x, y), float(len(ring) // 2))
 
 
 def _rings(zone: Zone) -> Iterator[Ring]:
@@ -148,3 +116,201 @@ def _is_outer(ring: Ring) -> bool:
 def _size(zone: Zone) -> int:
     """Twice the area, in mm^2, near enough to say which zone is the smallest."""
     return 6 * zone.data[2] if zone.shape == CIRCLE else sum(map(_twice_area, _rings(zone)))
+
+
+# ---------------------------------------------------------------- the mission protocol
+
+RETRY_US: Final = 1_000_000
+RETRIES: Final = 8
+#: Between two requests of the vehicle; ArduCopter itself gives up after 8 s.
+SILENCE_US: Final = 8_000_000
+
+_RESULTS: Final = {
+    1: "error", 2: "unsupported frame", 4: "no space", 5: "invalid", 13: "invalid sequence", 14: "denied",
+    15: "cancelled",
+}  # fmt: skip
+_ACCEPTED, _UNSUPPORTED = 0, 3
+
+
+class UploadState(Enum):
+    """Where an upload stands."""
+
+    IDLE = auto()
+    SENDING = auto()
+    COUNTING = auto()
+    READING = auto()
+    DONE = auto()
+    UNSUPPORTED = auto()
+    FAILED = auto()
+
+
+class Upload:
+    """One fence, to one vehicle: upload, then download, and the two must be the same. An acknowledged upload says
+    little (docs/adr/0019-what-a-vehicle-says.md). `problem` says what went wrong when it FAILED.
+
+    Source: https://mavlink.io/en/services/mission.html; PX4 asks with MISSION_REQUEST_INT, and at times with both,
+    ArduCopter with the older MISSION_REQUEST and takes MISSION_ITEM_INT for an answer (recorded).
+    """
+
+    def __init__(self, items: tuple[FenceItem, ...], frame: int, slack: int = 1) -> None:
+        self._slack = slack
+        self._items = items
+        self._frame = frame
+        self.state = UploadState.IDLE
+        self.problem = ""
+        self._request: Message = None  # the last one, which is put again until it is answered
+        self._tries = 0
+        self._sent_us = 0
+        self._asked = False  # the vehicle asks now
+        self._read = 0  # how many items of it came back as they were sent
+
+    def due(self, system: int, now_us: int) -> list[Message]:
+        """What to send now: the beginning, or again what was not answered."""
+        if self.state is UploadState.IDLE:
+            return self._ask(UploadState.SENDING, messages.fence_count(system, len(self._items)), now_us)
+        if self.state not in (UploadState.SENDING, UploadState.COUNTING, UploadState.READING):
+            return []
+        if now_us - self._sent_us < (SILENCE_US if self._asked else RETRY_US) * self._slack:
+            return []
+        self._tries += 1
+        if self._tries > RETRIES:
+            return self._fail("does not answer")
+        self._sent_us, self._asked = now_us, False
+        return [self._request]
+
+    def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
+        """A message of the mission protocol, about fences and for us; what answers it."""
+        match name, self.state:
+            case (("MISSION_REQUEST" | "MISSION_REQUEST_INT"), UploadState.SENDING):
+                if message.seq >= len(self._items):
+                    return self._fail(f"asks for item {message.seq} of {len(self._items)}")
+                self._sent_us, self._asked, self._tries = now_us, True, 0
+                return [messages.fence_item(system, message.seq, self._frame, self._items[message.seq])]
+            case "MISSION_ACK", UploadState.SENDING:
+                if message.type == _ACCEPTED:
+                    return self._ask(UploadState.COUNTING, messages.fence_list(system), now_us)
+                if message.type == _UNSUPPORTED:
+                    self.state = UploadState.UNSUPPORTED
+                    return []
+                return self._fail(f"refuses it ({_RESULTS.get(message.type, f'result {message.type}')})")
+            case "MISSION_COUNT", UploadState.COUNTING:
+                if message.count != len(self._items):
+                    return self._fail(f"holds {message.count} items instead of {len(self._items)}")
+                return self._ask(UploadState.READING, messages.fence_request(system, 0), now_us)
+            case "MISSION_ITEM_INT", UploadState.READING:
+                return self._compare(message, system, now_us)
+        return []
+
+    def _compare(self, message: Any, system: int, now_us: int) -> list[Message]:
+        if message.seq != self._read:
+            return []  # of an earlier request
+        item = self._items[self._read]
+        same = (message.command, message.x, message.y) == (item.command, item.latitude, item.longitude)
+        if not (same and isclose(message.param1, item.parameter, abs_tol=0.01)):
+            return self._fail(f"holds another item {self._read} than it was sent")
+        self._read += 1
+        if self._read < len(self._items):
+            return self._ask(UploadState.READING, messages.fence_request(system, self._read), now_us)
+        self.state = UploadState.DONE
+        return [messages.fence_received(system)]
+
+    def _ask(self, state: UploadState, request: Message, now_us: int) -> list[Message]:
+        self.state, self._request, self._sent_us, self._tries, self._asked = state, request, now_us, 0, False
+        return [request]
+
+    def _fail(self, problem: str) -> list[Message]:
+        self.state, self.problem = UploadState.FAILED, problem
+        return []
+
+
+# ---------------------------------------------------------------- what is made of it
+
+#: After a failure it waits so long before it begins again.
+AGAIN_US: Final = 10_000_000
+
+#: The messages of the mission protocol that `take` looks at.
+HEEDED: Final = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT")
+
+
+class Fencing:
+    """The airspace becomes the vehicle's fence: uploaded, read back, switched on; begun anew when that failed.
+
+    `unready` says what is not settled; `note` what an operator should know once it is.
+    """
+
+    def __init__(
+        self, policy: Policy, flavour: AutopilotFlavour, parameters: VehicleParameters, *, wanted: bool, slack: int
+    ) -> None:
+        self._fence = fence_of(policy, flavour.fence) if wanted else None
+        self._habits = flavour.fence
+        self._parameters = parameters
+        self._slack = slack
+        self._upload = self._begin()
+        self._failed_us: int | None = None
+        self._problem: str | None = None
+
+    def due(self, system: int, now_us: int) -> list[Message]:
+        """What to send now."""
+        if self._upload is None:
+            return []
+        problem = self._failure()
+        if problem is None:
+            self._failed_us = None
+        elif self._failed_us is None:
+            self._failed_us, self._problem = now_us, problem
+        elif now_us - self._failed_us >= AGAIN_US * self._slack:
+            self._failed_us, self._upload = None, self._begin()
+            for name, _ in self._habits.switches:
+                self._parameters.forget(name)
+        out = [] if self._upload is None else self._upload.due(system, now_us)
+        if self._state is UploadState.DONE:
+            for name, bits in self._habits.switches:
+                self._parameters.ensure(name, bits)
+        return out
+
+    def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
+        """A message of the mission protocol; what answers it."""
+        if self._upload is None or name not in HEEDED or message.mission_type != FENCE:
+            return []
+        return self._upload.take(name, message, system, now_us)
+
+    @property
+    def unready(self) -> str | None:
+        """Why the fence is not there yet; None where none is wanted, or possible."""
+        if self._state in (None, UploadState.UNSUPPORTED):
+            return None
+        if self._state is UploadState.DONE and all(self._parameters.has(*each) for each in self._habits.switches):
+            return None
+        return self._failure() or self._problem or "its fence is being set"
+
+    @property
+    def note(self) -> str:
+        """What became of it, once nothing is outstanding."""
+        fence = self._fence
+        if fence is None:
+            return "its own fence was left as it is"
+        if self._state is UploadState.UNSUPPORTED:
+            return "it takes no fence: the policy's airspace is watched by this program alone"
+        left_out = "; ".join(fence.left_out)
+        if not fence.items:
+            return f"no fence was set, for none can say this airspace: {left_out}"
+        many = f"{len(fence.items)} item{'' if len(fence.items) == 1 else 's'}"
+        text = f"its fence was set to the policy's airspace ({many}), and read back"
+        return f"{text}; not in it: {left_out}" if left_out else text
+
+    @property
+    def _state(self) -> UploadState | None:
+        return None if self._upload is None else self._upload.state
+
+    def _begin(self) -> Upload | None:
+        if self._fence is None or not self._fence.items:
+            return None
+        return Upload(self._fence.items, self._habits.frame, self._slack)
+
+    def _failure(self) -> str | None:
+        if self._upload is not None and self._upload.state is UploadState.FAILED:
+            return f"its fence could not be set: it {self._upload.problem}; `--no-fence` flies without"
+        for name, _ in self._habits.switches if self._state is UploadState.DONE else ():
+            if self._parameters.is_absent(name):
+                return f"its fence could not be switched on: no answer about `{name}`; `--no-fence` flies without"
+        return None

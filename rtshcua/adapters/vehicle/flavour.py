@@ -1,16 +1,53 @@
-"""What differs between autopilots, as a value: each flavour's package makes one."""
+"""What differs between autopilots, as a value that each flavour's package makes, and what they fly alike."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
-from rtshcua.adapters.vehicle.fence import FenceHabits
-from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.progress import Expected
-from rtshcua.adapters.vehicle.targets import Target
+from rtshcua.adapters.vehicle import effects, messages
+from rtshcua.adapters.vehicle.effects import Effect, Measure
+from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
+from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.onboard.ports import Command
 
-Message = Any
+#: us of link time until a mode shows, and until the motors run
+MODE_US: Final = 5_000_000
+ARM_US: Final = 8_000_000
+#: mm: what rounding, and a height of home that moves a little, may make of a target
+SAME: Final = 3_000
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedTarget:
+    """What the autopilot should report: a place, and its height in mm above mean sea level (None: any).
+
+    `within`: how far off, in mm, the first one that is reported may be; it then counts as the target. A vehicle that
+    was told to stop says itself where it will.
+    """
+
+    latitude: int
+    longitude: int
+    amsl: int | None
+    within: int = SAME
+
+    def matches(self, reported: Reported) -> bool:
+        """Whether a report is of this target."""
+        latitude, longitude, amsl = reported
+        level = self.amsl is None or abs(amsl - self.amsl) <= SAME
+        return level and effects.apart(latitude, longitude, self.latitude, self.longitude) <= self.within
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedProgress:
+    """How a stage shows its progress: some part of `measure` falls by a metre within `within_us` of link time.
+
+    `either_way`: that it changes is enough. A return climbs, crosses and descends, to a place that the autopilot knows.
+    """
+
+    measure: Measure
+    within_us: int
+    either_way: bool = False
 
 
 class Stage(NamedTuple):
@@ -27,23 +64,34 @@ class Stage(NamedTuple):
 
     message: Message | None
     command: int | None
-    done: Callable[[Observed], bool] | None
+    done: Effect | None
     modes: frozenset[int]
     timeout_us: int = 0
     repeat_us: int = 0
     powered: bool = False
-    target: Target | None = None
-    progress: Expected | None = None
+    target: ExpectedTarget | None = None
+    progress: ExpectedProgress | None = None
     stops: bool = False
     spare: bool = False
 
 
-Stages: TypeAlias = Callable[[Command, Observed, int], list[Stage]]
+Stages: TypeAlias = Callable[[Command, ObservedVehicle, int], list[Stage]]
 """How a command is flown: what is seen and the target system to the stages of its manoeuvre."""
 
 
-@dataclass(frozen=True, slots=True)
-class ReturnAltitude:
+class FenceHabits(NamedTuple):
+    """How an autopilot takes a fence.
+
+    `frame` (MAV_FRAME) goes with each item. `all_inclusions`: the vehicle must be inside every inclusion; else inside
+    any of them. `switches` are parameters that must have these bits set for the fence to count.
+    """
+
+    frame: int
+    all_inclusions: bool
+    switches: tuple[tuple[str, int], ...]
+
+
+class ReturnAltitude(NamedTuple):
     """A parameter that holds the height at which the autopilot flies home, and the mm in one of its units."""
 
     parameter: str
@@ -51,7 +99,7 @@ class ReturnAltitude:
 
 
 @dataclass(frozen=True, slots=True)
-class Flavour:
+class AutopilotFlavour:
     """An autopilot: its name, the names of its modes, how it is made to do each kind of motion, and its own ways.
 
     `estimator` is the message in which its estimator reports. `natural` are changes of mode (from, to) that it makes
@@ -73,7 +121,49 @@ class Flavour:
     bytewise: bool
     fence: FenceHabits
 
+    def mode_name(self, number: int) -> str:
+        """The autopilot's name of a `custom_mode`, or the number itself."""
+        return self.mode_names.get(number, f"mode {number}")
 
-def mode_name(flavour: Flavour, number: int) -> str:
-    """The flavour's name of a `custom_mode`, or the number itself."""
-    return flavour.mode_names.get(number, f"mode {number}")
+
+# ---------------------------------------------------------------- what both fly alike
+
+
+def entering(system: int, mode: Px4Mode | CopterMode) -> Stage:
+    """A mode first. Where it is the mode already nothing is sent, for that would undo a takeover under way."""
+    message = messages.set_mode(system, mode)
+    return Stage(message, messages.DO_SET_MODE, effects.in_mode(mode), frozenset({mode}), MODE_US, spare=True)
+
+
+def arming(system: int, modes: frozenset[int]) -> Stage:
+    """The motors run, in one of these modes."""
+    return Stage(messages.arm(system), messages.ARM_DISARM, lambda seen: seen.armed, modes, ARM_US)
+
+
+def climbing(height: int) -> ExpectedProgress:
+    """A climb gets a metre higher."""
+    return ExpectedProgress(effects.up_to(height), 10_000_000)
+
+
+def flying(latitude: int, longitude: int, height: int) -> ExpectedProgress:
+    """A leg gets a metre nearer to its end."""
+    return ExpectedProgress(effects.to_place(latitude, longitude, height), 8_000_000)
+
+
+def returning(system: int, mode: Px4Mode | CopterMode) -> list[Stage]:
+    """Home, and down there. The window is long: ArduCopter hovers over home for 5 s."""
+    return _coming_down(system, mode, ExpectedProgress(effects.homeward, 45_000_000, either_way=True))
+
+
+def landing(system: int, mode: Px4Mode | CopterMode) -> list[Stage]:
+    """Down where it is."""
+    return _coming_down(system, mode, ExpectedProgress(effects.to_the_ground, 15_000_000))
+
+
+def _coming_down(system: int, mode: Px4Mode | CopterMode, progress: ExpectedProgress) -> list[Stage]:
+    own = frozenset({mode})
+    message = messages.set_mode(system, mode)
+    return [
+        Stage(message, messages.DO_SET_MODE, effects.in_mode_or_down(mode), own, MODE_US),
+        Stage(None, None, lambda seen: seen.down, own, progress=progress),
+    ]

@@ -1,12 +1,15 @@
-"""Our end of the link: what came, once it proved to be the vehicle's, and what leaves, once the boundary let it."""
+"""Our end of the link: what came, once it proved to be the vehicle's, what leaves, once the boundary let it, and
+whether it is up.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.vehicle.company import Company
-from rtshcua.adapters.vehicle.flavour import Message
+from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import Verifier
@@ -27,45 +30,58 @@ class Heard(NamedTuple):
     frames: Sequence[Received]
 
 
-class Link:
+class VehicleLink:
     """Frames in and out. There is no other way out than through `frames`, the boundary's gate.
 
     `verifier` holds the link's key, if it has one: what is not signed with it is dropped. With a `system`, nobody else
-    is heard from the beginning.
+    is heard from the beginning: the operator said which one is flown. Others may speak too then, but under no
+    circumstances under the same id: two autopilots that send to one port, of which one is flown, must not go unnoticed.
     """
 
     def __init__(self, frames: Gate, verifier: Verifier | None = None, system: int | None = None) -> None:
         self._frames = frames
         self._verifier = verifier
         self._named = system is not None
-        self._company: Company | None = None
-        self._begun = False
         self._codec = Codec(_NOBODY, OURS, only=None if system is None else {system}, verifier=verifier)
+        self._system = 0
+        #: until the flight begins: what is not the chosen vehicle's, of its own sender and of another one
+        self._others: tuple[Codec, Codec] | None = None
+        #: another vehicle that was heard on the link before the flight, in words; None while there is none that matters
+        self.crowd: str | None = None
 
     def settle(self, system: int) -> None:
         """From now on be part of this system, and hear nobody else."""
+        self._system = system
         self._codec = Codec(system, OURS, only={system}, verifier=self._verifier)
-        self._company = Company(system, self._verifier, named=self._named)
+        others = Codec(0, 0, only=frozenset(range(256)) - {system}, verifier=self._verifier)
+        # with a key, a second sender of the vehicle's own frames is nobody: at most it repeats them
+        self._others = others, Codec(0, 0) if self._verifier is None else others
 
     def begin(self) -> None:
         """The flight begins: from now on nothing is made of other vehicles."""
-        self._begun = True
+        self._others = None
 
-    @property
-    def crowd(self) -> str | None:
-        """Another vehicle that was heard on the link before the flight, in words."""
-        return None if self._company is None else self._company.found
-
-    def overhear(self, datagram: bytes, now_us: int) -> None:
-        """Take in a datagram of another sender than the vehicle's."""
-        if self._company is not None and not self._begun:
-            self._company.hear(datagram, now_us, elsewhere=True)
+    def overhear(self, datagram: bytes, now_us: int, *, elsewhere: bool = True) -> None:
+        """Look for another vehicle in a datagram; `elsewhere`: of another sender than the vehicle's."""
+        if self._others is None:
+            return
+        for frame in self._others[elsewhere].parse(datagram, now_us):
+            is_autopilot = frame.component == AUTOPILOT and frame.name == "HEARTBEAT"
+            if not is_autopilot or frame.message.autopilot == NO_AUTOPILOT:
+                continue
+            if frame.system == self._system:
+                self.crowd = f"two vehicles speak here as system {self._system}: give each an id of its own"
+            elif not self._named and self.crowd is None:
+                self.crowd = (
+                    f"two vehicles speak here, systems {self._system} and {frame.system}: `--system` says which one "
+                    "is meant"
+                )
 
     def parse(self, datagram: bytes, now_us: int) -> list[Received]:
         """The good frames in a datagram, in order; never raises, whatever the bytes."""
         received: list[Received] = []
-        if self._company is not None and not self._begun:
-            self._company.hear(datagram, now_us, elsewhere=False)
+        if self._others is not None:
+            self.overhear(datagram, now_us, elsewhere=False)
         for each in self._codec.parse(datagram, now_us):
             if each.component == OURS:
                 continue  # what comes back under our own name says nothing of the vehicle
@@ -87,3 +103,69 @@ class Link:
             else:
                 frames.append(sealed)
         return frames, refused
+
+
+# ---------------------------------------------------------------- whether it is up
+
+#: Nothing at all came from the autopilot for this long: the link is silent. Its streams come several times a second.
+SILENT_US: Final = 1_000_000
+#: Nothing that was asked was answered for this long, though the autopilot is heard: it does not hear us.
+UNANSWERED_US: Final = 3_000_000
+
+SILENT: Final = "silent"
+UNANSWERED: Final = "heard, but it answers nothing"
+
+
+class LinkWatch:
+    """Whether the link to the autopilot is up, in both directions, and a clock that only runs while it is.
+
+    Nothing that we send arrives on a link that is cut, and nothing that we see is the present. So what waits for an
+    effect or an answer waits in *link time*: a manoeuvre does not fail because nobody could hear of its success.
+    Told of every frame, question and answer; `slack` stretches its limits, see `Driver`. Times in us.
+    """
+
+    def __init__(self, slack: int = 1) -> None:
+        self._slack = slack
+        #: when it was last heard
+        self.heard_us: int | None = None
+        self._unanswered_us: int | None = None  # since when a question stands open
+        self._seen_us: int | None = None
+        #: link time: how long the link was up in sum, as of the last look
+        self.up_us = 0
+        #: whether it ever answered anything: one that never did cannot be held to it
+        self.answers = False
+        #: why the link is down; None while it is up
+        self.down: str | None = None
+
+    def heard(self, now_us: int) -> None:
+        """A frame of the autopilot came."""
+        self.heard_us = now_us
+
+    def asked(self, now_us: int) -> None:
+        """Something was asked that the autopilot answers."""
+        if self._unanswered_us is None:
+            self._unanswered_us = now_us
+
+    def answered(self) -> None:
+        """It answered."""
+        self._unanswered_us, self.answers = None, True
+
+    def look(self, now_us: int) -> bool:
+        """Let time pass; True when the link went down, or came up again, since the last look."""
+        if self.heard_us is None:
+            return False
+        if self._seen_us is not None and self.down is None:
+            self.up_us += min(now_us - self._seen_us, SILENT_US * self._slack)  # we may have been held up ourselves
+        self._seen_us = now_us
+        was, self.down = self.down, self._why(now_us)
+        return (was is None) != (self.down is None)
+
+    def _why(self, now_us: int) -> str | None:
+        if self.heard_us is not None and now_us - self.heard_us > SILENT_US * self._slack:
+            # What was asked meanwhile could not be answered; the question is put anew when it is heard again.
+            self._unanswered_us = None
+            return SILENT
+        asked_us = self._unanswered_us
+        if self.answers and asked_us is not None and now_us - asked_us > UNANSWERED_US * self._slack:
+            return UNANSWERED
+        return None

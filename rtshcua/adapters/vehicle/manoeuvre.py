@@ -1,21 +1,173 @@
 """One command under way: stage after stage, each ended by its observed effect.
 
 Three things are watched all the while: that nobody else flies the vehicle, that it gets somewhere, and that it stops
-when it is told to. Waits are in link time (`Observed.up_us`): while the link is down nothing is expected of anybody.
+when it is told to. Waits are in link time (`ObservedVehicle.up_us`): while the link is down nothing is expected of
+anybody. Before anything moves the vehicle its flight mode is known.
 """
 
 from collections.abc import Sequence
 from typing import Final
 
-from rtshcua.adapters.vehicle.commander import NEVER, RESULTS, Commander
+from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.effects import apart, still
-from rtshcua.adapters.vehicle.flavour import Flavour, Message, Stage, mode_name
-from rtshcua.adapters.vehicle.mode_query import ModeQuery
-from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.progress import Brakes, Progress, Stop
-from rtshcua.adapters.vehicle.targets import Targets
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
+from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.supervision import NEVER, Brakes, StageProgress, Stopping, TargetWatch
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Succeeded, TakenOver
+
+RETRY_US = 1_000_000
+RETRIES = 5
+#: An answer may come this late; within it, a refusal may belong to an earlier sending of the same command.
+LATE_US = 5_000_000
+
+_ACCEPTED, _IN_PROGRESS = 0, 5
+#: MAV_RESULT as slugs
+RESULTS = {
+    1: "temporarily",
+    2: "denied",
+    3: "unsupported",
+    4: "failed",
+    6: "cancelled",
+    7: "only-as-command-long",
+    8: "only-as-command-int",
+    9: "unsupported-frame",
+}
+
+
+class Commander:
+    """Sends the message of one stage and follows its acknowledgement; it serves all manoeuvres of a vehicle in turn.
+
+    A missing acknowledgement means that it is not known whether the command was executed; only the effect tells.
+
+    `accepted` and `refused` (the result) tell what the vehicle answered. A refusal counts only while it can belong to
+    nothing but the one sending of this stage: after a retry the first one may have been obeyed, and what is refused is
+    its repetition. `slack` stretches every wait: see `Driver`.
+    """
+
+    def __init__(self, slack: int = 1) -> None:
+        self.slack = slack
+        self._stage: Stage | None = None
+        self._sent_us = 0
+        self._tries = 0
+        self._doubtful = False
+        self._last_us: dict[int, int] = {}
+        self.accepted = False
+        self.refused: int | None = None
+        self.busy_us: int | None = None
+
+    def start(self, stage: Stage | None, now_us: int) -> list[Message]:
+        """Begin another stage (None: none)."""
+        self._stage, self._sent_us, self._tries = stage, now_us, 0
+        self.accepted, self.refused, self.busy_us = False, None, None
+        if stage is None or stage.message is None:
+            return []
+        self._doubtful = False
+        if stage.command is not None:
+            last_us = self._last_us.get(stage.command)
+            self._doubtful = last_us is not None and now_us - last_us < LATE_US
+            self._last_us[stage.command] = now_us
+        return [stage.message]
+
+    @property
+    def waits(self) -> bool:
+        """Whether a command of the present stage was sent and not answered yet."""
+        stage = self._stage
+        return stage is not None and stage.command is not None and not self.accepted and self.refused is None
+
+    @property
+    def due_us(self) -> int:
+        """When `due` may next have something to send, unless something is acknowledged before."""
+        stage = self._stage
+        if stage is None or stage.message is None:
+            return NEVER
+        if stage.command is None:
+            return self._sent_us + stage.repeat_us if stage.repeat_us else NEVER
+        return NEVER if self.accepted or self._tries >= RETRIES else self._sent_us + RETRY_US * self.slack
+
+    def acknowledge(self, command: int, result: int, now_us: int) -> None:
+        """Take in one COMMAND_ACK of the vehicle. PX4 answers some twice: accepted, and then what came of it."""
+        if self._stage is None or command != self._stage.command:
+            return
+        if result == _IN_PROGRESS:
+            self._sent_us = self.busy_us = now_us  # it is at it: wait on
+        elif result == _ACCEPTED:
+            self.accepted = True
+        elif not self._doubtful:
+            self.refused = result
+
+    def due(self, now_us: int) -> list[Message]:
+        """What must be sent again now: an unanswered command with `confirmation` raised, or a repeated target."""
+        stage = self._stage
+        if stage is None or stage.message is None or now_us < self.due_us:
+            return []
+        if stage.command is not None:
+            if hasattr(stage.message, "confirmation"):
+                stage.message.confirmation = self._tries + 1
+            self._doubtful = True
+            self._last_us[stage.command] = now_us
+        self._tries += 1
+        self._sent_us = now_us
+        return [stage.message]
+
+
+# ---------------------------------------------------------------- the mode
+
+#: An unanswered question is put again after this long.
+AGAIN_US: Final = 100_000
+#: While nothing of ours flies it is asked this often, to know that it answers at all;
+IDLE_US: Final = 1_000_000
+#: and while something does, where the mode is streamed fast enough.
+STREAMED_US: Final = 300_000
+
+
+class ModeQuery:
+    """Asks for HEARTBEAT. `within_us`: no frame that moves the vehicle leaves on an older mode report.
+
+    PX4 sends its HEARTBEAT once a second, whatever interval is asked for, and a pilot who takes over in between would
+    be flown over. Both autopilots answer REQUEST_MESSAGE of HEARTBEAT within milliseconds, so the mode is asked for:
+    again and again while something of ours flies, and once more right before a frame that begins a motion
+    (docs/adr/0034).
+    """
+
+    def __init__(self, within_us: int) -> None:
+        self._within_us = within_us
+        self._asked_us: int | None = None
+        self._wanted_beats: int | None = None  # how many heartbeats had come when a frame began to wait
+
+    def is_young(self, seen: ObservedVehicle, now_us: int) -> bool:
+        """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down."""
+        return seen.heartbeat_us is not None and now_us - seen.heartbeat_us <= self._within_us
+
+    def is_newer(self, seen: ObservedVehicle) -> bool:
+        """Whether a mode report came since this was first asked for one frame: it will do for any."""
+        if self._wanted_beats is None:
+            self._wanted_beats = seen.beats
+            self._asked_us = None  # ask at once
+        return seen.beats > self._wanted_beats
+
+    def sent(self) -> None:
+        """The frame left, or is not wanted any more: the next one asks anew."""
+        self._wanted_beats = None
+
+    def due(self, system: int, seen: ObservedVehicle, now_us: int, *, flies: bool) -> list[Message]:
+        """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
+        if self._wanted_beats is not None:
+            every_us = AGAIN_US
+        elif not flies:
+            every_us = IDLE_US
+        elif seen.heartbeat_us is not None and now_us - seen.heartbeat_us < self._within_us // 2:
+            every_us = STREAMED_US
+        else:
+            every_us = self._within_us // 2
+        if self._asked_us is not None and now_us - self._asked_us < every_us:
+            return []
+        self._asked_us = now_us
+        return [messages.request(system, "HEARTBEAT")]
+
+
+# ---------------------------------------------------------------- a manoeuvre
 
 #: Never answered, and no effect seen: it may have been executed, or be executed yet.
 UNKNOWN: Final = "unknown/no-answer"
@@ -34,12 +186,12 @@ _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
 class Aids:
     """What serves all manoeuvres of a vehicle in turn."""
 
-    def __init__(self, flavour: Flavour, brakes: Brakes, commander: Commander) -> None:
+    def __init__(self, flavour: AutopilotFlavour, brakes: Brakes, commander: Commander) -> None:
         self.flavour = flavour
         self.brakes = brakes
         self.commander = commander
         self.mode = ModeQuery(flavour.mode_within_us * commander.slack)
-        self.targets = Targets()
+        self.targets = TargetWatch()
 
 
 class Manoeuvre:
@@ -50,17 +202,23 @@ class Manoeuvre:
     """
 
     def __init__(
-        self, command: Command, aids: Aids, seen: Observed, stages: list[Stage], before: frozenset[int] = frozenset()
+        self,
+        command: Command,
+        aids: Aids,
+        seen: ObservedVehicle,
+        stages: list[Stage],
+        before: frozenset[int],
     ) -> None:
         self._command = command
+        self.token = command.token
         self._aids = aids
         self._flavour = aids.flavour
         self._left = stages
         self._commander = aids.commander
         self._entered_us = 0
         self._waits = False  # the message of the stage was not sent yet
-        self._progress: Progress | None = None
-        self._stop: Stop | None = None
+        self._progress: StageProgress | None = None
+        self._stop: Stopping | None = None
         self._held_us: int | None = None
         self._stands: tuple[int, int] | None = None
         self._before = before if seen.mode is None else before | {seen.mode}
@@ -76,11 +234,6 @@ class Manoeuvre:
         self._enter(seen)
 
     @property
-    def token(self) -> int:
-        """Of its command."""
-        return self._command.token
-
-    @property
     def waits(self) -> bool:
         """Whether a frame waits until the mode is known."""
         return self._waits and not self.over
@@ -90,13 +243,13 @@ class Manoeuvre:
         """The flight modes in which nobody has taken over."""
         return self._modes | self._before
 
-    def advance(self, seen: Observed, now_us: int) -> tuple[list[Message], Sequence[Event]]:
+    def advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         """Messages to send and events, after something was observed or time went by."""
         out = self._advance(seen, now_us)
         self.due_us = self._due_us(seen, now_us)
         return out
 
-    def _advance(self, seen: Observed, now_us: int) -> tuple[list[Message], Sequence[Event]]:
+    def _advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         how = self._taken_over(seen)
         if how is not None:
             self.over = self._taken = True
@@ -114,38 +267,38 @@ class Manoeuvre:
                 break
             self._left.pop(0)
             self._enter(seen)
-        if not self._left:
-            return [], self._finish(seen, now_us)
-        reason = self._failure(seen)
-        if reason is not None:
-            self.over = True
-            return [], [Failed(now_us, self._command.token, reason, seen.text)]
-        return self._again(seen, now_us), ()
+        reason = self._failure(seen) if self._left else self._left_its_place(seen)
+        if reason is None and self._left:
+            return self._again(seen, now_us), ()
+        if reason is None and not self._has_held(seen):
+            return [], ()
+        self.over = True
+        return [], [Succeeded(now_us, self.token) if reason is None else Failed(now_us, self.token, reason, seen.text)]
 
     # -------------------------------------------------------- what is sent
 
-    def _enter(self, seen: Observed) -> None:
+    def _enter(self, seen: ObservedVehicle) -> None:
         self._entered_us, self._progress = seen.up_us, None
         if not self._left:
             self._commander.start(None, seen.up_us)
             return
         stage = self._left[0]
         self._before, self._modes = self.modes, stage.modes
-        self._progress = None if stage.progress is None else Progress(stage.progress)
+        self._progress = None if stage.progress is None else StageProgress(stage.progress)
         if stage.stops and self._stop is None:
-            self._stop = Stop(self._aids.brakes, seen)
+            self._stop = Stopping(self._aids.brakes, seen)
         self._waits = stage.message is not None
         if not self._waits:
             self._commander.start(stage, seen.up_us)
 
-    def _may_send(self, seen: Observed, now_us: int) -> bool:
+    def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether the mode is known well enough for a frame that moves the vehicle (docs/adr/0034)."""
         mode = self._aids.mode
         if self._command.kind in _URGENT and mode.is_young(seen, now_us):
             return True
         return mode.is_newer(seen)
 
-    def _send(self, seen: Observed) -> list[Message]:
+    def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""
         self._waits, self._entered_us = False, seen.up_us
         self._aids.mode.sent()
@@ -156,7 +309,7 @@ class Manoeuvre:
             return []
         return self._commander.start(self._left[0], seen.up_us)
 
-    def _again(self, seen: Observed, now_us: int) -> list[Message]:
+    def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
         """The message once more, where it needs to be: never of a target that the autopilot flies to."""
         commander, stage = self._commander, self._left[0]
         goes = self._aids.targets.shown or (self._progress is not None and self._progress.shown)
@@ -168,7 +321,7 @@ class Manoeuvre:
         self._aids.targets.told_again()
         return commander.due(seen.up_us)
 
-    def _due_us(self, seen: Observed, now_us: int) -> int:
+    def _due_us(self, seen: ObservedVehicle, now_us: int) -> int:
         """When to look again, in real time, unless something is seen before."""
         if self.over:
             return NEVER
@@ -178,46 +331,46 @@ class Manoeuvre:
         elif self._waits:
             at_us = self._entered_us + MODE_UNKNOWN_US
         else:
-            stage, commander = self._left[0], self._commander
-            at_us = commander.due_us
-            if stage.timeout_us:
-                at_us = min(at_us, max(self._entered_us, commander.busy_us or 0) + stage.timeout_us * commander.slack)
             watched = [each.due_us for each in (self._progress, self._stop) if each is not None]
-            at_us = min([at_us, *[due_us for due_us in watched if due_us is not None]])
+            at_us = min(self._commander.due_us, self._shows_us, *watched)
         return now_us + max(at_us - seen.up_us, 0)
+
+    @property
+    def _shows_us(self) -> int:
+        """When, in link time, the effect of the present stage must show at the latest."""
+        timeout_us, commander = self._left[0].timeout_us, self._commander
+        if not timeout_us:
+            return NEVER
+        return max(self._entered_us, commander.busy_us or 0) + timeout_us * commander.slack
 
     # -------------------------------------------------------- what is seen
 
-    def _is_done(self, seen: Observed) -> bool:
+    def _is_done(self, seen: ObservedVehicle) -> bool:
         stage = self._left[0]
         return self._commander.accepted if stage.done is None else stage.done(seen)
 
-    def _finish(self, seen: Observed, now_us: int) -> Sequence[Event]:
-        if self._command.kind == MotionKind.HOLD:
-            reason = self._left_its_place(seen)
-            if reason is not None:
-                self.over = True
-                return (Failed(now_us, self._command.token, reason, seen.text),)
-            if self._held_us is None:
-                self._held_us = seen.up_us
-            if not self._command.hold_us or seen.up_us - self._held_us < self._command.hold_us:
-                return ()
-        self.over = True
-        return (Succeeded(now_us, self._command.token),)
+    def _has_held(self, seen: ObservedVehicle) -> bool:
+        """Whether a vehicle that came to stand has done so for the time of a HOLD."""
+        if self._command.kind != MotionKind.HOLD:
+            return True
+        if self._held_us is None:
+            self._held_us = seen.up_us
+        return bool(self._command.hold_us) and seen.up_us - self._held_us >= self._command.hold_us
 
-    def _left_its_place(self, seen: Observed) -> str | None:
-        """Why a vehicle that came to stand does not hold, as a slug."""
+    def _left_its_place(self, seen: ObservedVehicle) -> str | None:
+        """Why a vehicle that came to stand for a HOLD does not hold, as a slug."""
+        if self._command.kind != MotionKind.HOLD:
+            return None
         if seen.down:
             return "disarmed"
-        if seen.located and self._stands is None:
-            self._stands = seen.latitude, seen.longitude
-        if seen.located and self._stands is not None:
-            away = apart(seen.latitude, seen.longitude, *self._stands)
-            if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)):
-                return "did-not-hold"
-        return None
+        if not seen.located:
+            return None
+        here = seen.latitude, seen.longitude
+        self._stands = self._stands or here
+        away = apart(*here, *self._stands)
+        return "did-not-hold" if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)) else None
 
-    def _taken_over(self, seen: Observed) -> str | None:
+    def _taken_over(self, seen: ObservedVehicle) -> str | None:
         """What shows that somebody else flies: a mode, a landing or a target that nothing of ours asked for.
 
         A mode may belong to this stage or, until its own mode showed, to those before.
@@ -230,13 +383,13 @@ class Manoeuvre:
         if seen.mode in self._modes:
             self._before = frozenset()
         elif seen.mode not in self._before or self._was_taken_back(seen):
-            return mode_name(self._flavour, seen.mode)
+            return self._flavour.mode_name(seen.mode)
         self._was_landing = self._was_landing and seen.landing
         if seen.landing and not homeward and not self._was_landing:
             return "landing"
         return "another target" if self._aids.targets.is_foreign(seen) else None
 
-    def _was_taken_back(self, seen: Observed) -> bool:
+    def _was_taken_back(self, seen: ObservedVehicle) -> bool:
         """Whether our mode was accepted, and another shows in several reports since: somebody chose it again."""
         if not self._commander.accepted or self._commander.refused is not None or self._waits:
             self._accepted = None
@@ -246,7 +399,7 @@ class Manoeuvre:
         accepted_us, beats = self._accepted
         return seen.up_us - accepted_us > TAKEN_BACK_US and seen.beats - beats >= TAKEN_BACK_BEATS
 
-    def _failure(self, seen: Observed) -> str | None:
+    def _failure(self, seen: ObservedVehicle) -> str | None:
         """Why the present stage cannot be waited for any longer, as a slug."""
         stage, commander = self._left[0], self._commander
         if self._waits:
@@ -259,8 +412,7 @@ class Manoeuvre:
         obeyed = commander.accepted or stage.command is None
         if self._stop is not None and self._stop.has_failed(seen, obeyed=obeyed):
             return "did-not-stop"
-        waited_us = seen.up_us - max(self._entered_us, commander.busy_us or 0)
-        if stage.timeout_us and waited_us > stage.timeout_us * commander.slack:
+        if seen.up_us > self._shows_us:
             return UNKNOWN if commander.waits else "no-effect"
         if self._progress is not None and self._progress.has_stalled(seen):
             if commander.waits:

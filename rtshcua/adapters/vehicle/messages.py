@@ -1,10 +1,9 @@
 """The MAVLink messages that adapters send, made in one place with the fields that nobody uses filled in."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from rtshcua.adapters.vehicle.fence import FenceItem
 from rtshcua.codec.decode import kind_of
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import COMMAND_LONG, TEXT_OCTETS
@@ -21,6 +20,8 @@ SET_INTERVAL = enums.MAV_CMD_SET_MESSAGE_INTERVAL
 RUN_PREARM_CHECKS = enums.MAV_CMD_RUN_PREARM_CHECKS
 FENCE = enums.MAV_MISSION_TYPE_FENCE
 
+Message = Any  # one of pymavlink's classes
+
 _ZEROS = (0.0,) * 7
 _COMMAND_LONG = kind_of(COMMAND_LONG)
 assert _COMMAND_LONG is not None
@@ -29,52 +30,50 @@ _COMMAND = _COMMAND_LONG
 _AUTOPILOT = enums.MAV_COMP_ID_AUTOPILOT1
 
 
-def heartbeat() -> Any:
+def heartbeat() -> Message:
     """Of an onboard controller; never of a ground station, which would hide the loss of the real one."""
     return dialect.MAVLink_heartbeat_message(
         enums.MAV_TYPE_ONBOARD_CONTROLLER, enums.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
 
 
-def command(system: int, number: int, *parameters: float) -> Any:
+def command(system: int, number: int, *parameters: float) -> Message:
     """COMMAND_LONG with up to seven parameters, the rest 0."""
     filled = (*parameters, *_ZEROS[len(parameters) :])
     return _COMMAND.build((*filled, number, system, _AUTOPILOT, 0))  # in the order of the wire
 
 
-def set_mode(system: int, mode: Px4Mode | CopterMode) -> Any:
+def set_mode(system: int, mode: Px4Mode | CopterMode) -> Message:
     """DO_SET_MODE to a custom mode."""
     return command(system, DO_SET_MODE, enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *mode.parameters)
 
 
-def arm(system: int) -> Any:
+def arm(system: int) -> Message:
     """Arm, never by force."""
     return command(system, ARM_DISARM, 1, 0)
 
 
-def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int) -> Any:
+def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int) -> Message:
     """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode."""
-    speed = speed_mm_s / 1_000 if speed_mm_s else -1.0
-    flags = enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-    return dialect.MAVLink_command_int_message(
-        system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
-        speed, flags, 0, NAN, latitude, longitude, amsl_m,
-    )  # fmt: skip
+    return _reposition(system, speed_mm_s / 1_000 if speed_mm_s else -1.0, latitude, longitude, amsl_m)
 
 
-def stop_here(system: int) -> Any:
+def stop_here(system: int) -> Message:
     """DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand ("pause").
 
     As COMMAND_INT, where INT32_MAX is what NaN is in a float (vehicles.md 5; PX4: `Navigator`, DO_REPOSITION).
     """
-    flags = enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    return _reposition(system, -1.0, enums.NO_PLACE, enums.NO_PLACE, NAN)
+
+
+def _reposition(system: int, speed_m_s: float, latitude: int, longitude: int, amsl_m: float) -> Message:
     return dialect.MAVLink_command_int_message(
         system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL, REPOSITION, 0, 0,
-        -1.0, flags, 0, NAN, enums.NO_PLACE, enums.NO_PLACE, NAN,
+        speed_m_s, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0, NAN, latitude, longitude, amsl_m,
     )  # fmt: skip
 
 
-def position_target(system: int, latitude: int, longitude: int, height_m: float) -> Any:
+def position_target(system: int, latitude: int, longitude: int, height_m: float) -> Message:
     """SET_POSITION_TARGET_GLOBAL_INT: a place at a height in metres above home."""
     return dialect.MAVLink_set_position_target_global_int_message(
         0, system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, enums.POSITION_ONLY,
@@ -88,42 +87,51 @@ def number_of(message: str) -> int | None:
     return number
 
 
-def message_interval(system: int, message: str, interval_us: int) -> Any:
+def message_interval(system: int, message: str, interval_us: int) -> Message:
     """SET_MESSAGE_INTERVAL by the name of a message that the dialect has."""
     return command(system, SET_INTERVAL, number_of(message) or 0, interval_us)
 
 
-def request(system: int, message: str) -> Any:
+def request(system: int, message: str) -> Message:
     """REQUEST_MESSAGE: once, by the name of a message that the dialect has."""
     return command(system, enums.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
 
 
-def time_sync(now_ns: int) -> Any:
+def time_sync(now_ns: int) -> Message:
     """TIMESYNC: our monotonic time, to come back beside the vehicle's."""
     return dialect.MAVLink_timesync_message(0, now_ns)
 
 
-def status_text(severity: int, text: str) -> Any:
+def status_text(severity: int, text: str) -> Message:
     """STATUSTEXT of at most 50 octets."""
     return dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:TEXT_OCTETS])
 
 
-def parameter_read(system: int, name: str) -> Any:
+def parameter_read(system: int, name: str) -> Message:
     """PARAM_REQUEST_READ by name."""
     return dialect.MAVLink_param_request_read_message(system, _AUTOPILOT, name.encode(), -1)
 
 
-def parameter_set(system: int, name: str, value: float, kind: int) -> Any:
+def parameter_set(system: int, name: str, value: float, kind: int) -> Message:
     """PARAM_SET; the value is encoded as the flavour wants it."""
     return dialect.MAVLink_param_set_message(system, _AUTOPILOT, name.encode(), value, kind)
 
 
-def fence_count(system: int, items: int) -> Any:
+class FenceItem(NamedTuple):
+    """One MISSION_ITEM_INT: the command, a place in 1e-7 degree, and `param1`: corners of its ring, or radius in m."""
+
+    command: int
+    latitude: int
+    longitude: int
+    parameter: float
+
+
+def fence_count(system: int, items: int) -> Message:
     """MISSION_COUNT of a fence that is to be uploaded."""
     return dialect.MAVLink_mission_count_message(system, _AUTOPILOT, items, FENCE)
 
 
-def fence_item(system: int, number: int, frame: int, item: FenceItem) -> Any:
+def fence_item(system: int, number: int, frame: int, item: FenceItem) -> Message:
     """MISSION_ITEM_INT of a fence."""
     return dialect.MAVLink_mission_item_int_message(
         system, _AUTOPILOT, number, frame, item.command, 0, 1, item.parameter, 0, 0, 0, item.latitude, item.longitude,
@@ -131,16 +139,16 @@ def fence_item(system: int, number: int, frame: int, item: FenceItem) -> Any:
     )  # fmt: skip
 
 
-def fence_list(system: int) -> Any:
+def fence_list(system: int) -> Message:
     """MISSION_REQUEST_LIST: how many items has the fence?"""
     return dialect.MAVLink_mission_request_list_message(system, _AUTOPILOT, FENCE)
 
 
-def fence_request(system: int, number: int) -> Any:
+def fence_request(system: int, number: int) -> Message:
     """MISSION_REQUEST_INT: one item of the fence."""
     return dialect.MAVLink_mission_request_int_message(system, _AUTOPILOT, number, FENCE)
 
 
-def fence_received(system: int) -> Any:
+def fence_received(system: int) -> Message:
     """MISSION_ACK that ends a download."""
     return dialect.MAVLink_mission_ack_message(system, _AUTOPILOT, dialect.MAV_MISSION_ACCEPTED, FENCE)

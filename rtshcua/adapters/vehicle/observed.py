@@ -1,12 +1,106 @@
-"""What the vehicle was seen to do: the only ground on which a command counts as done."""
+"""What the vehicle was seen to do: the only ground on which a command counts as done.
 
+Position and height are known only while the autopilot's own estimator vouches for them. GLOBAL_POSITION_INT goes on as
+if nothing had happened while the estimator has no position any more, and begins before it has one; the pre-arm bit of
+SYS_STATUS turns good seconds too early (recorded flights of ArduCopter 4.7). Only the flags of ESTIMATOR_STATUS (PX4)
+and EKF_STATUS_REPORT (ArduPilot) tell; up to 0x200 they mean the same in both.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import acos, cos, degrees, hypot, isfinite
-from typing import Any
+from typing import Any, Final
 
-from rtshcua.adapters.vehicle import datum, health
-from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
 from rtshcua.mavlink import enums
+
+#: ESTIMATOR_STATUS_FLAGS, EKF_STATUS_FLAGS
+ATTITUDE: Final = 0x01
+VELOCITY_HORIZONTAL: Final = 0x02
+VELOCITY_VERTICAL: Final = 0x04
+POSITION_RELATIVE: Final = 0x08
+POSITION: Final = 0x10
+HEIGHT: Final = 0x20
+#: PX4: GPS glitch; ArduPilot: not initialised. Either way its position is worth nothing.
+_GLITCH: Final = 0x400
+#: ArduPilot alone: GPS glitching
+_GLITCHING: Final = 0x8000
+
+#: A report that is older than this vouches for nothing; it is asked for several times within.
+STALE_US: Final = 2_000_000
+
+_WHERE: Final = POSITION | VELOCITY_HORIZONTAL | ATTITUDE
+_HIGH: Final = HEIGHT | VELOCITY_VERTICAL | ATTITUDE
+_ACROSS: Final = VELOCITY_HORIZONTAL | ATTITUDE
+_UP: Final = VELOCITY_VERTICAL | ATTITUDE
+
+#: What a field rests on. What is not here does not come from the estimator.
+_RESTS_ON: Mapping[str, Mapping[str, int]] = {
+    "GLOBAL_POSITION_INT": {
+        "lat": _WHERE, "lon": _WHERE, "alt": _HIGH, "relative_alt": _HIGH, "vx": _ACROSS, "vy": _ACROSS, "vz": _UP,
+        "hdg": ATTITUDE,
+    },
+    "LOCAL_POSITION_NED": {
+        "x": POSITION_RELATIVE | _ACROSS, "y": POSITION_RELATIVE | _ACROSS, "z": _HIGH,
+        "vx": _ACROSS, "vy": _ACROSS, "vz": _UP,
+    },
+    "VFR_HUD": {"alt": _HIGH, "climb": _UP, "groundspeed": _ACROSS, "heading": ATTITUDE},
+    "ATTITUDE": dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), ATTITUDE),
+}  # fmt: skip
+
+
+class Estimator:
+    """The last report, by `flags` and when it was made. A height is above home, so it means nothing before there is
+    one: the estimator must have had a position once.
+    """
+
+    def __init__(self, report: str = "") -> None:
+        self.report = report
+        self._flags = 0
+        self._at_us: int | None = None
+        self._homed = False
+
+    def take(self, flags: int, at_us: int) -> None:
+        """A report came that was made at `at_us` (see `source_time`); one that is older than the last is set aside."""
+        if self._at_us is not None and at_us < self._at_us:
+            return
+        self._flags, self._at_us = flags, at_us
+        self._homed = self._homed or self.position(at_us)
+
+    def vouches(self, bits: int, now_us: int) -> bool:
+        """Whether a report that is not stale has all these flags, and no sign of being astray."""
+        if self._at_us is None or now_us - self._at_us > STALE_US:
+            return False
+        astray = bits & (POSITION | POSITION_RELATIVE | VELOCITY_HORIZONTAL) and self._flags & (_GLITCH | _GLITCHING)
+        return not astray and self._flags & bits == bits
+
+    def position(self, now_us: int) -> bool:
+        """Whether it knows where it is."""
+        return self.vouches(_WHERE, now_us)
+
+    def height(self, now_us: int) -> bool:
+        """Whether it knows how high above home it is."""
+        return self._homed and self.vouches(_HIGH, now_us)
+
+    def vouches_for(self, message: str, field: str, now_us: int) -> bool:
+        """Whether what this field of a message says is known to the estimator; true of what does not come from it."""
+        fields = _RESTS_ON.get(message)
+        bits = 0 if fields is None else fields.get(field, 0)
+        if bits & HEIGHT and field == "relative_alt":
+            return self.height(now_us)
+        return not bits or self.vouches(bits, now_us)
+
+    def missing(self, now_us: int) -> str | None:
+        """What it has not got, in words; None when it has a position and a height."""
+        if self._at_us is None:
+            return f"its estimator says nothing (no {self.report})"
+        if now_us - self._at_us > STALE_US:
+            return f"its estimator fell silent (no {self.report})"
+        if not self.position(now_us):
+            return f"its estimator has no position (flags 0x{self._flags:x})"
+        return None if self.height(now_us) else f"its estimator has no height (flags 0x{self._flags:x})"
+
+
+# ---------------------------------------------------------------- all that it says of itself
 
 _IN_AIR = (enums.MAV_LANDED_STATE_IN_AIR, enums.MAV_LANDED_STATE_TAKEOFF, enums.MAV_LANDED_STATE_LANDING)
 _FIX_3D = 3
@@ -18,17 +112,41 @@ _HEEDED = (
     "ATTITUDE",
 )  # fmt: skip
 _REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
+_PREARM: Final = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
+
+#: MAV_SYS_STATUS_SENSOR, as far as arming rests on them
+_SENSORS: Final = {
+    0x01: "gyroscope",
+    0x02: "accelerometer",
+    0x04: "magnetometer",
+    0x08: "barometer",
+    0x20: "GPS",
+    0x8000: "motor outputs",
+    0x1_0000: "remote control",
+    0x10_0000: "geofence",
+    0x20_0000: "attitude and heading",
+    0x100_0000: "logging",
+    0x200_0000: "battery",
+    0x4000_0000: "propulsion",
+}
+
+
+Reported = tuple[int, int, int]
+"""Where an autopilot says that it flies to: latitude and longitude in 1e-7 degree, mm above mean sea level."""
+
+
+class NoDatum(RuntimeError):
+    """A height was to be converted before the vehicle said how high its home lies."""
 
 
 @dataclass(slots=True)
-class Observed:
+class ObservedVehicle:
     """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
-    so now, of a position that is not old. `target` is where the autopilot says that it flies to: latitude, longitude,
-    mm above mean sea level. `descent` is how fast it sinks and `tilt` how many degrees it leans (`tilt_us`: told then),
-    whoever vouches for that. `beats` counts heartbeats; `up_us` is link time, see `LinkWatch`.
-    `notes` collects what an operator should know.
+    so now, of a position that is not old. `target` is where the autopilot says that it flies to. `descent` is how fast
+    it sinks and `tilt` how many degrees it leans (`tilt_us`: told then), whoever vouches for that. `beats` counts
+    heartbeats; `up_us` is link time, see `LinkWatch`. `notes` collects what an operator should know.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -45,7 +163,7 @@ class Observed:
     descent: int = 0
     tilt: int = 0
     tilt_us: int = 0
-    target: tuple[int, int, int] | None = None
+    target: Reported | None = None
     fix: int = 0
     prearm: bool = False
     unwell: tuple[str, ...] = ()
@@ -92,21 +210,25 @@ class Observed:
             case "GPS_RAW_INT":
                 self.fix = message.fix_type
             case "SYS_STATUS":
-                self.prearm = health.would_arm(message)
-                self.unwell = health.unwell(message)
+                # PX4 1.16 sets the bit of the check without saying that there is such a check (recorded)
+                self.prearm = bool(message.onboard_control_sensors_health & _PREARM)
+                self.unwell = _unwell(message)
             case self.estimator.report if at_us is not None:
                 self.estimator.take(message.flags, at_us)
-                self.located = self.located and self.estimator.position(now_us)
-                self.levelled = self.levelled and self.estimator.height(now_us)
+                self._doubt(now_us)
 
     def pass_time(self, now_us: int) -> None:
         """Time goes by: where it was, and what the estimator last said, grows old."""
         self.now_us = now_us
         if now_us - self.made_us.get("GLOBAL_POSITION_INT", now_us) > STALE_US:
             self.located, self.levelled, self.speed = False, False, None
-        elif self.located or self.levelled:
-            self.located = self.located and self.estimator.position(now_us)
-            self.levelled = self.levelled and self.estimator.height(now_us)
+        else:
+            self._doubt(now_us)
+
+    def _doubt(self, now_us: int) -> None:
+        """Where it was holds no longer than the estimator vouches for it."""
+        self.located = self.located and self.estimator.position(now_us)
+        self.levelled = self.levelled and self.estimator.height(now_us)
 
     def say(self, severity: int, text: str) -> None:
         """Keep what it said: the gravest text since `hush`, and the last that says why it would not arm."""
@@ -114,6 +236,17 @@ class Observed:
             self.text, self.text_severity = text, severity
         if text.startswith(_REASONS):
             self.prearm_text = text
+
+    def amsl(self, height: int) -> int:
+        """The altitude above mean sea level of a height above home, both in mm. Raises NoDatum where home's own is not
+        known.
+
+        Everything of ours is in mm above home; PX4's commands take altitudes above mean sea level, whatever frame they
+        name. A mistake between the two has crashed real vehicles: they are made of each other here and in `_place`.
+        """
+        if self.home_amsl is None:
+            raise NoDatum("the vehicle has not said how high its home lies, so no altitude can be commanded")
+        return self.home_amsl + height
 
     def hush(self) -> None:
         """What it says from now on may be about something new."""
@@ -133,11 +266,6 @@ class Observed:
     def down(self) -> bool:
         """Seen on the ground with its motors off."""
         return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and not self.armed
-
-    @property
-    def ready(self) -> bool:
-        """It has a position and would arm, or it flies already."""
-        return self.airborne or self.unready is None
 
     @property
     def unready(self) -> str | None:
@@ -170,9 +298,8 @@ class Observed:
         """A failsafe need not change the mode: a low battery on the way home does not."""
         critical = status in _CRITICAL
         if critical != self.critical:
-            self.notes.append(
-                "it says that its state is critical" if critical else "its state is not critical any more"
-            )
+            says = "it says that its state is critical" if critical else "its state is not critical any more"
+            self.notes.append(says)
         self.critical = critical
 
     def _place(self, message: Any, now_us: int) -> None:
@@ -183,7 +310,7 @@ class Observed:
         if self.levelled:
             self.height = message.relative_alt
             if self.located:
-                self.home_amsl = datum.home_amsl_mm(message.alt, message.relative_alt)
+                self.home_amsl = message.alt - message.relative_alt
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
         # from cm/s; without a speed that the estimator knows, it does not count as still
         self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None
@@ -195,3 +322,10 @@ def _tilt(roll: float, pitch: float) -> int:
     if not (isfinite(roll) and isfinite(pitch)):
         return 0
     return round(degrees(acos(max(-1.0, min(1.0, cos(roll) * cos(pitch))))))
+
+
+def _unwell(message: Any) -> tuple[str, ...]:
+    """The sensors that are there and in use, and not healthy."""
+    used = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
+    ill = used & ~message.onboard_control_sensors_health
+    return tuple([name for bit, name in _SENSORS.items() if ill & bit])

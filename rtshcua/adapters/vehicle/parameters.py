@@ -7,17 +7,17 @@ PX4 carries integers as their bytes inside the float, ArduPilot casts them.
 
 import struct
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, Final
 
 from rtshcua.adapters.vehicle import messages
-from rtshcua.adapters.vehicle.flavour import Message
+from rtshcua.adapters.vehicle.messages import Message
 
 RETRY_US: Final = 1_000_000
 RETRIES: Final = 5
 #: How often one that did not answer is asked for again.
 AGAIN_US: Final = 10_000_000
 
-_FLOAT: Final = 9  # MAV_PARAM_TYPE_REAL32
 #: MAV_PARAM_TYPE of integers, and the bytes that they are in a float's place
 _INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 
@@ -32,7 +32,7 @@ class _Wanted:
     silent: bool = False
 
 
-class Parameters:
+class VehicleParameters:
     """Each name has one request outstanding. `values` holds what was heard of any that was asked for."""
 
     def __init__(self, *, bytewise: bool, slack: int = 1) -> None:
@@ -55,6 +55,21 @@ class Parameters:
         """Set one that was read before."""
         self._wanted[name] = _Wanted(value)
 
+    def has(self, name: str, bits: int) -> bool:
+        """Whether one that was read has all these bits set."""
+        return self._bits(name) & bits == bits
+
+    def ensure(self, name: str, bits: int) -> None:
+        """Read it if it was not, and set the bits that it lacks."""
+        if name not in self.values:
+            self.read(name)
+        elif self.is_settled(name) and not self.has(name, bits):
+            self.write(name, float(self._bits(name) | bits))
+
+    def _bits(self, name: str) -> int:
+        value = self.values.get(name, 0.0)
+        return int(value) if isfinite(value) else 0
+
     def is_absent(self, name: str) -> bool:
         """Whether it did not answer, as often as it was asked."""
         return name in self._wanted and self._wanted[name].silent
@@ -65,7 +80,7 @@ class Parameters:
 
     def take(self, message: Any) -> None:
         """A PARAM_VALUE."""
-        name, value = _name(message), self._decode(message)
+        name, value = message.param_id, self._decode(message)
         wanted = self._wanted.get(name)
         if wanted is None and name not in self.values:
             return
@@ -90,20 +105,15 @@ class Parameters:
         return out
 
     def _decode(self, message: Any) -> float:
-        shape = _INTEGERS.get(message.param_type)
-        if not self._bytewise or shape is None:
+        shape = self._shape(message.param_type)
+        if shape is None:
             return float(message.param_value)
         return float(struct.unpack(shape, struct.pack("<f", message.param_value))[0])
 
     def _encode(self, value: float, kind: int) -> float:
-        shape = _INTEGERS.get(kind)
-        if not self._bytewise or shape is None:
-            return value
-        encoded: float = struct.unpack("<f", struct.pack(shape, int(value)))[0]
-        return encoded
+        shape = self._shape(kind)
+        return value if shape is None else struct.unpack("<f", struct.pack(shape, int(value)))[0]
 
-
-def _name(message: Any) -> str:
-    name: str | bytes = message.param_id
-    text = name if isinstance(name, str) else name.decode("ascii", "replace")
-    return text.rstrip("\0")
+    def _shape(self, kind: int) -> str | None:
+        """The bytes of a value in a float's place; None where it is the float."""
+        return _INTEGERS.get(kind) if self._bytewise else None

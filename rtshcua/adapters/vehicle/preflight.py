@@ -7,11 +7,12 @@ A vehicle that flies already is left alone.
 from typing import Any, Final
 
 from rtshcua.adapters.vehicle import messages
-from rtshcua.adapters.vehicle.fencing import HEEDED as FENCE_HEEDED
-from rtshcua.adapters.vehicle.fencing import Fencing
-from rtshcua.adapters.vehicle.flavour import Flavour, Message, ReturnAltitude
-from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.parameters import Parameters
+from rtshcua.adapters.vehicle.fence import HEEDED as FENCE_HEEDED
+from rtshcua.adapters.vehicle.fence import Fencing
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ReturnAltitude
+from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import Projection, project
@@ -31,12 +32,14 @@ class Preflight:
     waits, as in `Driver`.
     """
 
-    def __init__(self, policy: Policy, flavour: Flavour, seen: Observed, *, fence: bool, slack: int = 1) -> None:
+    def __init__(
+        self, policy: Policy, flavour: AutopilotFlavour, seen: ObservedVehicle, *, fence: bool, slack: int = 1
+    ) -> None:
         self._flavour = flavour
         self._seen = seen
         self._projection, self._home_within = policy.projection, policy.vehicle.home_within
         self._wanted_mm = policy.vehicle.return_altitude
-        self._parameters = Parameters(bytewise=flavour.bytewise, slack=slack)
+        self._parameters = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
         self._fencing = Fencing(policy, flavour, self._parameters, wanted=fence, slack=slack)
         self._told = False
         self._checked_us: int | None = None
@@ -51,7 +54,7 @@ class Preflight:
         if self._seen.prearm_fails and (self._checked_us is None or now_us - self._checked_us >= CHECK_US):
             self._checked_us = now_us
             out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
-        if self._placed and self._return() is None and self._far_from_home() is None:  # a fence is of one place only
+        if not (self.unplaced or self.astray or self.unread):  # a fence is of one place only
             out += self._fencing.due(system, now_us)
         if not self._told and self._fencing.unready is None:
             self._told = True
@@ -68,29 +71,33 @@ class Preflight:
     @property
     def unready(self) -> str | None:
         """What is not settled, in words."""
-        return self.unplaced or self.astray or self._return() or self._fencing.unready
+        return self.unplaced or self.astray or self.unread or self._fencing.unready
 
     @property
     def astray(self) -> str | None:
         """What is known to be otherwise than the policy has it, in words."""
-        return (self._far_from_home() if self._placed else None) or (None if self._found is None else self._return())
+        return self._far_from_home() or (None if self._found is None else self._returns_at(self._found))
 
     @property
     def unplaced(self) -> str | None:
         """That it is not known where it stands, in words."""
-        return None if self._placed else "it does not say where it stands"
+        return None if self._seen.located else "it does not say where it stands"
 
     @property
     def unread(self) -> str | None:
         """That its return altitude is not known, in words."""
-        return self._return() if self._found is None else None
-
-    @property
-    def _placed(self) -> bool:
-        return self._seen.located
+        if not self._wanted_mm or self._found is not None:
+            return None
+        names = [each.parameter for each in self._flavour.returns]
+        quoted = " or ".join(f"`{name}`" for name in names)
+        if all(map(self._parameters.is_absent, names)):
+            return f"it does not tell its return altitude ({quoted})"
+        return f"its return altitude ({quoted}) was not read yet"
 
     def _far_from_home(self) -> str | None:
         """Where it stands becomes its home, which all of the policy is drawn around."""
+        if not self._seen.located:
+            return None
         away = distance_from_home(self._projection, self._seen.latitude, self._seen.longitude)
         if away <= self._home_within:
             return None
@@ -101,15 +108,9 @@ class Preflight:
         values = self._parameters.values
         return next((each for each in self._flavour.returns if each.parameter in values), None)
 
-    def _return(self) -> str | None:
+    def _returns_at(self, found: ReturnAltitude) -> str | None:
         if not self._wanted_mm:
             return None
-        names = " or ".join(f"`{each.parameter}`" for each in self._flavour.returns)
-        found = self._found
-        if found is None:
-            if all(self._parameters.is_absent(each.parameter) for each in self._flavour.returns):
-                return f"it does not tell its return altitude ({names})"
-            return f"its return altitude ({names}) was not read yet"
         height = quantise(self._parameters.values[found.parameter], found.mm, 1)
         if height is not None and abs(height - self._wanted_mm) <= SAME_MM:
             return None

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 
 from rtshcua.adapters.vehicle import messages
-from rtshcua.adapters.vehicle.flavour import Message
+from rtshcua.adapters.vehicle.messages import Message
 
 #: How long one request waits for its acknowledgement; twice as long after each that came to nothing, up to the latter.
 ANSWER_US = 500_000
@@ -33,7 +33,7 @@ ALWAYS: Mapping[str, int] = {
 AT_TIMES: Mapping[str, int] = {"POSITION_TARGET_GLOBAL_INT": 100_000}
 
 
-class Streams:
+class StreamRequests:
     """SET_MESSAGE_INTERVAL for each message of `wanted` (its interval in us), one request outstanding at a time.
 
     Those `at_times` are asked for like the others, and not missed when they do not come. `needed` holds groups of

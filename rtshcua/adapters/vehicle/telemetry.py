@@ -1,6 +1,6 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rtshcua.decision.reads import where
@@ -19,10 +19,6 @@ _WITHIN_STALE = 4
 
 def _always(_: str) -> bool:
     return True
-
-
-def _never(_: str) -> bool:
-    return False
 
 
 def _says_nothing(name: str, message: Any) -> bool:
@@ -45,33 +41,21 @@ class Telemetry:
     """
 
     def __init__(self, policy: Policy) -> None:
-        _check(policy)
         vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
         self._first: dict[tuple[int, str], Any] = {}
         self._projection = policy.projection
-        self._sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
         self._by_message: dict[str, list[tuple[Signal, SignalSource]]] = {}
         for signal in policy.signals:
             for source in signal.sources:
+                _check(signal, source)
                 self._by_message.setdefault(source.message, []).append((signal, source))
-
-    @property
-    def carriers(self) -> Collection[str]:
-        """The messages that carry some signal."""
-        return self._by_message.keys()
-
-    @property
-    def intervals(self) -> Mapping[str, int]:
-        """The messages that some signal needs, and how often, in us."""
-        return {
+        #: the messages that carry some signal, and how often each is needed, in us
+        self.intervals: Mapping[str, int] = {
             name: _often(min(signal.stale_us for signal, _ in carried)) for name, carried in self._by_message.items()
         }
-
-    @property
-    def sources(self) -> Sequence[frozenset[str]]:
-        """For each signal, the messages that may carry it."""
-        return self._sources
+        #: for each signal, the messages that may carry it
+        self.sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
 
     def read(
         self, name: str, message: Any, component: int = AUTOPILOT, vouched: Callable[[str], bool] = _always
@@ -85,11 +69,10 @@ class Telemetry:
         if carried is None or not self._is_first(name, message, component):
             return ()
         known = vouched if component == AUTOPILOT else _always
-        if _says_nothing(name, message):
-            known = _never
+        empty = _says_nothing(name, message)
         values: list[tuple[int, int | None]] = []
         for signal, source in carried:
-            if not all(map(known, source.fields)):
+            if empty or not all(map(known, source.fields)):
                 values += [(slot, None) for slot in range(signal.slot, signal.slot + 1 + (signal.kind == POSITION))]
             elif signal.kind == POSITION:
                 x, y = _place(source, message, self._projection)
@@ -110,18 +93,15 @@ class Telemetry:
         return bool(instance == first)
 
 
-def _check(policy: Policy) -> None:
-    known = dialect.load().messages
-    for signal in policy.signals:
-        for source in signal.sources:
-            fields = known[source.message].fields if source.message in known else {}
-            for name in source.fields:
-                field = fields.get(name)
-                if field is None or field.length or field.type == "char":
-                    raise UnknownSource(
-                        f"the policy reads `{signal.name}` from `{source.message}.{name}`, which is no number that a "
-                        "vehicle reports"
-                    )
+def _check(signal: Signal, source: SignalSource) -> None:
+    message = dialect.load().messages.get(source.message)
+    for name in source.fields:
+        field = None if message is None else message.fields.get(name)
+        if field is None or field.length or field.type == "char":
+            raise UnknownSource(
+                f"the policy reads `{signal.name}` from `{source.message}.{name}`, which is no number that a vehicle "
+                "reports"
+            )
 
 
 def _often(stale_us: int) -> int:

@@ -1,10 +1,14 @@
-"""What the vehicle says to people: STATUSTEXT, put together from its chunks, quoted, and not too much of it.
+"""STATUSTEXT, both ways: what the vehicle says to people, and what we tell any ground station.
 
-All of it is untrusted: it may hold anything, come in floods, or never end. It explains, and decides nothing.
+What the vehicle says is untrusted: it may hold anything, come in floods, or never end. It explains, and decides
+nothing. What we tell is never needed for the flight, and the first to be left out.
 """
 
+from collections import deque
 from typing import Any, Final
 
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.mavlink.layouts import TEXT_OCTETS
 from rtshcua.onboard.ports import Said
 
@@ -13,7 +17,7 @@ LONGEST: Final = 200  # characters
 CHUNK_US: Final = 1_000_000
 #: So many texts at once, and one more each so often; what is more is counted.
 BURST: Final = 20
-EACH_US: Final = 500_000
+EARNED_US: Final = 500_000
 
 
 def quoted(text: str) -> str:
@@ -21,8 +25,10 @@ def quoted(text: str) -> str:
     return "".join([each if each.isprintable() else each.encode("unicode_escape").decode() for each in text])[:LONGEST]
 
 
-class Texts:
-    """Collects the texts of one component. A long one comes in chunks that share an `id` (MAVLink 2)."""
+class StatusTexts:
+    """Collects the texts of one component, not too many of them. A long one comes in chunks that share an `id`
+    (MAVLink 2).
+    """
 
     def __init__(self) -> None:
         self._id = 0
@@ -35,8 +41,7 @@ class Texts:
 
     def take(self, message: Any, now_us: int) -> list[Said]:
         """Take in one STATUSTEXT; the texts that are complete now."""
-        raw = message.text if isinstance(message.text, str) else bytes(message.text).decode("utf-8", "replace")
-        part = raw.partition("\0")[0]
+        part: str = message.text
         said: list[Said] = []
         if not (self._parts and message.id == self._id and message.chunk_seq == len(self._parts)):
             said += self._finish(now_us)
@@ -57,9 +62,9 @@ class Texts:
             return []
         if self._paid_us is None:
             self._paid_us = now_us
-        earned = (now_us - self._paid_us) // EACH_US
+        earned = (now_us - self._paid_us) // EARNED_US
         self._left = min(BURST, self._left + earned)
-        self._paid_us += earned * EACH_US
+        self._paid_us += earned * EARNED_US
         if not self._left:
             self._dropped += 1
             return []
@@ -67,3 +72,27 @@ class Texts:
         if self._dropped:
             text, self._dropped = f"{text} ({self._dropped} texts before it were left out)", 0
         return [Said(now_us, self._severity, text)]
+
+
+#: So many wait at most: what is older is left out.
+KEPT: Final = 4
+EACH_US: Final = 200_000
+
+
+class Announcer:
+    """Keeps what is told to ground stations until the link has nothing better to do."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[int, str]] = deque(maxlen=KEPT)
+        self._sent_us: int | None = None
+
+    def add(self, severity: int, text: str) -> None:
+        """Announce a text; of a long one the first 50 octets."""
+        self._waiting.append((severity, text))
+
+    def due(self, now_us: int, *, busy: bool) -> list[Message]:
+        """The next one, unless the link is busy or was just used for one."""
+        if busy or not self._waiting or (self._sent_us is not None and now_us - self._sent_us < EACH_US):
+            return []
+        self._sent_us = now_us
+        return [messages.status_text(*self._waiting.popleft())]

@@ -29,7 +29,8 @@ class UdpVehicle:
     def __init__(
         self, address: tuple[str, int], driver: Driver, clock: LinkClock, keep: Callable[[int, bytes], None]
     ) -> None:
-        self._driver = driver
+        #: what is known of the vehicle
+        self.driver = driver
         self._clock = clock
         self._keep = keep
         self._peer: tuple[str, int] | None = None
@@ -51,11 +52,6 @@ class UdpVehicle:
         """The port listened at (the system's choice when 0 was asked for)."""
         return int(self._socket.getsockname()[1])
 
-    @property
-    def driver(self) -> Driver:
-        """What is known of the vehicle."""
-        return self._driver
-
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
         """Wait at most `timeout_us` of the clock for frames; gives what happened.
 
@@ -68,7 +64,7 @@ class UdpVehicle:
         if came:  # before the driver is told the time: it must not take for silence that nobody looked
             self._drain(now_us + self._slice_us, events)
             now_us = self._clock.now().monotonic_us
-        due, frames = self._driver.tick(now_us)
+        due, frames = self.driver.tick(now_us)
         self._send(frames)
         events += due
         wait = 0.0 if came or events else max(0.0, self._clock.real_seconds(timeout_us))
@@ -78,17 +74,17 @@ class UdpVehicle:
 
     def begin(self, command: Command, now_us: int) -> None:
         """Start a manoeuvre."""
-        events, frames = self._driver.begin(command, now_us)
+        events, frames = self.driver.begin(command, now_us)
         self._send(frames)
         self._pending += events
 
     def release(self) -> None:
         """Send nothing more that moves the vehicle."""
-        self._driver.release()
+        self.driver.release()
 
     def announce(self, severity: int, text: str) -> None:
         """Tell any ground station on the link."""
-        self._driver.announce(severity, text)
+        self.driver.announce(severity, text)
 
     def close(self) -> None:
         """Give the port back."""
@@ -113,11 +109,11 @@ class UdpVehicle:
         now = self._clock.now()
         now_us = now.monotonic_us
         if self._peer is not None and sender != self._peer:
-            self._driver.overhear(datagram, now_us)
+            self.driver.overhear(datagram, now_us)
             return now_us
-        heard = self._driver.receive(datagram, now_us)
+        heard = self.driver.receive(datagram, now_us)
         if self._peer is None:
-            if self._driver.flavour is None:
+            if self.driver.flavour is None:
                 return now_us
             self._peer = sender
         for frame in heard.frames:

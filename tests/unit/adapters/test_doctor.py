@@ -7,9 +7,8 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.doctor.diagnosis import diagnose
-from rtshcua.adapters.doctor.examination import Examination
-from rtshcua.adapters.doctor.finding import Finding, Verdict
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose
+from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
@@ -29,24 +28,24 @@ Prepare = Callable[[VirtualVehicle], None]
 
 def examine(
     config: SimulationConfig, policy: Policy | None = None, *, prepare: Prepare = lambda _: None, seconds: int = 14
-) -> dict[str, Finding]:
+) -> dict[str, VehicleFinding]:
     """The findings after so many seconds, by slug; of several with one slug, the worst."""
     policy = policy or case.policy()
     clock = VirtualClock()
     vehicle = VirtualVehicle(policy, config, clock, fence=False)
-    vehicle.driver = Examination(policy, clock, vehicle.frames)
+    vehicle.driver = ExaminingDriver(policy, clock, vehicle.frames)
     prepare(vehicle)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
-    found: dict[str, Finding] = {}
+    found: dict[str, VehicleFinding] = {}
     for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, utc_error_us=1_000):
-        if each.slug not in found or each.verdict is Verdict.STOP:
+        if each.slug not in found or each.verdict is MissionVerdict.STOP:
             found[each.slug] = each
     return found
 
 
-def stops(found: dict[str, Finding]) -> set[str]:
-    return {slug for slug, each in found.items() if each.verdict is Verdict.STOP}
+def stops(found: dict[str, VehicleFinding]) -> set[str]:
+    return {slug for slug, each in found.items() if each.verdict is MissionVerdict.STOP}
 
 
 @FLAVOURS
@@ -58,15 +57,15 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
 
     found = examine(case.simulated(flavour), prepare=watch)
     assert stops(found) == set()
-    assert found["autopilot/version"].verdict is Verdict.OK
-    assert found["link/answers"].verdict is found["link/round-trip"].verdict is Verdict.OK
+    assert found["autopilot/version"].verdict is MissionVerdict.OK
+    assert found["link/answers"].verdict is found["link/round-trip"].verdict is MissionVerdict.OK
     assert found["link/round-trip"].found == "0 ms there and back; its clock is known to 3 ms"
     assert found["signal/battery"].found.startswith("`battery`: BATTERY_STATUS every ")
     assert {slug for slug in found if slug.startswith("settings/")} >= {
         "px4": {"settings/gf_action", "settings/nav_dll_act"},
         "ardupilot": {"settings/fs_ekf_action", "settings/batt_fs_low_act"},
     }[flavour]
-    assert found["link/signing"].verdict is Verdict.WARN
+    assert found["link/signing"].verdict is MissionVerdict.WARN
     names = [each.message for frame in sent for each in Codec(0, 0).parse(frame)]
     assert {each.get_type() for each in names} == {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ", "TIMESYNC"}
     asked = {each.command for each in names if each.get_type() == "COMMAND_LONG"}
@@ -102,7 +101,7 @@ def test_a_vehicle_that_answers_nothing() -> None:
     found = examine(case.simulated("px4"), prepare=deaf)
     assert "link/answers" in stops(found)
     assert "--signing-key" in found["link/answers"].advice
-    assert found["autopilot/version"].verdict is found["settings/unread"].verdict is Verdict.UNKNOWN
+    assert found["autopilot/version"].verdict is found["settings/unread"].verdict is MissionVerdict.UNKNOWN
 
 
 @FLAVOURS
@@ -115,7 +114,7 @@ def test_a_vehicle_whose_clock_is_not_known(flavour: str) -> None:
     found = examine(case.simulated(flavour), prepare=without_time)
     assert "link/round-trip" in stops(found)
     assert found["link/round-trip"].found == "TIMESYNC is not answered, so nobody knows how old its reports are"
-    assert found["link/answers"].verdict is Verdict.OK
+    assert found["link/answers"].verdict is MissionVerdict.OK
     assert any(slug.startswith("signal/") for slug in stops(found)), "no signal is known"
 
 
@@ -126,7 +125,7 @@ def test_a_signal_that_nobody_sends() -> None:
 
     found = examine(case.simulated("px4"), prepare=without_wind)
     (wind,) = [each for slug, each in found.items() if slug.startswith("signal/wind")]
-    assert wind.verdict in (Verdict.STOP, Verdict.WARN)
+    assert wind.verdict in (MissionVerdict.STOP, MissionVerdict.WARN)
     assert wind.found.endswith("no WIND_COV or WIND")
 
 
@@ -149,7 +148,7 @@ def test_another_one_that_mediates_and_a_ground_station() -> None:
     assert found["link/ground-station"].found == "1 ground station(s) heard"
 
 
-def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, Finding]:
+def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFinding]:
     """The same on a link with a key."""
     now = VirtualClock().now()
     link = SignedLink(KEY, State(0, {}), now.utc_us, now.monotonic_us)
@@ -157,7 +156,7 @@ def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, Finding]:
     frames.sign_with(link)
     policy, clock = case.policy(), VirtualClock()
     vehicle = VirtualVehicle(policy, case.simulated(flavour, signing_key=KEY, utc_us=now.utc_us), clock, frames)
-    vehicle.driver = Examination(policy, clock, frames, link)
+    vehicle.driver = ExaminingDriver(policy, clock, frames, link)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
     findings = diagnose(vehicle.driver, policy, MISSION, keyed=True, utc_error_us=1_000, **words)
@@ -173,7 +172,7 @@ def test_a_signal_that_nobody_signs_stops_a_mission_that_needs_it() -> None:
 
 def test_what_is_not_believed_is_no_value() -> None:
     found = signed("ardupilot")
-    assert found["signal/link.quality"].verdict is Verdict.STOP, "the radio's frames are heard, and not taken in"
+    assert found["signal/link.quality"].verdict is MissionVerdict.STOP, "the radio's frames are heard, and not taken in"
 
 
 def test_what_was_never_learned_is_not_well() -> None:
@@ -186,11 +185,11 @@ def test_what_was_never_learned_is_not_well() -> None:
         vehicle.hurt = lambda frame: [] if any(each.name in mute for each in codec.parse(frame)) else [frame]
 
     found = examine(case.simulated("ardupilot"), policy, prepare=silent)
-    assert found["vehicle/down"].verdict is Verdict.UNKNOWN
-    assert found["mission/place"].verdict is Verdict.UNKNOWN
+    assert found["vehicle/down"].verdict is MissionVerdict.UNKNOWN
+    assert found["mission/place"].verdict is MissionVerdict.UNKNOWN
     mute.remove("GLOBAL_POSITION_INT")
     found = examine(case.simulated("ardupilot"), policy, prepare=silent)
-    assert found["mission/place"].verdict is Verdict.UNKNOWN
+    assert found["mission/place"].verdict is MissionVerdict.UNKNOWN
     assert "RTL_ALT" in found["mission/place"].found
 
 
@@ -210,7 +209,7 @@ def test_another_vehicle_at_the_port(elsewhere: bool) -> None:
         vehicle.hurt = also
 
     found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
-    assert found["link/other-vehicle"].verdict is Verdict.STOP
+    assert found["link/other-vehicle"].verdict is MissionVerdict.STOP
     assert "system 2" in found["link/other-vehicle"].found
 
 
@@ -227,4 +226,4 @@ def test_two_vehicles_of_one_id() -> None:
 
     found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
     assert "an id of its own" in found["link/other-vehicle"].found
-    assert found["link/loss"].verdict is Verdict.OK, "the other one's frames are not counted as this one's"
+    assert found["link/loss"].verdict is MissionVerdict.OK, "the other one's frames are not counted as this one's"

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.loop import HELD_WAIT_US, WAIT_US, Loop
+from rtshcua.adapters.loop import HELD_WAIT_US, WAIT_US, RunLoop
 from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
@@ -45,7 +45,7 @@ class World:
         self.coming: list[Any] = []
         self.prepared: list[Any] = []
         self.doing: Sequence[Any] = ()
-        self.loop = Loop(self, self, self, self, lambda *seen: self.saw.append(seen))
+        self.loop = RunLoop(self, self, self, self, lambda *seen: self.saw.append(seen))
 
     def now(self) -> Now:
         return Now(self.now_us, self.now_us, 0)

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters.vehicle import messages
-from rtshcua.adapters.vehicle.commander import LATE_US, RETRIES, RETRY_US, Commander
 from rtshcua.adapters.vehicle.flavour import Stage
-from rtshcua.adapters.vehicle.streams import MEASURE_US, QUIET_US, Streams
+from rtshcua.adapters.vehicle.manoeuvre import LATE_US, RETRIES, RETRY_US, Commander
+from rtshcua.adapters.vehicle.streams import MEASURE_US, QUIET_US, StreamRequests
 
 S = 1_000_000
 ACCEPTED, TEMPORARILY, DENIED, FAILED, IN_PROGRESS = 0, 1, 2, 4, 5
@@ -82,7 +82,7 @@ class Link:
     """Streams that come as they are asked for, unless `every` says otherwise."""
 
     def __init__(self, wanted: dict[str, int]) -> None:
-        self.streams = Streams(wanted, ())
+        self.streams = StreamRequests(wanted, ())
         self.every = dict(wanted)
         self.asked: list[str] = []
         self.now_us = 0

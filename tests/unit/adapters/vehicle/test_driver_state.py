@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.vehicle.datum import NoDatum, amsl_m, home_amsl_mm, relative_m
 from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.observed import NoDatum, ObservedVehicle
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
@@ -228,12 +228,16 @@ def test_no_altitude_is_commanded_before_home_is_known(kind: MotionKind) -> None
 
 
 def test_altitudes_are_converted_in_one_place() -> None:
-    assert amsl_m(20_000, 488_200) == 508.2
-    assert amsl_m(-500, -1_000) == -1.5
-    assert relative_m(20_500) == 20.5
-    assert home_amsl_mm(503_000, 15_000) == 488_000
+    seen = ObservedVehicle()
     with pytest.raises(NoDatum):
-        amsl_m(20_000, None)
+        seen.amsl(20_000)
+    seen.estimator.take(0x3F, 0)
+    seen.take(
+        "GLOBAL_POSITION_INT", mavlink.MAVLink_global_position_int_message(1, 0, 0, 503_000, 15_000, 0, 0, 0, 0), 0, 0
+    )
+    assert seen.home_amsl == 488_000
+    assert seen.amsl(20_000) == 508_000
+    assert seen.amsl(-489_000) == -1_000
 
 
 def test_the_gravest_text_since_a_command_began_is_its_reason() -> None:

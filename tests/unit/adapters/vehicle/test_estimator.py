@@ -2,7 +2,7 @@
 
 import pytest
 
-from rtshcua.adapters.vehicle.estimator import STALE_US, Estimator
+from rtshcua.adapters.vehicle.observed import STALE_US, Estimator
 
 S = 1_000_000
 GPI = "GLOBAL_POSITION_INT"

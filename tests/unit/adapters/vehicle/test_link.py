@@ -3,7 +3,7 @@
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from hostile.target import KEY, UTC_US, Target, greeting
-from rtshcua.adapters.vehicle.link import Link
+from rtshcua.adapters.vehicle.link import VehicleLink
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, unsigned
 from rtshcua.mavlink.radio import UnsignedRadio
@@ -63,7 +63,7 @@ def test_with_a_key_whatever_leaves_is_signed() -> None:
 def test_the_boundary_learns_of_the_vehicle_from_proved_frames_alone() -> None:
     theirs = SignedLink(KEY, State(0, {}), UTC_US, 0)
     frames = FrameSession()
-    link = Link(frames, SignedLink(KEY, State(0, {}), UTC_US, 0))
+    link = VehicleLink(frames, SignedLink(KEY, State(0, {}), UTC_US, 0))
     heartbeat = Codec(1, 1).pack(greeting("px4")[0])
     own = mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
     assert link.parse(heartbeat, 0) == []
@@ -74,7 +74,7 @@ def test_the_boundary_learns_of_the_vehicle_from_proved_frames_alone() -> None:
 
 
 def test_an_unsigned_radio_is_heard_at_its_worst() -> None:
-    link = Link(FrameSession(), UnsignedRadio(SignedLink(KEY, State(0, {}), UTC_US, 0)))
+    link = VehicleLink(FrameSession(), UnsignedRadio(SignedLink(KEY, State(0, {}), UTC_US, 0)))
     radio, told = Codec(1, 68), []
     for txbuf in (80, 20, 100):
         (received,) = link.parse(radio.pack(mavlink.MAVLink_radio_status_message(200, 200, txbuf, 0, 0, 0, 0)), 0)

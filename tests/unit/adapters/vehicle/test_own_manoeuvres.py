@@ -8,7 +8,7 @@ import pytest
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
-from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Failed, Ready, Succeeded
 from virtual.policy import POLICY
@@ -32,7 +32,7 @@ def with_own(flyer: Callable[..., Any], flavour: str) -> Make:
 def test_a_skill_is_flown_in_its_own_way_and_every_other_as_ever(with_own: Make) -> None:
     asked: list[str] = []
 
-    def own(command: Command, seen: Observed, system: int) -> list[Stage]:
+    def own(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         asked.append(command.skill)
         return made.vehicle.driver.flavour.stages(command, seen, system)
 
@@ -43,7 +43,7 @@ def test_a_skill_is_flown_in_its_own_way_and_every_other_as_ever(with_own: Make)
 
 
 def test_code_that_raises_has_failed_its_skill(with_own: Make) -> None:
-    def own(command: Command, seen: Observed, system: int) -> list[Stage]:
+    def own(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         raise ZeroDivisionError("no nozzle")
 
     end = with_own(own).fly(MotionKind.CLIMB, altitude=10_000)
@@ -52,10 +52,10 @@ def test_code_that_raises_has_failed_its_skill(with_own: Make) -> None:
 
 
 def test_an_effect_that_cannot_be_looked_for_has_failed_its_skill(with_own: Make) -> None:
-    def done(seen: Observed) -> bool:
+    def done(seen: ObservedVehicle) -> bool:
         raise KeyError("tank")
 
-    def own(command: Command, seen: Observed, system: int) -> list[Stage]:
+    def own(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         return [Stage(None, None, done, frozenset())]
 
     end = with_own(own).fly(MotionKind.CLIMB, altitude=10_000)
@@ -73,7 +73,7 @@ def test_an_effect_that_cannot_be_looked_for_has_failed_its_skill(with_own: Make
     ids=["forced arming", "another place", "a parameter"],
 )
 def test_whatever_it_sends_passes_the_gate_or_does_not_leave(with_own: Make, message: Any) -> None:
-    def own(command: Command, seen: Observed, system: int) -> list[Stage]:
+    def own(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         return [Stage(message(system), None, lambda seen: seen.airborne, frozenset())]
 
     made = with_own(own)

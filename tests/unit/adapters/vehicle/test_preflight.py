@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
-from rtshcua.adapters.vehicle.flavour import Flavour
-from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.parameters import Parameters
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour as Flavour
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.policy import Airspace
@@ -98,8 +98,8 @@ def preflight(flavour: Flavour, *, fence: bool = True) -> Preflight:
     return Preflight(CITY, flavour, at_home(), fence=fence)
 
 
-def at_home() -> Observed:
-    return Observed(latitude=PROJECTION.latitude, longitude=PROJECTION.longitude, located=True)
+def at_home() -> ObservedVehicle:
+    return ObservedVehicle(latitude=PROJECTION.latitude, longitude=PROJECTION.longitude, located=True)
 
 
 @FLAVOURS
@@ -264,7 +264,7 @@ def test_fences_of_other_kinds_are_not_ours() -> None:
 
 @pytest.mark.parametrize("value", [0, 1, 2, 255, 4_001, 2**31 - 1, -1, -5])
 def test_px4s_integers_travel_as_their_bytes(value: int) -> None:
-    parameters = Parameters(bytewise=True)
+    parameters = VehicleParameters(bytewise=True)
     parameters.read("GF_ACTION")
     parameters.due(1, 0)
     raw = struct.unpack("<f", struct.pack("<i", value))[0]
@@ -278,7 +278,7 @@ def test_px4s_integers_travel_as_their_bytes(value: int) -> None:
 
 
 def test_a_parameter_is_set_when_its_echo_says_so() -> None:
-    parameters = Parameters(bytewise=False)
+    parameters = VehicleParameters(bytewise=False)
     parameters.read("FENCE_ENABLE")
     parameters.due(1, 0)
     for value, settled in ((0.0, True), (0.0, False), (1.0, True)):

@@ -10,14 +10,12 @@ import pytest
 from recorded.trace import Heard, Question, Trace
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
-from rtshcua.adapters.vehicle.commander import Commander
-from rtshcua.adapters.vehicle.estimator import Estimator
-from rtshcua.adapters.vehicle.fence import FenceItem
-from rtshcua.adapters.vehicle.flavour import Flavour, Stage
-from rtshcua.adapters.vehicle.messages import FENCE
-from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.texts import Texts
-from rtshcua.adapters.vehicle.upload import Step, Upload
+from rtshcua.adapters.vehicle.fence import Upload, UploadState
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
+from rtshcua.adapters.vehicle.manoeuvre import Commander
+from rtshcua.adapters.vehicle.messages import FENCE, FenceItem
+from rtshcua.adapters.vehicle.observed import Estimator, ObservedVehicle
+from rtshcua.adapters.vehicle.texts import StatusTexts
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 
 ARM, TAKEOFF, MODE, REPOSITION, RETURN, LAND = 400, 22, 176, 192, 20, 21
@@ -30,7 +28,7 @@ class Judged:
     number: int
     message: Any
     commander: Commander
-    seen: Observed
+    seen: ObservedVehicle
 
     @property
     def outcome(self) -> str:
@@ -51,7 +49,7 @@ def judged(name: str, estimator: str) -> list[Judged]:
 
 
 def _judge(session: Trace, estimator: Estimator) -> Iterator[Judged]:
-    seen, texts, commander = Observed(estimator), Texts(), Commander()
+    seen, texts, commander = ObservedVehicle(estimator), StatusTexts(), Commander()
     heard = session.of_vehicle
     at = 0
     for question, end_us in windows(session):
@@ -65,10 +63,10 @@ def _judge(session: Trace, estimator: Estimator) -> Iterator[Judged]:
             take(heard[at], seen, texts, commander)
             at += 1
         if is_command:
-            yield Judged(m.command, m, commander, Observed(estimator, seen.mode, seen.armed, text=seen.text))
+            yield Judged(m.command, m, commander, ObservedVehicle(estimator, seen.mode, seen.armed, text=seen.text))
 
 
-def take(frame: Heard, seen: Observed, texts: Texts, commander: Commander) -> None:
+def take(frame: Heard, seen: ObservedVehicle, texts: StatusTexts, commander: Commander) -> None:
     if frame.name == "COMMAND_ACK":
         commander.acknowledge(frame.message.command, frame.message.result, frame.at_us)
     elif frame.name == "STATUSTEXT":
@@ -140,7 +138,7 @@ def test_returns_and_landings_show_in_the_heartbeat(name: str, number: int, mode
 
 
 @pytest.mark.parametrize(("name", "flavour"), [("px4-commands", PX4), ("arducopter-commands", ARDUPILOT)])
-def test_fences_are_uploaded_as_the_recorded_client_did(name: str, flavour: Flavour) -> None:
+def test_fences_are_uploaded_as_the_recorded_client_did(name: str, flavour: AutopilotFlavour) -> None:
     uploads = 0
     session = trace(name)
     for question, end_us in windows(session):
@@ -161,7 +159,7 @@ def test_fences_are_uploaded_as_the_recorded_client_did(name: str, flavour: Flav
                 answers = upload.take(frame.name, frame.message, 1, frame.at_us)
                 given += [answer for answer in answers if answer.get_type() == "MISSION_ITEM_INT"]
         assert [fields(m) for m in given] == [fields(m) for m in sent]
-        assert upload.step is Step.COUNTING, "acknowledged, and about to be read back"
+        assert upload.state is UploadState.COUNTING, "acknowledged, and about to be read back"
         uploads += 1
     assert uploads == 3
 

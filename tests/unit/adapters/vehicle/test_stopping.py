@@ -11,8 +11,9 @@ import pytest
 
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.effects import STILL
-from rtshcua.adapters.vehicle.observed import Observed
-from rtshcua.adapters.vehicle.progress import LAG_US, Brakes, Expected, Progress, Stop
+from rtshcua.adapters.vehicle.flavour import ExpectedProgress
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.supervision import LAG_US, Brakes, StageProgress, Stopping
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Crashed, Failed, Ready, Succeeded, TakenOver
 from rtshcua.simulation.faults import Kill, LinkDelay, Pillar
@@ -132,17 +133,17 @@ def test_the_fastest_that_it_may_be(passed_s: float, fastest: int) -> None:
     assert BRAKES.fastest(10_000, round(passed_s * S)) == fastest
 
 
-def speeds(stop: Stop, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0) -> float | None:
+def speeds(stop: Stopping, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0) -> float | None:
     """When a stop from 10 m/s fails, where the speed is `of` the seconds since; None: it does not."""
     for tick in range(round(until_s * 10)):
-        seen = Observed(up_us=tick * S // 10, speed=of(tick / 10))
+        seen = ObservedVehicle(up_us=tick * S // 10, speed=of(tick / 10))
         if stop.has_failed(seen, obeyed=tick / 10 >= obeyed_s):
             return tick / 10
     return None
 
 
-def stop_from(speed: int | None) -> Stop:
-    return Stop(BRAKES, Observed(speed=speed))
+def stop_from(speed: int | None) -> Stopping:
+    return Stopping(BRAKES, ObservedVehicle(speed=speed))
 
 
 def test_a_vehicle_that_brakes_as_declared_does_not_fail() -> None:
@@ -191,11 +192,11 @@ def test_a_vehicle_without_declared_brakes_is_given_a_cautious_guess() -> None:
 
 def test_progress_is_a_metre_in_its_time_by_any_part() -> None:
     left: list[tuple[int, ...] | None] = [None]
-    progress = Progress(Expected(lambda seen: left[0], 8 * S))
+    progress = StageProgress(ExpectedProgress(lambda seen: left[0], 8 * S))
 
     def at(second: float, *parts: int) -> bool:
         left[0] = parts or None
-        return progress.has_stalled(Observed(up_us=round(second * S)))
+        return progress.has_stalled(ObservedVehicle(up_us=round(second * S)))
 
     assert not at(0, 50_000, 20_000)
     assert not at(8, 49_500, 20_000)

@@ -152,7 +152,8 @@ class Held:
 
     def hear(self, message: Any, now_us: int) -> tuple[int | None, int]:
         """The fix, and its age."""
-        for ts1 in self._source.due(now_us):
+        ts1 = self._source.clock.due(now_us)
+        if ts1 is not None:
             self._of(mavlink.MAVLink_timesync_message(now_us * 1_000, ts1), now_us)
         at_us = self._of(message, now_us)
         assert at_us is not None

@@ -6,8 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.vehicle.announcer import EACH_US, KEPT, Announcer
-from rtshcua.adapters.vehicle.texts import BURST, CHUNK_US, LONGEST, Texts, quoted
+from rtshcua.adapters.vehicle.texts import (
+    BURST,
+    CHUNK_US,
+    EACH_US,
+    KEPT,
+    LONGEST,
+    Announcer,
+    StatusTexts,
+    quoted,
+)
 from rtshcua.codec.frames import Codec
 from rtshcua.onboard.ports import Said
 
@@ -20,22 +28,24 @@ def text(content: str, number: int = 0, chunk: int = 0, severity: int = 6) -> An
 
 
 def test_a_short_text_is_there_at_once_and_loses_its_padding() -> None:
-    assert Texts().take(text("Landing detected\t", 5), S) == [Said(S, 6, "Landing detected")]
-    assert Texts().take(text("Arm: Accels inconsistent", severity=2), S) == [Said(S, 2, "Arm: Accels inconsistent")]
+    assert StatusTexts().take(text("Landing detected\t", 5), S) == [Said(S, 6, "Landing detected")]
+    assert StatusTexts().take(text("Arm: Accels inconsistent", severity=2), S) == [
+        Said(S, 2, "Arm: Accels inconsistent")
+    ]
 
 
 def test_chunks_are_put_together() -> None:
-    texts, parts = Texts(), ("a" * 50, "b" * 50, "c")
+    texts, parts = StatusTexts(), ("a" * 50, "b" * 50, "c")
     said = [texts.take(text(part, 3, at), at) for at, part in enumerate(parts)]
     assert said == [[], [], [Said(2, 6, "".join(parts))]]
 
 
 def test_a_full_text_without_a_number_has_no_more_chunks() -> None:
-    assert Texts().take(text("a" * 50), 0) == [Said(0, 6, "a" * 50)]
+    assert StatusTexts().take(text("a" * 50), 0) == [Said(0, 6, "a" * 50)]
 
 
 def test_a_missing_chunk_does_not_join_what_does_not_belong_together() -> None:
-    texts = Texts()
+    texts = StatusTexts()
     assert texts.take(text("a" * 50, 3, 0), 0) == []
     assert texts.take(text("end", 4, 1), 1) == [Said(1, 6, "a" * 50), Said(1, 6, "end")]
     assert texts.take(text("b" * 50, 5, 0), 2) == []
@@ -43,7 +53,7 @@ def test_a_missing_chunk_does_not_join_what_does_not_belong_together() -> None:
 
 
 def test_a_text_whose_end_never_comes_is_taken_as_it_is() -> None:
-    texts = Texts()
+    texts = StatusTexts()
     texts.take(text("a" * 50, 3, 0), 0)
     assert texts.due(CHUNK_US) == []
     assert texts.due(CHUNK_US + 1) == [Said(CHUNK_US + 1, 6, "a" * 50)]
@@ -51,18 +61,18 @@ def test_a_text_whose_end_never_comes_is_taken_as_it_is() -> None:
 
 
 def test_a_text_that_never_ends_is_bounded() -> None:
-    texts = Texts()
+    texts = StatusTexts()
     said = [one for at in range(20) for one in texts.take(text("x" * 50, 9, at), at)]
     assert said
     assert all(len(one.text) <= LONGEST for one in said)
 
 
 def test_an_empty_text_is_none() -> None:
-    assert Texts().take(text("\t"), 0) == []
+    assert StatusTexts().take(text("\t"), 0) == []
 
 
 def test_a_flood_is_cut_and_what_was_left_out_is_counted() -> None:
-    texts = Texts()
+    texts = StatusTexts()
     said = [one for at in range(1_000) for one in texts.take(text(f"text {at}"), at)]
     assert len(said) == BURST
     (later,) = texts.take(text("after it"), 60 * S)
@@ -80,7 +90,7 @@ def test_control_characters_and_what_turns_text_around_are_quoted() -> None:
 def test_whatever_is_said_prints_on_one_line(content: str, number: int, chunk: int, at_us: int) -> None:
     message = mavlink.MAVLink_statustext_message(0, b"", number, chunk)
     message.text = content
-    texts = Texts()
+    texts = StatusTexts()
     for said in [*texts.take(message, at_us), *texts.due(at_us + CHUNK_US + 1)]:
         assert said.text.isprintable()
         assert 0 < len(said.text) <= LONGEST

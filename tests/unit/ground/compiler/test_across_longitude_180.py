@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from reference.sources import LIBRARY
 from rtshcua.adapters.vehicle.effects import arrived
-from rtshcua.adapters.vehicle.observed import Observed
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.compiler.projection import projection_at
@@ -131,8 +131,8 @@ def test_a_program_at_longitude_180_is_that_of_any_other_longitude(home: int) ->
 def test_a_place_on_the_other_side_is_reached_and_simulated() -> None:
     near = arrived(-168_500_000, -HALF_TURN + 10, 20_000)
     there = {"latitude": -168_500_000, "height": 20_000, "located": True, "levelled": True}
-    assert near(Observed(longitude=HALF_TURN - 10, **there))
-    assert not near(Observed(longitude=HALF_TURN - 10_000, **there))
+    assert near(ObservedVehicle(longitude=HALF_TURN - 10, **there))
+    assert not near(ObservedVehicle(longitude=HALF_TURN - 10_000, **there))
     for side in (1, -1):
         home = Home(-168_500_000, side * (HALF_TURN - 1000), 0)
         latitude, longitude = home.globe(30.0, side * 200.0)

@@ -3,7 +3,7 @@
 import pytest
 
 from reference.sources import findings, found, mission, policy, program, skill
-from rtshcua.adapters.vehicle import commander, streams, telemetry
+from rtshcua.adapters.vehicle import manoeuvre, streams, telemetry
 from rtshcua.ground.compiler.proofs import observation
 from rtshcua.ground.compiler.proofs.rates import COMMANDS, RATES
 from rtshcua.mavlink import dialect
@@ -22,7 +22,7 @@ def test_the_figures_are_those_of_what_flies() -> None:
     assert RATES.least_often == telemetry.LEAST_OFTEN_US
     assert RATES.within_stale == telemetry._WITHIN_STALE
     assert observation.DECIDE_US == CONSERVATIVE_US
-    assert observation.ACTUATE_US == commander.RETRY_US
+    assert observation.ACTUATE_US == manoeuvre.RETRY_US
     assert dialect.load().messages.keys() >= COMMANDS
 
 

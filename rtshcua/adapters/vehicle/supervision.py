@@ -1,0 +1,269 @@
+"""What is watched while something flies: whether it gets anywhere, whether it stops, whether somebody else flies it,
+whether it crashed. A mode report or an acknowledgement proves nothing, only what is seen does.
+"""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Final
+
+from rtshcua.adapters.vehicle.effects import STILL
+from rtshcua.adapters.vehicle.flavour import SAME, ExpectedProgress, ExpectedTarget
+from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
+from rtshcua.model.flat.policy import Vehicle
+
+NEVER: Final = (1 << 63) - 1  # us
+
+#: mm by which some measure must fall for it to count as progress
+LEAST: Final = 1_000
+
+
+class StageProgress:
+    """Follows one stage."""
+
+    def __init__(self, expected: ExpectedProgress) -> None:
+        self._expected = expected
+        self._best: tuple[int, ...] | None = None
+        self._since_us: int | None = None
+        self._began_us: int | None = None
+        #: whether there was any progress yet
+        self.shown = False
+
+    @property
+    def due_us(self) -> int:
+        """When it will have stalled, in link time, unless something is seen before."""
+        return NEVER if self._since_us is None else self._since_us + self._expected.within_us
+
+    def has_stalled(self, seen: ObservedVehicle) -> bool:
+        """Whether nothing fell for too long. What is not known meanwhile is not held against it."""
+        left = self._expected.measure(seen)
+        if left is None or self._best is None or self._since_us is None:
+            self._best, self._since_us = left, None if left is None else seen.up_us
+            self._began_us = seen.up_us if self._began_us is None else self._began_us
+            return False
+        if self._has_come_further(self._best, left):
+            self._best, self._since_us, self.shown = left, seen.up_us, True
+            return False
+        if (
+            not self.shown
+            and self._has_come_further(left, self._best)
+            and seen.up_us - (self._began_us or 0) <= self._expected.within_us
+        ):
+            self._best, self._since_us = left, seen.up_us  # at first it may have to turn round
+        return seen.up_us - self._since_us > self._expected.within_us
+
+    def _has_come_further(self, best: tuple[int, ...], left: tuple[int, ...]) -> bool:
+        changes = [before - now for before, now in zip(best, left, strict=True)]
+        return max(map(abs, changes) if self._expected.either_way else changes) >= LEAST
+
+
+# ---------------------------------------------------------------- stopping
+
+#: us of link time between a command to stop that was obeyed and the time from which its effect must show: what
+#: filters, reports and a gust take. PX4 1.16 needs it: from 4.5 m/s it is below 0.4 m/s after 3.6 to 4.6 s only.
+LAG_US: Final = 2_000_000
+#: what a vehicle is taken to brake with that does not say: mm/s^2, and us before it begins
+UNDECLARED_BRAKING: Final = 1_000
+UNDECLARED_REACTION_US: Final = 1_000_000
+_SECOND: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Brakes:
+    """How a vehicle brakes, as its policy declares it (`brakes from 12 m/s in 6 s after 500 ms`): mm/s^2 and us."""
+
+    braking: int
+    reaction_us: int
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> "Brakes":
+        """Those of a signed vehicle, or a cautious guess for one that declares none."""
+        if not vehicle.braking:
+            return cls(UNDECLARED_BRAKING, UNDECLARED_REACTION_US)
+        return cls(vehicle.braking, vehicle.reaction_us)
+
+    def fastest(self, speed: int, passed_us: int) -> int:
+        """How fast it may still be, mm/s, so long after it was told to stop at a speed of `speed`."""
+        falling_us = max(passed_us - self.reaction_us - LAG_US, 0)
+        return max(speed - self.braking * falling_us // _SECOND, STILL)
+
+    def stands_us(self, speed: int) -> int:
+        """By when it must stand still, told to stop at a speed of `speed`."""
+        return self.reaction_us + speed * _SECOND // self.braking + 2 * LAG_US
+
+
+class Stopping:
+    """Follows a vehicle that was told to stop, from the speed that it then had."""
+
+    def __init__(self, brakes: Brakes, seen: ObservedVehicle) -> None:
+        self._brakes = brakes
+        self._speed = seen.speed
+        self._since_us: int | None = None
+
+    @property
+    def due_us(self) -> int:
+        """By when it must stand still, in link time; never while it was not seen to obey."""
+        return NEVER if self._since_us is None else self._since_us + self._brakes.stands_us(self._speed or 0)
+
+    def has_failed(self, seen: ObservedVehicle, *, obeyed: bool) -> bool:
+        """Whether it is faster than it may be by now, or moves when it must stand still.
+
+        `obeyed`: the command was acknowledged, or its mode shows. The speed that it must lose is the greatest until its
+        effect must show. A speed that is not known is none that fell.
+        """
+        if self._since_us is None and obeyed:
+            self._since_us = seen.up_us
+        if self._since_us is None or seen.up_us - self._since_us <= self._brakes.reaction_us + LAG_US:
+            if seen.speed is not None:  # it may have been told to stop while it still gathered speed
+                self._speed = max(self._speed or 0, seen.speed)
+            return False
+        passed_us, speed = seen.up_us - self._since_us, self._speed or 0
+        if passed_us > self._brakes.stands_us(speed):
+            return seen.speed is None or seen.speed > STILL
+        return seen.speed is not None and seen.speed > self._brakes.fastest(speed, passed_us) + STILL
+
+
+# ---------------------------------------------------------------- somebody else's target
+
+#: Until ours shows, what is reported may be older than our frame; in us of link time.
+SETTLES_US: Final = 1_500_000
+_REMEMBERED: Final = 4
+
+
+class TargetWatch:
+    """The target that the autopilot says it flies to, against those that we gave it, over all manoeuvres of a vehicle.
+
+    A ground station takes over without any change of mode: PX4's pause and go-to, ArduCopter's guided targets. The
+    autopilot then reports another target than ours (POSITION_TARGET_GLOBAL_INT). PX4 reports one whenever it has one,
+    ArduCopter in GUIDED only.
+    """
+
+    def __init__(self) -> None:
+        self._ours: deque[ExpectedTarget] = deque(maxlen=_REMEMBERED)
+        self._expected: ExpectedTarget | None = None
+        self._prior: Reported | None = None
+        self._settled_us = 0
+        self._given: ExpectedTarget | None = None  # the present target as it was given, before the vehicle named it
+        self._more = 0  # how often it may name another, for it was told again
+        #: whether the autopilot was seen to fly to the present target
+        self.shown = False
+
+    def expect(self, target: ExpectedTarget | None, seen: ObservedVehicle) -> None:
+        """From now on this is what it should fly to; None: nothing that could be compared.
+
+        Where it flew to a target of its own, that may show for a while yet. Where it flew to one of ours, any other is
+        somebody else's, also one that shows only after our next frame left.
+        """
+        settles_us = 0 if self.shown else SETTLES_US
+        self._expected, self.shown = target, False
+        self._given, self._more = target, 0
+        self._prior, self._settled_us = seen.target, seen.up_us + settles_us
+        if target is not None:
+            self._ours.append(target)
+
+    def told_again(self) -> None:
+        """The present target went out once more: each time that it stops anew, it stops somewhere else."""
+        self._more += 1
+
+    def is_foreign(self, seen: ObservedVehicle) -> bool:
+        """Whether it flies to somebody else's target."""
+        expected, reported = self._expected, seen.target
+        if expected is None or reported is None:
+            return False
+        if reported == self._prior and not self.shown:
+            return False  # not obeyed yet; when it never is, there is no progress
+        if expected.matches(reported):
+            self._show(expected, reported)
+            return False
+        if self.shown and self._more and self._given is not None and self._given.matches(reported):
+            self._more, self.shown = self._more - 1, False
+            self._show(self._given, reported)
+            return False
+        if self.shown:
+            return True
+        if any(ours.matches(reported) for ours in self._ours if ours is not expected):
+            return False  # not obeyed yet
+        return seen.up_us >= self._settled_us
+
+    def _show(self, expected: ExpectedTarget, reported: Reported) -> None:
+        if not self.shown and expected.within > SAME:  # this is the one, from now on
+            latitude, longitude, amsl = reported
+            expected = replace(expected, latitude=latitude, longitude=longitude, amsl=amsl, within=SAME)
+            self._ours[-1] = self._expected = expected
+        self.shown = True
+
+
+# ---------------------------------------------------------------- crashes
+
+#: mm above home: motors that stop higher than this, without a landing before, did not stop for one
+ABOVE: Final = 3_000
+#: us: how old the last report of its flight may be when they stop; after a silence it may have landed meanwhile
+RECENT_US: Final = 2_000_000
+#: us between two reports of a tilt, of which a single one proves nothing
+LASTS_US: Final = 400_000
+#: mm/s: no landing comes down so fast,
+FALLS: Final = 3_000
+#: and no motors stop it to this
+STOPPED: Final = 500
+#: within this time, in us, between two reports of its speed.
+AT_ONCE_US: Final = 400_000
+#: us from there until it says that it lies on the ground, or that its motors are off
+LIES_WITHIN_US: Final = 10_000_000
+#: degrees: autopilots lean at most 45 of their own accord
+TILTED: Final = 60
+
+
+class CrashWatch:
+    """A crash told from a landing, once, by each observation of one flight: by the motors, the fall and the attitude.
+
+    What lies on the ground with its motors off says ON_GROUND however it came there.
+    """
+
+    def __init__(self) -> None:
+        self._flown = False
+        self._told = False
+        self._flew: tuple[int, int, bool] | None = None  # when it was last seen to, how high, and whether to land
+        self._tilted_us: int | None = None
+        self._fell: tuple[int, int] | None = None  # when, and how fast it came down
+        self._impact: tuple[int, int] | None = None
+
+    def look(self, seen: ObservedVehicle, now_us: int) -> str | None:
+        """What shows that it crashed; None, also once that was told."""
+        if seen.airborne and seen.armed:
+            self._flown = True
+        if not self._flown or self._told:
+            return None
+        how = self._motors(seen, now_us) or self._attitude(seen, now_us) or self._fall(seen, now_us)
+        self._told = how is not None
+        return how
+
+    def _motors(self, seen: ObservedVehicle, now_us: int) -> str | None:
+        """Autopilots call a vehicle landed that is disarmed: what counts is how it flew when it was last seen armed."""
+        if seen.armed:
+            if seen.airborne and seen.levelled:
+                self._flew = now_us, seen.height, seen.landing
+            return None
+        flew, self._flew = self._flew, None
+        if flew is None or now_us - flew[0] > RECENT_US or flew[1] < ABOVE or flew[2]:
+            return None
+        return f"its motors stopped {flew[1] // 1_000} m above home"
+
+    def _attitude(self, seen: ObservedVehicle, now_us: int) -> str | None:
+        if seen.tilt < TILTED or not (seen.armed or seen.airborne):
+            self._tilted_us = None
+            return None
+        if self._tilted_us is None:
+            self._tilted_us = seen.tilt_us
+        return f"it leans {seen.tilt} degrees" if seen.tilt_us - self._tilted_us >= LASTS_US else None
+
+    def _fall(self, seen: ObservedVehicle, now_us: int) -> str | None:
+        if seen.descent >= FALLS:
+            self._fell, self._impact = (now_us, seen.descent), None
+        elif self._fell is not None:
+            if abs(seen.descent) <= STOPPED and now_us - self._fell[0] <= AT_ONCE_US:
+                self._impact = self._fell
+            self._fell = None
+        if self._impact is None or now_us - self._impact[0] > LIES_WITHIN_US:
+            return None
+        if seen.airborne and seen.armed:
+            return None
+        return f"it came down at {self._impact[1] / 1_000:.1f} m/s"

@@ -10,24 +10,8 @@ from typing import NamedTuple, Protocol
 
 from rtshcua.model.durability import BUFFERED, SYNCED_FIRST
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import (
-    WITHHELD,
-    Action,
-    Announce,
-    Append,
-    Clock,
-    Dispatch,
-    End,
-    Ending,
-    Event,
-    EvidenceFailed,
-    EvidenceKept,
-    EvidenceSink,
-    Failed,
-    Noted,
-    Release,
-    Vehicle,
-)
+from rtshcua.onboard import ports
+from rtshcua.onboard.ports import Action, Dispatch, Ending, Event
 
 #: The longest that the loop waits for the vehicle before it steps the runtime again, in us of its clock;
 WAIT_US = 50_000
@@ -65,7 +49,7 @@ class RunLoop:
     """One run. `watch` sees each step's events and actions, after they were carried out; it must not block."""
 
     def __init__(
-        self, runtime: Stepped, vehicle: Vehicle, sink: EvidenceSink, clock: Clock, watch: Watch,
+        self, runtime: Stepped, vehicle: ports.Vehicle, sink: ports.EvidenceSink, clock: ports.Clock, watch: Watch,
         wait_us: int = WAIT_US, held_wait_us: int = HELD_WAIT_US,
     ) -> None:  # fmt: skip
         self._runtime = runtime
@@ -107,14 +91,14 @@ class RunLoop:
             self._fail(reason)
         elif self._failed is not None and self._sink.kept >= self._lines and self._sink.synced >= self._failed:
             self._failed = None
-            self._answers.append(EvidenceKept(self._clock.now().monotonic_us))
+            self._answers.append(ports.EvidenceKept(self._clock.now().monotonic_us))
         if late is not None:
-            self._answers.append(Noted(self._clock.now().monotonic_us, late))
+            self._answers.append(ports.Noted(self._clock.now().monotonic_us, late))
         if self._held is None:
             return
         dispatch, record = self._held
         if reason is not None:
-            self._refuse(dispatch, WITHHELD)
+            self._refuse(dispatch, ports.WITHHELD)
         elif self._recorded(record):
             self._send(dispatch)
         elif self._clock.now().monotonic_us > dispatch.not_after_us:
@@ -125,22 +109,22 @@ class RunLoop:
         record: _Record | None = _Record(self._lines, BUFFERED)
         for action in actions:
             match action:
-                case Append():
+                case ports.Append():
                     record = self._append(action, record)
                 case Dispatch():
                     if action is not sent:
                         self._dispatch(action, record)
-                case Release():
+                case ports.Release():
                     self._held = None
                     self._vehicle.release()
-                case Announce(severity, text):
+                case ports.Announce(severity, text):
                     self._vehicle.announce(severity, text)
-                case End(how):
+                case ports.End(how):
                     self._held = None
                     ending = how
         return ending
 
-    def _append(self, append: Append, record: _Record | None) -> _Record | None:
+    def _append(self, append: ports.Append, record: _Record | None) -> _Record | None:
         """What a command after it is held for; None if it, or one before it in this step, was refused."""
         try:
             given = self._sink.append(append.line, append.durability)
@@ -157,7 +141,7 @@ class RunLoop:
         """Send a command, or hold it until its record is kept. The one that was held is replaced."""
         self._held = None
         if dispatch.needs_record and record is None:
-            self._refuse(dispatch, WITHHELD)
+            self._refuse(dispatch, ports.WITHHELD)
         elif not dispatch.needs_record or record is None or self._recorded(record):
             self._send(dispatch)
         else:
@@ -171,7 +155,7 @@ class RunLoop:
 
     def _fail(self, reason: str) -> None:
         self._failed = self._lines
-        self._answers.append(EvidenceFailed(self._clock.now().monotonic_us, reason))
+        self._answers.append(ports.EvidenceFailed(self._clock.now().monotonic_us, reason))
 
     def _send(self, dispatch: Dispatch) -> None:
         """Look at the clock again: what is late is not sent."""
@@ -184,4 +168,4 @@ class RunLoop:
 
     def _refuse(self, dispatch: Dispatch, reason: str) -> None:
         self._held = None
-        self._answers.append(Failed(self._clock.now().monotonic_us, dispatch.command.token, reason))
+        self._answers.append(ports.Failed(self._clock.now().monotonic_us, dispatch.command.token, reason))

@@ -5,7 +5,7 @@ It obeys position targets in GUIDED only, and ignores them silently elsewhere; t
 
 from rtshcua.adapters.vehicle import effects, flavour, messages
 from rtshcua.adapters.vehicle.effects import Effect
-from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
@@ -53,19 +53,10 @@ def _legs(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
     """
     height = command.altitude
     amsl = None if seen.home_amsl is None else seen.amsl(height)
-    legs = [
-        Stage(
-            messages.position_target(system, *place, height / 1_000),
-            None,
-            effects.arrived(*place, height),
-            _GUIDED,
-            repeat_us=_REPEAT_US,
-            powered=True,
-            target=ExpectedTarget(*place, amsl),
-            progress=flavour.flying(*place, height),
-        )
-        for place in zip(command.geo[::2], command.geo[1::2], strict=True)
-    ]
+    legs: list[Stage] = []
+    for place in zip(command.geo[::2], command.geo[1::2], strict=True):
+        message = messages.position_target(system, *place, height / 1_000)
+        legs.append(flavour.leg(message, None, _GUIDED, place, height, amsl, _REPEAT_US))
     if not command.speed or not legs:
         return legs
     first, *others = legs

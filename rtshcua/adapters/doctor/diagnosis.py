@@ -44,15 +44,9 @@ class VehicleFinding(msgspec.Struct, frozen=True):
 
 
 def diagnose(
-    vehicle: ExaminingDriver,
-    policy: Policy,
-    flown: Mission | None,
-    *,
-    keyed: bool,
-    utc_error_us: int,
-    unheard: frozenset[int] = frozenset(),
-    named: bool = False,
-) -> Iterator[VehicleFinding]:
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, utc_error_us: int,
+    unheard: frozenset[int] = frozenset(), named: bool = False,
+) -> Iterator[VehicleFinding]:  # fmt: skip
     """What was found. `flown` is the mission that the vehicle is to fly, None where only signals were asked about.
 
     `keyed`: a link key was given, and what is not signed with it was dropped. `unheard` are the slots of signals that
@@ -176,8 +170,7 @@ def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]
     if message is None:
         yield VehicleFinding("autopilot/version", UNKNOWN, "it does not tell its version")
         return
-    number, tested = message.flight_sw_version, _TESTED[flavour]
-    version = (number >> 24 & 0xFF, number >> 16 & 0xFF, number >> 8 & 0xFF)
+    tested, version = _TESTED[flavour], tuple(message.flight_sw_version.to_bytes(4)[:3])
     found = f"{flavour} {'.'.join(map(str, version))}"
     advice = f"the answers that we know were recorded of {'.'.join(map(str, tested))}: fly it in simulation first"
     yield _graded("autopilot/version", found, "", advice, warns=version[:2] != tested)
@@ -259,19 +252,19 @@ def _signals(
     for signal in policy.signals:
         slots = signal.slots
         bad = WARN if wanted.isdisjoint(slots) else STOP
-        if unheard.isdisjoint(slots):
-            yield _signal(vehicle, signal, slots, bad)
-        else:
-            names = " or ".join(source.message for source in signal.sources)
-            found = f"`{signal.name}` stays unknown: nobody signs {names}, and nothing unsigned is believed here"
-            yield VehicleFinding(f"signal/{signal.name}", bad, found, names, "`--unsigned-radio`, here and for `run`")
+        yield _signal(vehicle, signal, slots, bad, signed=unheard.isdisjoint(slots))
 
 
-def _signal(vehicle: ExaminingDriver, signal: Signal, slots: Sequence[int], bad: MissionVerdict) -> VehicleFinding:
+def _signal(
+    vehicle: ExaminingDriver, signal: Signal, slots: Sequence[int], bad: MissionVerdict, *, signed: bool
+) -> VehicleFinding:
     slug, sources = f"signal/{signal.name}", [source.message for source in signal.sources]
+    names = " or ".join(sources)
+    if not signed:
+        found = f"`{signal.name}` stays unknown: nobody signs {names}, and nothing unsigned is believed here"
+        return VehicleFinding(slug, bad, found, names, "`--unsigned-radio`, here and for `run`")
     heard = next((name for name in sources if name in vehicle.streams), None)
     if heard is None:
-        names = " or ".join(sources)
         return VehicleFinding(slug, bad, f"`{signal.name}` stays unknown: no {names}", names, _ADVICE)
     if any(vehicle.values.get(slot) is None for slot in slots):
         found = f"`{signal.name}` is unknown now: {heard} comes, and says so or is not vouched for"

@@ -90,7 +90,7 @@ class ExaminingDriver(Driver):
         self._meet(datagram, now_us)
         for frame in heard.frames:
             if frame.system == self.system:
-                self._hear(frame, now_us)
+                self._examine(frame, now_us)
         self._note(heard.events)
         return heard
 
@@ -110,10 +110,10 @@ class ExaminingDriver(Driver):
             self.parameters = VehicleParameters(bytewise=flavour.bytewise)
             for setting in SETTINGS[flavour.name]:
                 self.parameters.read(setting.parameter)
-        send: list[Any] = self.parameters.due(self._system, now_us)
+        send: list[Any] = self.parameters.due(self.system, now_us)
         if self._asked_us is None or now_us - self._asked_us >= _ASK_US:
             self._asked_us = now_us
-            send += [messages.request(self._system, name) for name in _ONCE if name not in self.streams]
+            send += [messages.request(self.system, name) for name in _ONCE if name not in self.streams]
         return events, frames + self._pack(send, now_us, events)
 
     def latest(self, name: str) -> Any:
@@ -128,7 +128,7 @@ class ExaminingDriver(Driver):
             if frame.system != but and (key in self.talkers or len(self.talkers) < _MOST_TALKERS):
                 self.talkers.setdefault(key, Talker()).hear(frame)
 
-    def _hear(self, frame: Received, now_us: int) -> None:
+    def _examine(self, frame: Received, now_us: int) -> None:
         """Take in what one frame of the vehicle says."""
         name, message = frame.name, frame.message
         stream = self.streams.get(name)

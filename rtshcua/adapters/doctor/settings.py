@@ -13,21 +13,13 @@ class Setting(NamedTuple):
     warns: Mapping[float, str]
 
 
-_Words = Mapping[float, str]
-_DATA_LINK: _Words = {
-    0: "nothing",
-    1: "hold",
-    2: "return",
-    3: "land",
-    5: "terminate",
-    6: "lockdown",
-}
+_LOST: Final[Mapping[float, str]] = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "lockdown"}
 _MOTORS_OFF: Final = "the motors stop in the air"
 
 SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
     "px4": (
-        Setting("NAV_DLL_ACT", "when the ground station is lost", _DATA_LINK, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
-        Setting("NAV_RCL_ACT", "when the remote control is lost", _DATA_LINK, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
+        Setting("NAV_DLL_ACT", "when the ground station is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
+        Setting("NAV_RCL_ACT", "when the remote control is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
         Setting(
             "COM_LOW_BAT_ACT", "when the battery is low", {0: "warns only", 2: "land", 3: "return, then land"},
             {0: "the autopilot does nothing of its own about a battery that runs out"},

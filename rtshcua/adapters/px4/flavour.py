@@ -26,18 +26,11 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
             return _climb(command, seen, system)
         case MotionKind.FLY | MotionKind.COVER:
             height, amsl = command.altitude, seen.amsl(command.altitude)
-            return [
-                Stage(
-                    messages.reposition_amsl(system, *place, amsl / 1_000, command.speed),
-                    messages.REPOSITION,
-                    effects.arrived(*place, height),
-                    _HOLD,
-                    powered=True,
-                    target=ExpectedTarget(*place, amsl),
-                    progress=flavour.flying(*place, height),
-                )
-                for place in zip(command.geo[::2], command.geo[1::2], strict=True)
-            ]
+            legs: list[Stage] = []
+            for place in zip(command.geo[::2], command.geo[1::2], strict=True):
+                message = messages.reposition_amsl(system, *place, amsl / 1_000, command.speed)
+                legs.append(flavour.leg(message, messages.REPOSITION, _HOLD, place, height, amsl))
+            return legs
         case MotionKind.HOME:
             return flavour.returning(system, Px4Mode.RETURN)
         case MotionKind.LAND:

@@ -5,13 +5,13 @@ from functools import partial
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
-from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle import messages, observed, preflight
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stages
 from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
-from rtshcua.adapters.vehicle.preflight import HEEDED, Preflight
+from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, StreamRequests
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
@@ -21,22 +21,9 @@ from rtshcua.codec.frames import Received
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.frames import OURS, Gate
-from rtshcua.onboard.ports import (
-    AirState,
-    Command,
-    Crashed,
-    Event,
-    Failed,
-    LinkBack,
-    LinkLost,
-    Noted,
-    Readings,
-    Ready,
-    Said,
-    Sent,
-    TakenOver,
-)
+from rtshcua.onboard.ports import Command, Event, Said
 
 HEARTBEAT_US = 1_000_000
 
@@ -144,8 +131,10 @@ class Driver:
         send += self._ask(now_us)
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
-            events.append(Ready(now_us, self._flown_by_others()))
-        events += self._notes(now_us)
+            events.append(ports.Ready(now_us, self._flown_by_others()))
+        for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
+            events += [ports.Noted(now_us, text) for text in notes]
+            notes.clear()
         send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         return events, self._pack(send, now_us, events)
 
@@ -158,17 +147,16 @@ class Driver:
         if flavour is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
         if self._others is not None:  # also where this was on its way while the takeover showed
-            return [Failed(now_us, command.token, "taken-over", self._others)], []
+            return [ports.Failed(now_us, command.token, "taken-over", self._others)], []
         self.link.begin()
         before = frozenset[int]() if self._manoeuvre is None else self._manoeuvre.modes
         own = self._manoeuvres.get(f"{flavour.name}.{command.skill}")  # else it is flown as any skill of its kind
         way = own or self._manoeuvres.get(flavour.name, flavour.stages)
         try:
             stages = way(command, self.seen, self.system)
-        except NoDatum as error:
-            return [Failed(now_us, command.token, "no-datum", str(error))], []
         except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
-            return [Failed(now_us, command.token, "broken-manoeuvre", str(error))], []
+            slug = "no-datum" if isinstance(error, NoDatum) else "broken-manoeuvre"
+            return [ports.Failed(now_us, command.token, slug, str(error))], []
         self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before)
         self._unsent = command.token
         events: list[Event] = []
@@ -197,7 +185,7 @@ class Driver:
             slack = self._commander.slack
             self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
             self.preflight = Preflight(self._policy, flavour, self.seen, fence=self._fence, slack=slack)
-            self._heeded = {*self.seen.heeded, *HEEDED, "STATUSTEXT"}
+            self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; False if a manoeuvre sees nothing new in it."""
@@ -214,18 +202,17 @@ class Driver:
             return True
         self._streams.heard(name, now_us)
         if name in self._telemetry.intervals:
-            values = self._telemetry.read(
-                name, message, component, partial(self.seen.estimator.vouches_for, name, now_us=now_us)
-            )
+            vouched = partial(self.seen.estimator.vouches_for, name, now_us=now_us)
+            values = self._telemetry.read(name, message, component, vouched)
             if values and at_us is not None:
-                events.append(Readings(at_us, values))
+                events.append(ports.Readings(at_us, values))
         if component != AUTOPILOT or name not in self._heeded:
             return False
         before = self.seen.mode
         self.seen.take(name, message, now_us, at_us)
         crashed = self._crash.look(self.seen, now_us)
         if crashed is not None:
-            events.append(Crashed(now_us, crashed))
+            events.append(ports.Crashed(now_us, crashed))
             self._others = "crashed"
         match name:
             case "HEARTBEAT":
@@ -239,7 +226,7 @@ class Driver:
         air = (self.seen.armed, self.seen.airborne)
         if air != self._was_air and self.seen.landed_state:
             self._was_air = air
-            events.append(AirState(now_us, *air))
+            events.append(ports.AirState(now_us, *air))
         return True
 
     def _acknowledge(self, frame: Received, now_us: int) -> None:
@@ -267,14 +254,7 @@ class Driver:
             return
         if before not in (None, mode) and (before, mode) not in flavour.natural:
             self._others = flavour.mode_name(mode)
-            events.append(TakenOver(now_us, self._others))
-
-    def _notes(self, now_us: int) -> list[Event]:
-        events: list[Event] = []
-        for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
-            events += [Noted(now_us, text) for text in notes]
-            notes.clear()
-        return events
+            events.append(ports.TakenOver(now_us, self._others))
 
     def _look(self, now_us: int, events: list[Event]) -> None:
         """Whether the link is up, and how long it was so far. One that is heard and does not hear us may still be sent
@@ -287,10 +267,12 @@ class Driver:
             return
         if SILENT in (was, down):
             self._streams.interrupted()
-            events.append(LinkBack(now_us) if was == SILENT else LinkLost(now_us, SILENT, self._watch.heard_us or 0))
+            events.append(
+                ports.LinkBack(now_us) if was == SILENT else ports.LinkLost(now_us, SILENT, self._watch.heard_us or 0)
+            )
         if UNANSWERED in (was, down):
             says = "it is heard, but answers nothing" if down == UNANSWERED else "it answers again"
-            events.append(Noted(now_us, says))
+            events.append(ports.Noted(now_us, says))
 
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
         """Go on with the manoeuvre; where a frame of it waits for the mode, ask at once."""
@@ -306,7 +288,7 @@ class Driver:
         send += out
         events += happened
         for event in happened:
-            if isinstance(event, TakenOver):
+            if isinstance(event, ports.TakenOver):
                 self._others = event.how
         if manoeuvre.waits:
             send += self._ask(now_us)
@@ -324,7 +306,7 @@ class Driver:
     def _fail(self, reason: str, text: str, now_us: int, events: list[Event]) -> None:
         if self._manoeuvre is not None and not self._manoeuvre.over:
             self._manoeuvre.over = True
-            events.append(Failed(now_us, self._manoeuvre.token, reason, text))
+            events.append(ports.Failed(now_us, self._manoeuvre.token, reason, text))
 
     def _flown_by_others(self) -> str:
         """How it flies already, if nothing of ours would make it; what lands is left to it."""
@@ -346,6 +328,6 @@ class Driver:
         if refused:
             self._fail(refused[0].slug, "", now_us, events)
         elif moving and self._unsent is not None:
-            events.append(Sent(now_us, self._unsent))
+            events.append(ports.Sent(now_us, self._unsent))
             self._unsent = None
         return frames

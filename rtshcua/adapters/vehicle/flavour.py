@@ -145,9 +145,16 @@ def climbing(height: int) -> ExpectedProgress:
     return ExpectedProgress(effects.up_to(height), 10_000_000)
 
 
-def flying(latitude: int, longitude: int, height: int) -> ExpectedProgress:
-    """A leg gets a metre nearer to its end."""
-    return ExpectedProgress(effects.to_place(latitude, longitude, height), 8_000_000)
+def leg(
+    message: Message, command: int | None, modes: frozenset[int], place: tuple[int, int], height: int, amsl: int | None,
+    repeat_us: int = 0,
+) -> Stage:  # fmt: skip
+    """To a place (1e-7 degree) at a height above home, in a straight line: it gets a metre nearer in good time."""
+    nearer = ExpectedProgress(effects.to_place(*place, height), 8_000_000)
+    return Stage(
+        message, command, effects.arrived(*place, height), modes, repeat_us=repeat_us, powered=True,
+        target=ExpectedTarget(*place, amsl), progress=nearer,
+    )  # fmt: skip
 
 
 def returning(system: int, mode: Px4Mode | CopterMode) -> list[Stage]:

@@ -69,13 +69,11 @@ class VehicleLink:
             is_autopilot = frame.component == AUTOPILOT and frame.name == "HEARTBEAT"
             if not is_autopilot or frame.message.autopilot == NO_AUTOPILOT:
                 continue
-            if frame.system == self._system:
-                self.crowd = f"two vehicles speak here as system {self._system}: give each an id of its own"
+            ours, theirs = self._system, frame.system
+            if theirs == ours:
+                self.crowd = f"two vehicles speak here as system {ours}: give each an id of its own"
             elif not self._named and self.crowd is None:
-                self.crowd = (
-                    f"two vehicles speak here, systems {self._system} and {frame.system}: `--system` says which one "
-                    "is meant"
-                )
+                self.crowd = f"two vehicles speak here, systems {ours} and {theirs}: `--system` says which one is meant"
 
     def parse(self, datagram: bytes, now_us: int) -> list[Received]:
         """The good frames in a datagram, in order; never raises, whatever the bytes."""

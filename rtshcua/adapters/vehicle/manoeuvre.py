@@ -25,15 +25,9 @@ LATE_US = 5_000_000
 _ACCEPTED, _IN_PROGRESS = 0, 5
 #: MAV_RESULT as slugs
 RESULTS = {
-    1: "temporarily",
-    2: "denied",
-    3: "unsupported",
-    4: "failed",
-    6: "cancelled",
-    7: "only-as-command-long",
-    8: "only-as-command-int",
-    9: "unsupported-frame",
-}
+    1: "temporarily", 2: "denied", 3: "unsupported", 4: "failed", 6: "cancelled", 7: "only-as-command-long",
+    8: "only-as-command-int", 9: "unsupported-frame",
+}  # fmt: skip
 
 
 class Commander:
@@ -65,8 +59,7 @@ class Commander:
             return []
         self._doubtful = False
         if stage.command is not None:
-            last_us = self._last_us.get(stage.command)
-            self._doubtful = last_us is not None and now_us - last_us < LATE_US
+            self._doubtful = now_us - self._last_us.get(stage.command, -LATE_US) < LATE_US
             self._last_us[stage.command] = now_us
         return [stage.message]
 
@@ -202,12 +195,7 @@ class Manoeuvre:
     """
 
     def __init__(
-        self,
-        command: Command,
-        aids: Aids,
-        seen: ObservedVehicle,
-        stages: list[Stage],
-        before: frozenset[int],
+        self, command: Command, aids: Aids, seen: ObservedVehicle, stages: list[Stage], before: frozenset[int]
     ) -> None:
         self._command = command
         self.token = command.token

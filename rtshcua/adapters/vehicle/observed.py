@@ -107,7 +107,8 @@ _FIX_3D = 3
 _CRITICAL = (5, 6)  # MAV_STATE: CRITICAL, EMERGENCY
 _DEBUG = 7  # MAV_SEVERITY
 _ABOVE_SEA = (enums.MAV_FRAME_GLOBAL, enums.MAV_FRAME_GLOBAL_INT)
-_HEEDED = (
+#: the messages that `ObservedVehicle.take` looks at, beside the report of the estimator
+HEEDED: Final = (
     "HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "POSITION_TARGET_GLOBAL_INT", "GPS_RAW_INT", "SYS_STATUS",
     "ATTITUDE",
 )  # fmt: skip
@@ -116,19 +117,10 @@ _PREARM: Final = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
 
 #: MAV_SYS_STATUS_SENSOR, as far as arming rests on them
 _SENSORS: Final = {
-    0x01: "gyroscope",
-    0x02: "accelerometer",
-    0x04: "magnetometer",
-    0x08: "barometer",
-    0x20: "GPS",
-    0x8000: "motor outputs",
-    0x1_0000: "remote control",
-    0x10_0000: "geofence",
-    0x20_0000: "attitude and heading",
-    0x100_0000: "logging",
-    0x200_0000: "battery",
-    0x4000_0000: "propulsion",
-}
+    0x01: "gyroscope", 0x02: "accelerometer", 0x04: "magnetometer", 0x08: "barometer", 0x20: "GPS",
+    0x8000: "motor outputs", 0x1_0000: "remote control", 0x10_0000: "geofence", 0x20_0000: "attitude and heading",
+    0x100_0000: "logging", 0x200_0000: "battery", 0x4000_0000: "propulsion",
+}  # fmt: skip
 
 
 Reported = tuple[int, int, int]
@@ -177,11 +169,6 @@ class ObservedVehicle:
     text: str = ""
     text_severity: int = _DEBUG
     prearm_text: str = ""
-
-    @property
-    def heeded(self) -> tuple[str, ...]:
-        """The messages that `take` looks at."""
-        return (*_HEEDED, self.estimator.report)
 
     def take(self, name: str, message: Any, now_us: int, at_us: int | None) -> None:
         """Take in one message of the autopilot's component that was made at `at_us` (None: nobody knows), but for one

@@ -114,10 +114,10 @@ class Preflight:
         height = quantise(self._parameters.values[found.parameter], found.mm, 1)
         if height is not None and abs(height - self._wanted_mm) <= SAME_MM:
             return None
-        has = "no number" if height is None else f"{_metres(height)} m"
+        has = "no number" if height is None else f"{height / 1_000:g} m"
         should = quantise(self._wanted_mm, 1, found.mm)
         return (
-            f"it returns at {has} (`{found.parameter}`), and the policy says {_metres(self._wanted_mm)} m: set "
+            f"it returns at {has} (`{found.parameter}`), and the policy says {self._wanted_mm / 1_000:g} m: set "
             f"`{found.parameter}` to {should}, or change `return at`"
         )
 
@@ -125,7 +125,3 @@ class Preflight:
 def distance_from_home(projection: Projection, latitude: int, longitude: int) -> int:
     """Distance in mm of a place (1e-7 degree) from the declared home."""
     return hypot_mm(*project(projection, latitude, longitude))
-
-
-def _metres(mm: int) -> str:
-    return f"{mm / 1_000:g}"

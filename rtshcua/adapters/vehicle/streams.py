@@ -114,12 +114,14 @@ class StreamRequests:
 
     def _measure(self, now_us: int) -> None:
         """Once every request was answered: compare what came since with what was asked for."""
-        if self._measured_us is None:
-            self._begin_measuring(now_us)
+        since_us = self._measured_us
+        if since_us is not None and now_us - since_us < MEASURE_US:
             return
-        passed_us = now_us - self._measured_us
-        if passed_us < MEASURE_US:
-            return
+        if since_us is not None:
+            self._compare(now_us - since_us)
+        self._measured_us, self._counts = now_us, dict.fromkeys(self._wanted, 0)
+
+    def _compare(self, passed_us: int) -> None:
         for name, asked_us in self._wanted.items():
             count = self._counts[name]
             if name in self._refused or not count:
@@ -133,11 +135,6 @@ class StreamRequests:
                 self.notes.append(f"{name} comes every {came_us // 1_000} ms, asked for every {asked_us // 1_000} ms")
             else:
                 self.notes.append(f"{name} comes as often as asked for again")
-        self._begin_measuring(now_us)
-
-    def _begin_measuring(self, now_us: int) -> None:
-        self._measured_us = now_us
-        self._counts = dict.fromkeys(self._wanted, 0)
 
     def _is_quiet(self, name: str, now_us: int) -> bool:
         last_us = max(self._heard_us.get(name, 0), self._since_us or 0)

@@ -43,12 +43,9 @@ class StageProgress:
         if self._has_come_further(self._best, left):
             self._best, self._since_us, self.shown = left, seen.up_us, True
             return False
-        if (
-            not self.shown
-            and self._has_come_further(left, self._best)
-            and seen.up_us - (self._began_us or 0) <= self._expected.within_us
-        ):
-            self._best, self._since_us = left, seen.up_us  # at first it may have to turn round
+        at_first = not self.shown and seen.up_us - (self._began_us or 0) <= self._expected.within_us
+        if at_first and self._has_come_further(left, self._best):
+            self._best, self._since_us = left, seen.up_us  # it may have to turn round
         return seen.up_us - self._since_us > self._expected.within_us
 
     def _has_come_further(self, best: tuple[int, ...], left: tuple[int, ...]) -> bool:

@@ -15,7 +15,9 @@ FAST_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class BootPlan:
-    """When what is there, in seconds from the start, as recorded; a text is (time, severity, text); `{amsl}` is home's height."""
+    """When what is there, in seconds from the start, as recorded. A text is (time, severity, text), and `{amsl}` in it
+    home's height.
+    """
 
     answers_s: float
     """Sensors answer: SYS_STATUS, and a position if only of zeros."""

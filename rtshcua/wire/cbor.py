@@ -3,21 +3,16 @@
 Values are 64-bit integers, byte and text strings, booleans, null, arrays, and maps with text or integer keys; there are
 no floats, tags, indefinite lengths or other simple values. Map keys are in the bytewise order of their encodings (the
 canonical mode of cbor2 sorts by length first, the older rule of RFC 7049, and its encoder is slower than this one).
+The encoder is here, the decoder in `cbor_strict`.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import Final, cast
 
-import cbor2
-
-from rtshcua.wire.cbor_strict import MAX_DEPTH, CborError, Value, head, parse
+from rtshcua.wire.cbor_strict import LIMIT, MAX_DEPTH, CborError, Value, decode
 
 __all__ = ["LIMIT", "MAX_DEPTH", "CborError", "Value", "decode", "encode"]
-
-#: the most bytes that `decode` takes unless told otherwise
-LIMIT: Final = 16 << 20
 
 _WITH_2 = Struct(">BH").pack
 _WITH_4 = Struct(">BI").pack
@@ -30,21 +25,6 @@ def encode(value: object) -> bytes:
     Types are taken exactly: an `IntEnum` or a `bytearray` is refused, so that equal bytes mean equal values.
     """
     return _item(value, 0)
-
-
-def decode(data: bytes, *, limit: int = LIMIT) -> Value:
-    """The value of `data`, provided that `encode(value) == data`; else raises `CborError`. Arrays become tuples."""
-    if len(data) > limit:
-        raise CborError(f"longer than the limit of {limit} bytes", limit)
-    if _is_plain(data):
-        try:
-            # The wrapper, an array of indefinite length, shows whether the data is exactly one item.
-            items = cbor2.loads(b"\x9f" + data + b"\xff", max_depth=MAX_DEPTH, immutable=True)
-        except cbor2.CBORDecodeError:
-            items = ()
-        if len(items) == 1:
-            return items[0]  # type: ignore[no-any-return]
-    return parse(data)
 
 
 def _head(major: int, argument: int) -> bytes:
@@ -135,37 +115,3 @@ def _utf8(text: str) -> bytes:
         return text.encode()
     except UnicodeEncodeError:
         raise CborError("text is not Unicode scalar values") from None
-
-
-# Everything but maps, tags, floats and text, each head in its shortest form and each integer within 64 bits: what cbor2
-# reads as the strict decoder does. Strings of other lengths than 32 are stepped over by `_is_plain`.
-_PLAIN: Final = re.compile(
-    rb"""(?sx)(?:
-      [\x00-\x17\x20-\x37\x80-\x97\xf4-\xf6]            # small integers, short arrays, false, true, null
-    | [\x1a\x3a\x9a] (?!\0\0) .{4}
-    | [\x19\x39\x99] [^\0] .
-    | [\x18\x38\x98] [\x18-\xff]
-    | [\x1b\x3b] (?!\0\0\0\0) [\0-\x7f] .{7}
-    | \x58\x20 .{32}                                    # a digest or a public key
-    )*+"""
-)
-
-
-def _is_plain(data: bytes) -> bool:
-    """Whether every head in `data`, read as a row of items, is one that cbor2 may be trusted with."""
-    at = 0
-    while True:
-        run = _PLAIN.match(data, at)
-        assert run is not None, "no items are a run too"
-        at = run.end()
-        if at == len(data):
-            return True
-        if data[at] >> 5 not in (2, 3):
-            return False
-        try:
-            _, length, start = head(data, at)
-        except CborError:
-            return False
-        at = start + length
-        if at > len(data):
-            return False

@@ -1,7 +1,7 @@
 """The strict decoder: it accepts only the bytes that our encoder would have made (RFC 8949, section 4.2.1).
 
-This is the definition, written to be read, and to say where and why bytes are refused. `cbor.decode` takes a faster way
-for the common case and must agree with it.
+It is the only decoder, written to be read, and to say where and why bytes are refused. A second implementation must agree
+with it in every refusal: reason and place.
 """
 
 from typing import Final, TypeAlias
@@ -12,9 +12,14 @@ Value: TypeAlias = "bool | int | bytes | str | tuple[Value, ...] | dict[str | in
 #: how deep arrays and maps may nest
 MAX_DEPTH: Final = 32
 
+#: the most bytes that `decode` takes unless told otherwise
+LIMIT: Final = 16 << 20
+
 #: the least argument that needs 1, 2, 4 or 8 bytes after the initial byte
 _LEAST: Final = (24, 1 << 8, 1 << 16, 1 << 32)
 _INT64_MAX: Final = (1 << 63) - 1
+#: the integers that are their own head: most of what a bundle holds
+_SMALL: Final = {bytes([n]): n for n in range(24)} | {bytes([0x20 | n]): ~n for n in range(24)}
 _SIMPLE: Final[dict[int, bool | None]] = {0xF4: False, 0xF5: True, 0xF6: None}
 
 
@@ -27,8 +32,10 @@ class CborError(ValueError):
         self.offset = offset
 
 
-def parse(data: bytes) -> Value:
-    """The one item that `data` holds. Raises `CborError`."""
+def decode(data: bytes, *, limit: int = LIMIT) -> Value:
+    """The value of `data`, provided that `encode(value) == data`; else raises `CborError`. Arrays become tuples."""
+    if len(data) > limit:
+        raise CborError(f"longer than the limit of {limit} bytes", limit)
     value, end = _item(data, 0, 0)
     if end != len(data):
         raise CborError("bytes left over after the item", end)
@@ -99,9 +106,13 @@ def _text(data: bytes, at: int, start: int, length: int) -> str:
 
 def _array(data: bytes, at: int, start: int, count: int, depth: int) -> tuple[tuple[Value, ...], int]:
     _room(data, at, start, count, depth)
-    items = []
+    items: list[Value] = []
     for _ in range(count):
-        value, start = _item(data, start, depth)
+        value: Value = _SMALL.get(data[start : start + 1])
+        if value is None:
+            value, start = _item(data, start, depth)
+        else:
+            start += 1
         items.append(value)
     return tuple(items), start
 

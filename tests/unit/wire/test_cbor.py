@@ -9,7 +9,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rtshcua.wire import cbor
-from rtshcua.wire.cbor_strict import parse
 
 INT64 = st.integers(-(1 << 63), (1 << 63) - 1) | st.integers(-300, 300) | st.integers(-70_000, 70_000)
 TEXT = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)
@@ -110,7 +109,6 @@ EXAMPLES = [
 def test_examples(value, encoded):
     assert cbor.encode(value).hex() == encoded
     assert cbor.decode(bytes.fromhex(encoded)) == value
-    assert parse(bytes.fromhex(encoded)) == value
 
 
 @settings(max_examples=settings().max_examples * 2)
@@ -119,7 +117,6 @@ def test_bytes_are_those_of_the_naive_encoder_and_come_back(value):
     data = cbor.encode(value)
     assert data == naive(value)
     assert cbor.decode(data) == value
-    assert parse(data) == value
     assert cbor2.loads(data, immutable=True) == value
 
 
@@ -148,7 +145,7 @@ def test_arbitrary_bytes_are_canonical_or_refused(data):
 
 @settings(max_examples=settings().max_examples * 2)
 @given(VALUES | FLAT, st.data())
-def test_the_fast_decoder_agrees_with_the_strict_one_on_damaged_bytes(value, data):
+def test_damaged_bytes_are_canonical_or_refused(value, data):
     encoded = bytearray(cbor.encode(value))
     for _ in range(data.draw(st.integers(0, 2))):
         at = data.draw(st.integers(0, len(encoded) - 1))
@@ -162,8 +159,9 @@ def test_the_fast_decoder_agrees_with_the_strict_one_on_damaged_bytes(value, dat
             case _:
                 encoded[at : at + 1] = bytes([encoded[at] & 0xE0 | 24, encoded[at] & 0x1F])
     found = outcome(cbor.decode, bytes(encoded))
-    assert found == outcome(parse, bytes(encoded))
-    if not isinstance(found[1], int):
+    if isinstance(found[1], int):
+        assert 0 <= found[1] <= len(encoded)
+    else:
         assert cbor.encode(found[0]) == encoded
 
 

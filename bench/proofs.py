@@ -23,7 +23,7 @@ from rtshcua.evidence.merkle_proofs import verify_consistency, verify_inclusion
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.proofs.make import prove_inclusion
-from rtshcua.evidence.stored_tree import StoredTree
+from rtshcua.evidence.merkle_proofs import StoredTree
 
 SIZE = 65_536
 LIMIT_US = 30.0

@@ -47,16 +47,26 @@ class Tree:
         if len(leaves) == self.TILE:
             self._fold()
 
+    def graft(self, height: int, node: bytes) -> None:
+        """Adds a perfect subtree of 2**height leaves by its root; `size` is a multiple of that."""
+        self._fold()
+        self._join(self.size >> height, node)
+        self.size += 1 << height
+
     def _fold(self) -> None:
-        perfect, number = self._perfect, self.size - len(self._leaves)
-        for node in self._leaves:
-            bits = number
-            while bits & 1:
-                node = node_hash(perfect.pop(), node)
-                bits >>= 1
-            perfect.append(node)
-            number += 1
+        for number, leaf in enumerate(self._leaves, self.size - len(self._leaves)):
+            self._join(number, leaf)
         self._leaves.clear()
+
+    def _join(self, bits: int, node: bytes) -> None:
+        """Puts a node behind the perfect subtrees, with those of its size that stand before it joined to it: as many as
+        `bits`, the number of such nodes before it, ends in ones.
+        """
+        perfect = self._perfect
+        while bits & 1:
+            node = node_hash(perfect.pop(), node)
+            bits >>= 1
+        perfect.append(node)
 
     def root(self) -> bytes:
         """The root hash MTH(D[n]) of the leaves so far."""

@@ -7,10 +7,9 @@ from itertools import pairwise
 from reference import independent_verifier
 from rtshcua.adapters.files.logs import lines
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.quick import outline, quick
+from rtshcua.evidence.quick import outline, quick, scan
 from rtshcua.evidence.records import Genesis
 from rtshcua.evidence.report import Verdict
-from rtshcua.evidence.segments import scan
 from rtshcua.ground.auditor.audit import Audit, Auditor, anchors_of
 from rtshcua.ground.auditor.trust import Basis, establish
 from rtshcua.wire.keys import Duty

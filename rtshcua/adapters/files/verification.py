@@ -13,9 +13,8 @@ from typing import BinaryIO, Final, NamedTuple
 from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.quick import Outline, outline, quick
+from rtshcua.evidence.quick import LONGEST_SEGMENT, Octets, Outline, Part, outline, quick, scan
 from rtshcua.evidence.records import AnyRecord
-from rtshcua.evidence.segments import LONGEST_SEGMENT, Octets, Part, scan
 from rtshcua.ground.auditor.audit import Audit, Auditor, anchors_of, trusted
 from rtshcua.ground.auditor.frames import Frames
 from rtshcua.ground.auditor.trust import establish

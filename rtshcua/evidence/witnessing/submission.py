@@ -7,8 +7,8 @@ from typing import Final
 import msgspec
 
 from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.merkle_proofs import StoredTree
 from rtshcua.evidence.note import split
-from rtshcua.evidence.stored_tree import StoredTree
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
 from rtshcua.evidence.witnessing.witness import Request
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rtshcua.evidence.merkle import EMPTY, root_of
 from rtshcua.evidence.merkle_proofs import (
+    StoredTree,
     consistency_ranges,
     inclusion_ranges,
     proof_of,
@@ -16,7 +17,6 @@ from rtshcua.evidence.merkle_proofs import (
     verify_consistency,
     verify_inclusion,
 )
-from rtshcua.evidence.stored_tree import StoredTree
 
 LEAVES = [sha256(b"\0%d" % number).digest() for number in range(70)]
 MOST = 40

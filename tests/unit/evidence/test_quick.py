@@ -10,11 +10,11 @@ from hypothesis import strategies as some
 
 from reference.resealing import leaf_of, line_of, resealed, root_of
 from reference.witnessed import LOG_KEY, ORIGIN, PUBLIC, WITNESSES, Judge, Log
-from rtshcua.evidence import segments
+from rtshcua.evidence import quick as quick_verification
 from rtshcua.evidence.epochs import EpochKey
-from rtshcua.evidence.quick import Outline, outline, quick
+from rtshcua.evidence.merkle import Tree
+from rtshcua.evidence.quick import Outline, Part, _nodes, outline, quick, scan, signed_line
 from rtshcua.evidence.report import Report, Verdict
-from rtshcua.evidence.segments import Part, Peaks, _nodes, scan, signed_line
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 
@@ -176,7 +176,7 @@ def test_an_epoch_that_was_sealed_too_late(monkeypatch: pytest.MonkeyPatch) -> N
     assert quickly(log.lines) is None
     many = logged(9)
     assert quickly(many.lines) is not None
-    monkeypatch.setattr(segments, "MOST_RECORDS", 8)
+    monkeypatch.setattr(quick_verification, "MOST_RECORDS", 8)
     assert quickly(many.lines) is None
 
 
@@ -311,13 +311,13 @@ def test_a_walk_that_ends_without_a_close(log: Log) -> None:
 @given(sizes=some.lists(some.integers(1, 70), min_size=1, max_size=12))
 def test_a_tree_put_together_from_segments(sizes: list[int]) -> None:
     leaves = [bytes([number % 256]) * 32 for number in range(sum(sizes))]
-    peaks, first = Peaks(), 0
+    tree, first = Tree(), 0
     for size in sizes:
         for height, node in _nodes(leaves[first : first + size], first):
-            peaks.push(height, node)
+            tree.graft(height, node)
         first += size
-        assert peaks.size == first
-        assert peaks.root() == root_of(leaves[:first])
+        assert tree.size == first
+        assert tree.root() == root_of(leaves[:first])
 
 
 def test_a_log_that_is_anchored_to_its_end(log: Log) -> None:

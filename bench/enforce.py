@@ -26,7 +26,7 @@ from rtshcua.onboard.ports import Append, Dispatch
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import RemainingLatency
 from rtshcua.onboard.runtime.journal import Journal
-from rtshcua.wire.duty import Duty
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.request import Ref
 
 LIMIT_US, PUBLISHED_US = 100.0, 318.0

@@ -19,11 +19,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference.sealed_log import PIN, SECRET, sealed_log
 from rtshcua.evidence.merkle import leaf_hash
-from rtshcua.evidence.merkle_proofs import verify_consistency, verify_inclusion
+from rtshcua.evidence.merkle_proofs import StoredTree, verify_consistency, verify_inclusion
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.proofs.make import prove_inclusion
-from rtshcua.evidence.merkle_proofs import StoredTree
 
 SIZE = 65_536
 LIMIT_US = 30.0

@@ -5,6 +5,7 @@ The format is specified in docs/log-format.md.
 
 from base64 import b64encode
 from collections.abc import Callable
+from typing import Any
 from urllib.parse import quote
 
 from rtshcua.evidence.answer import RecordedAnswer
@@ -208,66 +209,51 @@ class Recorder:
 
     def seal(self, now: Now) -> bytes:
         """The end of an epoch: signed by its key, which is then dropped; it names the next one."""
-        head, key, last = self._head, EpochKey(self._draw()), self._epoch_key()
-        seal = Seal(
-            prev=head.prev,
-            at_us=now.monotonic_us,
-            bytes=head.octets,
-            checkpoint=None,
-            digest=head.digest(),
-            epoch=head.epoch,
-            next_key=key.public.hex(),
-            records=head.records,
-            seq=head.seq,
-            type="seal",
-            utc_error_us=now.utc_error_us,
-            utc_us=now.utc_us,
-        )
+        key, last = EpochKey(self._draw()), self._epoch_key()
+        seal = Seal(**self._segment(now), next_key=key.public.hex(), type="seal")
         self._key, self._signed_us = key, now.monotonic_us
-        return head.seal(seal, self._origin, last.public, last.sign)
+        return self._head.seal(seal, self._origin, last.public, last.sign)
 
     def recover(self, now: Now, *, discarded_bytes: int, discarded_digest: bytes) -> bytes:
         """The first line after a crash, signed by the log key; monotonic time begins anew."""
-        head, key = self._head, EpochKey(self._draw())
+        key = EpochKey(self._draw())
         recover = Recover(
-            prev=head.prev,
-            at_us=now.monotonic_us,
-            bytes=head.octets,
-            checkpoint=None,
-            digest=head.digest(),
+            **self._segment(now),
             discarded_bytes=discarded_bytes,
             discarded_digest=discarded_digest.hex(),
-            epoch=head.epoch,
             next_key=key.public.hex(),
-            records=head.records,
-            seq=head.seq,
             type="recover",
-            utc_error_us=now.utc_error_us,
-            utc_us=now.utc_us,
         )
         return self._certified(recover, key)
 
     def close(self, now: Now, *, ending: str, tlog: bytes | None, disclosure: bytes | None = None) -> bytes:
         """The last line. `tlog` is the SHA-256 of the telemetry log, `disclosure` the root of the disclosure tree."""
-        head, last = self._head, self._epoch_key()
+        last = self._epoch_key()
         close = Close(
-            prev=head.prev,
-            at_us=now.monotonic_us,
-            bytes=head.octets,
-            checkpoint=None,
-            digest=head.digest(),
+            **self._segment(now),
             disclosure=None if disclosure is None else disclosure.hex(),
             ending=ending,
-            epoch=head.epoch,
-            records=head.records,
-            seq=head.seq,
             tlog=None if tlog is None else tlog.hex(),
             type="close",
-            utc_error_us=now.utc_error_us,
-            utc_us=now.utc_us,
         )
         self._key = None
-        return head.seal(close, self._origin, last.public, last.sign)
+        return self._head.seal(close, self._origin, last.public, last.sign)
+
+    def _segment(self, now: Now) -> dict[str, Any]:
+        """What every record that ends a segment says of it, and of the moment."""
+        head = self._head
+        return {
+            "prev": head.prev,
+            "at_us": now.monotonic_us,
+            "bytes": head.octets,
+            "checkpoint": None,
+            "digest": head.digest(),
+            "epoch": head.epoch,
+            "records": head.records,
+            "seq": head.seq,
+            "utc_error_us": now.utc_error_us,
+            "utc_us": now.utc_us,
+        }
 
     def _epoch_key(self) -> EpochKey:
         assert self._key is not None, "no epoch has begun, or the log is closed"

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from rtshcua.evidence.merkle import LEAF, Tree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, sign
-from rtshcua.evidence.records import Close, Record, Signed, encode, unsigned
+from rtshcua.evidence.records import Record, Signed, encode, next_key_of, unsigned
 
 START = "0" * 64  # the genesis has no line before it
 
@@ -98,5 +98,5 @@ class Head:
 
 def checkpoint_of(record: Signed, origin: str, head: Head) -> Checkpoint:
     """What the checkpoint of a signed record must say where the log stands at `head`."""
-    key = None if isinstance(record, Close) else bytes.fromhex(record.next_key)
-    return Checkpoint(origin, head.seq, head.tree.root(), leaf_hash(encode(unsigned(record))), key, head.after)
+    own = leaf_hash(encode(unsigned(record)))
+    return Checkpoint(origin, head.seq, head.tree.root(), own, next_key_of(record), head.after)

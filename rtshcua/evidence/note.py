@@ -9,10 +9,8 @@ from collections.abc import Callable
 from hashlib import sha256
 from typing import Final, NamedTuple
 
-from cryptography.exceptions import InvalidSignature
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
 from rtshcua.evidence.finding import Flaw
+from rtshcua.wire.keys import verified
 
 ED25519: Final = b"\x01"
 MARK: Final = "\u2014 "  # an em dash opens a signature line
@@ -40,9 +38,9 @@ class Checkpoint(NamedTuple):
 
     def text(self) -> str:
         """The text that is signed."""
-        key = "" if self.key is None else f"{_KEY}{_base64(self.key)}\n"
-        after = "" if self.after is None else f"{_AFTER}{_base64(self.after)}\n"
-        return f"{self.origin}\n{self.size}\n{_base64(self.root)}\n{_RECORD}{_base64(self.record)}\n{key}{after}"
+        key = "" if self.key is None else f"{_KEY}{base64(self.key)}\n"
+        after = "" if self.after is None else f"{_AFTER}{base64(self.after)}\n"
+        return f"{self.origin}\n{self.size}\n{base64(self.root)}\n{_RECORD}{base64(self.record)}\n{key}{after}"
 
     def digest(self) -> bytes:
         """SHA-256 of the text: what the next checkpoint names."""
@@ -56,7 +54,7 @@ def key_id(name: str, public: bytes, kind: bytes = ED25519) -> bytes:
 
 def signature_line(name: str, signature: bytes) -> str:
     """The line of a signature, its key id in front."""
-    return f"{MARK}{name} {_base64(signature)}\n"
+    return f"{MARK}{name} {base64(signature)}\n"
 
 
 def sign(checkpoint: Checkpoint, public: bytes, signer: Callable[[bytes], bytes]) -> str:
@@ -94,18 +92,9 @@ def open_note(note: str, origin: str, public: bytes) -> Checkpoint | Flaw:
         return Flaw("note/malformed", "the checkpoint does not end with one Ed25519 signature line")
     if name != origin or signature[:ID_BYTES] != key_id(origin, public):
         return Flaw("note/key", "the checkpoint is signed by another key, or in another name", name, origin)
-    if not valid(public, signature[ID_BYTES:], text.encode()):
+    if not verified(public, signature[ID_BYTES:], text.encode()):
         return Flaw("note/signature", "the key that should have did not sign this checkpoint")
     return parse(text)
-
-
-def valid(public: bytes, signature: bytes, data: bytes) -> bool:
-    """Whether the key of `public` (32 bytes) signed `data`; one with s >= L is refused (RFC 8032, section 5.1.7)."""
-    try:
-        Ed25519PublicKey.from_public_bytes(public).verify(signature, data)
-    except InvalidSignature:
-        return False
-    return True
 
 
 def parse(text: str) -> Checkpoint | Flaw:
@@ -125,14 +114,20 @@ def _extension(lines: list[str], name: str) -> bytes | None:
     return next((strict_base64(line.removeprefix(name)) for line in lines if line.startswith(name)), None)
 
 
-def strict_base64(text: str) -> bytes:
-    """The bytes of canonical base64, none for what is not: unused bits could be changed unseen."""
+def octets(text: str) -> bytes | None:
+    """The bytes of canonical base64, None for what is not: what a lenient reader ignores could be changed unseen."""
     try:
         data = b64decode(text, validate=True)
     except ValueError:
-        return b""
-    return data if _base64(data) == text else b""
+        return None
+    return data if base64(data) == text else None
 
 
-def _base64(data: bytes) -> str:
+def strict_base64(text: str) -> bytes:
+    """As `octets`, but no bytes for what is not canonical base64."""
+    return octets(text) or b""
+
+
+def base64(data: bytes) -> str:
+    """The base64 of bytes."""
     return b64encode(data).decode()

@@ -21,6 +21,20 @@ from rtshcua.model.outcome import Outcome
 
 #: the longest line in bytes; a genesis carries a whole bundle
 LONGEST = 1 << 26
+#: bytes of a line that a finding quotes
+SHOWN = 80
+
+
+def too_long(line: bytes) -> Flaw | None:
+    """Whether a line is longer than any record, which is said before it is read."""
+    if len(line) <= LONGEST:
+        return None
+    return Flaw("record/too-long", "the line is too long for a record", f"{len(line)} bytes", f"{LONGEST} bytes")
+
+
+def shown(line: bytes) -> str:
+    """The beginning of a line, as a finding quotes it."""
+    return line[:SHOWN].decode("utf-8", "backslashreplace")
 
 
 def may_be_torn(line: bytes, prev: str) -> bool:

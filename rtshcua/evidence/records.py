@@ -242,3 +242,8 @@ def is_signed(line: bytes) -> bool:
 def unsigned(record: Signed) -> Signed:
     """A signed record as its checkpoint vouches for it: without that checkpoint."""
     return msgspec.structs.replace(record, checkpoint=None)
+
+
+def next_key_of(record: Signed) -> bytes | None:
+    """The key that signs what follows a signed record, 32 bytes; None behind a close."""
+    return None if isinstance(record, Close) else bytes.fromhex(record.next_key)

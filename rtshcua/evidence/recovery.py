@@ -19,15 +19,13 @@ from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.heads import Head
-from rtshcua.evidence.reading import LONGEST, read
+from rtshcua.evidence.reading import read, shown, too_long
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal, is_signed
-from rtshcua.evidence.seals import Seals, Segment
+from rtshcua.evidence.seals import Seals
 from rtshcua.model.flat.situation import Now
 
 #: the ending that the close of a recovered log names
 RECOVERED = "recovered"
-
-_SHOWN = 80  # bytes of a line that a finding quotes
 
 
 class State(Enum):
@@ -114,7 +112,7 @@ class Examination:
     def _check(self, record: AnyRecord, line: bytes) -> Flaw | None:
         head = self.head
         if self._closed:
-            return Flaw("close/junk-after", "there is something after the signed close", _shown(line))
+            return Flaw("close/junk-after", "there is something after the signed close", shown(line))
         if isinstance(record, Genesis) != (head.seq == 0):
             slug = "genesis/repeated" if head.seq else "genesis/missing"
             return Flaw(slug, "a log has one genesis, and begins with it", record.type)
@@ -135,12 +133,9 @@ class Examination:
                 return Flaw("seal/missing", "its epoch should have been sealed before")
             head.take(line)
             return None
-        segment = Segment(head.records, head.octets, head.digest(), head.tree.root())
-        flaw = self._seals.check(record, segment)
+        flaw = self._seals.follow(record, line, head)
         if flaw is not None:
             return flaw
-        assert self._seals.checkpoint is not None, "it was checked"
-        head.begin(line, self._seals.checkpoint.digest())
         self._sealed, self._sealed_us = head.seq, record.at_us
         self._closed = isinstance(record, Close)
         if isinstance(record, Genesis):
@@ -195,12 +190,9 @@ def ending(
 
 
 def _read(line: bytes) -> AnyRecord | Flaw:
-    if len(line) > LONGEST:
-        return Flaw("record/too-long", "the line is too long for a record", f"{len(line)} bytes", f"{LONGEST} bytes")
+    flaw = too_long(line)
+    if flaw is not None:
+        return flaw
     if not line.endswith(b"\n"):
-        return Flaw("tail/torn", f"the log ends inside this record, {len(line)} bytes into it", _shown(line))
+        return Flaw("tail/torn", f"the log ends inside this record, {len(line)} bytes into it", shown(line))
     return read(line)
-
-
-def _shown(line: bytes) -> str:
-    return line[:_SHOWN].decode("utf-8", "backslashreplace")

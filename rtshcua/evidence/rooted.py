@@ -1,10 +1,9 @@
 """The trust of a log: its root under the pinned key, and the duty of its log key under that root."""
 
-from base64 import b64decode, b64encode
-
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import Genesis
-from rtshcua.wire.keys import Duty
+from rtshcua.wire.keys import Duty, VerificationKey
 from rtshcua.wire.trust import TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -18,26 +17,28 @@ def rooted(genesis: Genesis, pinned: bytes) -> TrustRoot | Flaw:
     data = octets(genesis.root)
     if data is None or octets(genesis.bundle) is None:
         return Flaw("genesis/base64", "the trust root or the bundle is not canonical base64")
-    try:
-        root = open_root(data, pinned=pinned, now_us=genesis.utc_us)
-    except Untrusted as error:
-        return Flaw(f"trust/root-{error.slug}", f"the trust root is not to be trusted: {error}")
+    root = trusted_root(data, pinned, genesis.utc_us)
+    if isinstance(root, Flaw):
+        return root
     keys = root.keys_for(Duty.LOG)
     key = keys.get(bytes.fromhex(genesis.log_kid))
     if key is None:
         text = "the log's key has no duty `log` in the trust root: whoever signed this log was not entitled to"
         return Flaw("trust/log-key", text, genesis.log_kid, " or ".join(kid.hex() for kid in keys))
-    refusal = key_refusal(key, vehicle=genesis.vehicle, now_us=genesis.utc_us)
-    if refusal is not None:
-        text = f"the log's key might not sign for vehicle `{genesis.vehicle}` then: {refusal}"
-        return Flaw("trust/log-key", text, genesis.log_kid)
-    return root
+    return may_not_sign(key, genesis.vehicle, genesis.utc_us) or root
 
 
-def octets(text: str) -> bytes | None:
-    """The bytes of canonical base64: what a lenient reader ignores could be changed unseen."""
+def trusted_root(data: bytes, pinned: bytes, now_us: int) -> TrustRoot | Flaw:
+    """The trust root in an envelope, under the pinned key."""
     try:
-        data = b64decode(text, validate=True)
-    except ValueError:
+        return open_root(data, pinned=pinned, now_us=now_us)
+    except Untrusted as error:
+        return Flaw(f"trust/root-{error.slug}", f"the trust root is not to be trusted: {error}")
+
+
+def may_not_sign(key: VerificationKey, vehicle: str, now_us: int) -> Flaw | None:
+    """Why a log key might not sign the logs of a vehicle at a UTC time; None if it might."""
+    refusal = key_refusal(key, vehicle=vehicle, now_us=now_us)
+    if refusal is None:
         return None
-    return data if b64encode(data).decode() == text else None
+    return Flaw("trust/log-key", f"the log's key might not sign for vehicle `{vehicle}` then: {refusal}", key.kid.hex())

@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.heads import Head
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.note import Checkpoint, open_note
-from rtshcua.evidence.records import Close, Genesis, Recover, Sealing, Signed, encode, unsigned
+from rtshcua.evidence.records import Genesis, Recover, Sealing, Signed, encode, next_key_of, unsigned
 from rtshcua.wire.keys import Duty, key_id
 
 #: what `note` says of a note, in the words of a log
@@ -56,16 +57,22 @@ class Seals:
         if isinstance(opened, Flaw):
             return opened
         self.checkpoint = opened
+        self._next_key = opened.key or b""
         if isinstance(record, Genesis):
-            self._next_key = bytes.fromhex(record.next_key)
             return None
         self.epochs += 1
         if isinstance(record, Recover):
             crashes, loose, discarded = self.recoveries
             self.recoveries = Recoveries(crashes + 1, loose + record.records - 1, discarded + record.discarded_bytes)
-        if not isinstance(record, Close):
-            self._next_key = bytes.fromhex(record.next_key)
         return None
+
+    def follow(self, record: Signed, line: bytes, head: Head) -> Flaw | None:
+        """As `check`, of a record that stands next to the lines of the head, which then stands after it."""
+        flaw = self.check(record, Segment(head.records, head.octets, head.digest(), head.tree.root()))
+        if flaw is None:
+            assert self.checkpoint is not None, "it was checked"
+            head.begin(line, self.checkpoint.digest())
+        return flaw
 
     def _begin(self, genesis: Genesis) -> Flaw | None:
         self.origin = origin_of(genesis.vehicle, genesis.boot)
@@ -107,7 +114,7 @@ class Seals:
         if opened.record != own:
             text = "it is not the record that was signed: one of its fields was changed"
             return Flaw("seal/self", text, own.hex(), opened.record.hex())
-        key = None if isinstance(record, Close) else bytes.fromhex(record.next_key)
+        key = next_key_of(record)
         if opened.key != key:
             text = "the signature names another key for what follows than the record does"
             return Flaw("seal/next-key", text, _hex(key), _hex(opened.key))

@@ -13,41 +13,41 @@ and trust root, and derive the decisions again (`rtshcua.ground.auditor`).
 """
 
 from collections.abc import Iterable
-from hashlib import sha256
 
 from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Finding, Flaw
-from rtshcua.evidence.heads import START
-from rtshcua.evidence.merkle import Tree, leaf_hash
-from rtshcua.evidence.reading import LONGEST, may_be_torn, read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Signed
+from rtshcua.evidence.heads import START, Head
+from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.reading import SHOWN, may_be_torn, read, shown, too_long
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.evidence.report import Report, claims, unsealed
-from rtshcua.evidence.seals import Seals, Segment
+from rtshcua.evidence.seals import Seals
 
 _LINK = slice(10, 74)  # where the value of `_prev` stands
-_SHOWN = 80  # bytes of a line that a finding quotes
 
 
 class Verifier:
     """Takes the lines of a log in order; after the first that fails it takes no more."""
 
     def __init__(self) -> None:
-        self.records = 0
         self.genesis: Genesis | None = None
         self.close: Close | None = None
         self.failure: Finding | None = None
         self.offset = 0  # where the next line begins
         self.seals = Seals()
         self._counts: dict[str, int] = {}
-        self._tree = Tree()
-        self._prev = START
+        self._head = Head()
         self._clocks = Clocks()
         self._before = 0  # where the last line began
         self._torn: bytes | None = None
         self._doubt: tuple[bytes, Finding] | None = None  # hash of the line after a broken link, and what it then is
-        self._signed = self._signed_us = self._segment = 0  # last signed record: number, time, where its line began
-        self._digest = sha256()  # of the octets from there on
+        self._signed_us = 0  # time of the last signed record
+
+    @property
+    def records(self) -> int:
+        """How many records were sound."""
+        return self._head.seq
 
     def take(self, line: bytes) -> AnyRecord | None:
         """The record of the next line (newline included), or None when the log ends or fails there."""
@@ -62,19 +62,14 @@ class Verifier:
         if isinstance(record, Flaw):
             self.failure = record.at(self.records, self.offset)
             return None
-        leaf = leaf_hash(line)
         flaw = self._check_place(record)
-        if flaw is None and record.prev != self._prev:
-            self._doubt = leaf, self._broken_link(record)
+        if flaw is None and record.prev != self._head.prev:
+            self._doubt = leaf_hash(line), self._broken_link(record)
             return None
-        flaw = flaw or self._clocks.check(record) or self._check_epoch(record)
+        flaw = flaw or self._clocks.check(record) or self._check_epoch(record, line)
         if flaw is not None:
             self.failure = flaw.at(self.records, self.offset)
             return None
-        self._tree.push(leaf)
-        self._digest.update(line)
-        self._prev = leaf.hex()
-        self.records += 1
         self._before, self.offset = self.offset, self.offset + len(line)
         counts = self._counts
         counts[record.type] = counts.get(record.type, 0) + 1
@@ -89,19 +84,18 @@ class Verifier:
     def _read(self, line: bytes) -> AnyRecord | Flaw | None:
         # 1 the line
         if self.close is not None:
-            return Flaw("close/junk-after", "there is something after the signed close", _shown(line))
-        if len(line) > LONGEST:
-            return Flaw(
-                "record/too-long", "the line is too long for a record", f"{len(line)} bytes", f"{LONGEST} bytes"
-            )
+            return Flaw("close/junk-after", "there is something after the signed close", shown(line))
+        flaw = too_long(line)
+        if flaw is not None:
+            return flaw
         if self._torn is not None:
-            return Flaw("record/malformed", "a line without its end stands before others", _shown(self._torn))
+            return Flaw("record/malformed", "a line without its end stands before others", shown(self._torn))
         if not line.endswith(b"\n"):
             self._torn = line
             return None
         # 2 the record
         record = read(line)
-        return record._replace(found=_shown(line)) if isinstance(record, Flaw) and not record.found else record
+        return record._replace(found=shown(line)) if isinstance(record, Flaw) and not record.found else record
 
     def _check_place(self, record: AnyRecord) -> Flaw | None:
         number = self.records
@@ -123,7 +117,7 @@ class Verifier:
     def _broken_link(self, record: AnyRecord) -> Finding:
         before, after = self.records - 1, self.records
         text = f"record {after} was not written after record {before} as it stands here: one of the two was changed"
-        return Finding("chain/broken", before, text, self._prev, record.prev, self._before)
+        return Finding("chain/broken", before, text, self._head.prev, record.prev, self._before)
 
     def _settled(self, line: bytes) -> Finding:
         """Which of the two records at a broken link was changed: the line after them was written after the second."""
@@ -133,33 +127,25 @@ class Verifier:
             return finding
         return finding._replace(record=self.records, offset=self.offset)
 
-    def _check_epoch(self, record: AnyRecord) -> Flaw | None:
+    def _check_epoch(self, record: AnyRecord, line: bytes) -> Flaw | None:
         # 6 the epochs
+        head = self._head
         if isinstance(record, Decision | Effect):
-            return self._check_sealed(record)
-        segment = Segment(
-            self.records - self._signed, self.offset - self._segment, self._digest.hexdigest(), self._tree.root()
-        )
-        flaw = self.seals.check(record, segment)
-        if flaw is None:
-            self._follow(record)
-        return flaw
-
-    def _check_sealed(self, record: Decision | Effect) -> Flaw | None:
-        records, lasted_us = self.records - self._signed, record.at_us - self._signed_us
-        if records <= MOST_RECORDS and lasted_us <= LONGEST_US:
+            if head.records > MOST_RECORDS or record.at_us - self._signed_us > LONGEST_US:
+                text = f"the epoch that record {head.first} began should have been sealed before"
+                found = f"{head.records} records, {record.at_us - self._signed_us} us after it"
+                return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {LONGEST_US} us")
+            head.take(line)
             return None
-        text = f"the epoch that record {self._signed} began should have been sealed before"
-        found = f"{records} records, {lasted_us} us after it"
-        return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {LONGEST_US} us")
-
-    def _follow(self, record: Signed) -> None:
-        self._signed, self._signed_us, self._segment = self.records, record.at_us, self.offset
-        self._digest = sha256()
+        flaw = self.seals.follow(record, line, head)
+        if flaw is not None:
+            return flaw
+        self._signed_us = record.at_us
         if isinstance(record, Genesis):
             self.genesis = record
         elif isinstance(record, Close):
             self.close = record
+        return None
 
     def report(self) -> Report:
         """The whole, once the lines are over."""
@@ -169,7 +155,7 @@ class Verifier:
         shortfall = None
         if self.failure is None and self.close is None:
             self.failure, shortfall = self._end()
-        sealed = self._signed + 1 if self.genesis is not None else 0
+        sealed = self._head.first + 1 if self.genesis is not None else 0
         proven, unproven = claims(
             self.records, sealed, self.seals.epochs, self.genesis, self.close, self.failure, self.seals.recoveries
         )
@@ -183,7 +169,7 @@ class Verifier:
             genesis=self.genesis,
             close=self.close,
             last_us=self._clocks.at_us,
-            root=self._tree.root(),
+            root=self._head.tree.root(),
             proven=proven,
             unproven=unproven,
             sealed=sealed,
@@ -199,13 +185,13 @@ class Verifier:
         if not torn:
             text = "the log is empty: nothing was ever written, or all of it was cut off"
             return Finding("log/empty", number, text, offset=offset), None
-        if not may_be_torn(torn, self._prev):
-            start = '{"_prev":"' + self._prev
+        if not may_be_torn(torn, self._head.prev):
+            start = '{"_prev":"' + self._head.prev
             text = "what stands after the last whole record is not the beginning of another"
-            return Finding("record/malformed", number, text, _shown(torn), start[:_SHOWN], offset), None
+            return Finding("record/malformed", number, text, shown(torn), start[:SHOWN], offset), None
         if not number:
             text = "the log ends inside its first record"
-            return Finding("genesis/missing", number, text, _shown(torn), offset=offset), None
+            return Finding("genesis/missing", number, text, shown(torn), offset=offset), None
         text = f"the log ends inside record {number}, {len(torn)} bytes into it"
         return None, Finding("tail/torn", number, text, offset=offset)
 
@@ -218,7 +204,3 @@ def verify(lines: Iterable[bytes]) -> Report:
         if verifier.failure is not None:
             break
     return verifier.report()
-
-
-def _shown(line: bytes) -> str:
-    return line[:_SHOWN].decode("utf-8", "backslashreplace")

@@ -1,7 +1,7 @@
 """The strict decoder: it accepts only the bytes that our encoder would have made (RFC 8949, section 4.2.1).
 
-It is the only decoder, written to be read, and to say where and why bytes are refused. A second implementation must agree
-with it in every refusal: reason and place.
+It is the only decoder, written to be read, and to say where and why bytes are refused. A second implementation must
+agree with it in every refusal: reason and place.
 """
 
 from typing import Final, TypeAlias

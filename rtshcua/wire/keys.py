@@ -1,6 +1,7 @@
 """Ed25519 keys (RFC 8032), each bound to one duty."""
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Final, Self
 
 import msgspec
@@ -9,10 +10,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey,
 
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.wire import digest
-from rtshcua.wire.duty import Duty
 from rtshcua.wire.untrusted import Untrusted
-
-__all__ = ["ANY", "KID_BYTES", "Duty", "SigningKey", "VerificationKey", "WrongDuty", "key_id"]
 
 #: length of a key identifier, a public key and a seed in bytes
 KID_BYTES: Final = 16
@@ -23,6 +21,22 @@ SEED_BYTES: Final = 32
 ANY: Final = "*"
 
 _SOURCES: Final = frozenset(kind.name.lower() for kind in SourceKind)
+
+
+class Duty(StrEnum):
+    """One key, one duty: a key trusted for one signs nothing else (The Update Framework, section 2.1, roles)."""
+
+    ROOT = "root"  # names all other keys
+    POLICY = "policy"  # signs policies
+    MISSION = "mission"  # signs missions, for the roles and through the sources that the root lists
+    APPROVAL = "approval"  # answers a `confirm`
+    LOG = "log"  # signs evidence
+    WITNESS = "witness"  # cosigns the checkpoints of logs, away from the vehicle
+
+    @property
+    def label(self) -> bytes:
+        """What is signed along with every payload, so that a signature made for one duty verifies for no other."""
+        return b"rtshcua/duty/" + self.value.encode()
 
 
 class WrongDuty(Untrusted):
@@ -37,6 +51,15 @@ class WrongDuty(Untrusted):
 def key_id(duty: Duty, public: bytes) -> bytes:
     """The name of a key, 16 bytes: it depends on the duty too, so a relabelled key is a key that nobody knows."""
     return digest.digest(digest.KEY, duty.label + b"\0" + public)[:KID_BYTES]
+
+
+def verified(public: bytes, signature: bytes, message: bytes) -> bool:
+    """Whether the key of `public` (32 bytes) signed `message`; one with s >= L is refused (RFC 8032, 5.1.7)."""
+    try:
+        Ed25519PublicKey.from_public_bytes(public).verify(signature, message)
+    except InvalidSignature:
+        return False
+    return True
 
 
 class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -66,12 +89,8 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return key_id(self.duty, self.public)
 
     def verify(self, signature: bytes, message: bytes) -> bool:
-        """Whether this key made `signature` over exactly `message`; one with s >= L is refused (RFC 8032, 5.1.7)."""
-        try:
-            Ed25519PublicKey.from_public_bytes(self.public).verify(signature, message)
-        except InvalidSignature:
-            return False
-        return True
+        """Whether this key made `signature` over exactly `message`: see `verified`."""
+        return verified(self.public, signature, message)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -15,14 +15,15 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import root_from_inclusion
 from rtshcua.evidence.proofs.file import MAX_PROOF
-from rtshcua.evidence.proofs.trust import Name, name_of, trust
+from rtshcua.evidence.proofs.trust import Name, name_of
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord
+from rtshcua.evidence.rooted import may_not_sign, trusted_root
 from rtshcua.wire import cbor
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.cose import ED25519
 from rtshcua.wire.keys import Duty, VerificationKey
-from rtshcua.wire.trust import TrustRoot, key_refusal
+from rtshcua.wire.trust import TrustRoot
 
 TAG_18: Final = b"\xd2"  # COSE_Sign1
 
@@ -104,16 +105,15 @@ def _verify(
     name = name_of(origin)
     if isinstance(name, Flaw):
         return name
-    trusted = trust(root, pinned, record.utc_us)
+    trusted = trusted_root(root, pinned, record.utc_us)
     if isinstance(trusted, Flaw):
         return trusted
     key = trusted.keys_for(Duty.LOG).get(kid)
     if key is None:
         return Flaw("trust/log-key", "the key of the receipt has no duty `log` in the trust root", kid.hex()[:64])
-    refusal = key_refusal(key, vehicle=name.vehicle, now_us=record.utc_us)
-    if refusal is not None:
-        text = f"the log's key might not sign for vehicle `{name.vehicle}` then: {refusal}"
-        return Flaw("trust/log-key", text, kid.hex())
+    flaw = may_not_sign(key, name.vehicle, record.utc_us)
+    if flaw is not None:
+        return flaw
     head = root_from_inclusion(leaf_hash(line), number, size, path)
     if head is None or record.seq != number:
         return Flaw("proof/path", f"the path in it does not lead from record {record.seq} to a root")

@@ -10,10 +10,10 @@ from urllib.parse import unquote
 from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import ID_BYTES, Checkpoint, key_id, open_note, parse, read_signature, split
+from rtshcua.evidence.rooted import may_not_sign, trusted_root
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
 from rtshcua.wire.keys import Duty, VerificationKey
-from rtshcua.wire.trust import TrustRoot, key_refusal, open_root
-from rtshcua.wire.untrusted import Untrusted
+from rtshcua.wire.trust import TrustRoot
 
 _NOTE = {
     "note/unsigned": "proof/note",
@@ -61,7 +61,7 @@ def believe(notes: tuple[str, ...], root: bytes, pinned: bytes, now_us: int) -> 
     name = name_of(first.origin)
     if isinstance(name, Flaw):
         return name
-    trusted = trust(root, pinned, now_us)
+    trusted = trusted_root(root, pinned, now_us)
     if isinstance(trusted, Flaw):
         return trusted
     log_key = signer(trusted, _signer_id(notes[0]), name, now_us)
@@ -122,23 +122,11 @@ def name_of(origin: str) -> Name | Flaw:
     return Flaw("proof/origin", "it is not of a log of this program", origin[:160], "rtshcua/log/<vehicle>/<boot>")
 
 
-def trust(root: bytes, pinned: bytes, now_us: int) -> TrustRoot | Flaw:
-    """The trust root that a proof carries, under the pinned key."""
-    try:
-        return open_root(root, pinned=pinned, now_us=now_us)
-    except Untrusted as error:
-        return Flaw(f"trust/root-{error.slug}", f"the trust root is not to be trusted: {error}")
-
-
 def signer(root: TrustRoot, short: bytes, name: Name, now_us: int) -> VerificationKey | Flaw:
     """The key for duty `log` that a note names by its four octets, and that may sign for the vehicle."""
     for key in root.keys_for(Duty.LOG).values():
         if key_id(name.origin, key.public) == short:
-            refusal = key_refusal(key, vehicle=name.vehicle, now_us=now_us)
-            if refusal is None:
-                return key
-            text = f"the log's key might not sign for vehicle `{name.vehicle}` then: {refusal}"
-            return Flaw("trust/log-key", text, key.kid.hex())
+            return may_not_sign(key, name.vehicle, now_us) or key
     text = "no key that the trust root names for duty `log` signed this: whoever did was not entitled to"
     return Flaw("trust/log-key", text, short.hex())
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.note import ID_BYTES, key_id, read_signature, signature_line, split, valid
-from rtshcua.wire.keys import Duty
+from rtshcua.evidence.note import ID_BYTES, key_id, read_signature, signature_line, split
+from rtshcua.wire.keys import Duty, verified
 from rtshcua.wire.keys import key_id as kid_of
 
 COSIGNATURE: Final = b"\x04"
@@ -51,7 +51,7 @@ def read_cosignature(line: str, text: str, witnesses: Iterable[bytes]) -> Cosign
         return None
     signature = octets[ID_BYTES + _TIME_BYTES :]
     time_s = int.from_bytes(octets[ID_BYTES : ID_BYTES + _TIME_BYTES], "big")
-    if time_s > _LAST_S or not valid(public, signature, _message(text, time_s)):
+    if time_s > _LAST_S or not verified(public, signature, _message(text, time_s)):
         return Flaw("anchor/signature", f"witness `{name}` did not sign this checkpoint at this time", name)
     return Cosignature(public, name, time_s)
 

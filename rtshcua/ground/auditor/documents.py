@@ -4,8 +4,8 @@ from typing import Final
 
 from rtshcua.decision.session import Session
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import Effect
-from rtshcua.evidence.rooted import octets
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.receipt import APPROVAL, RECALL, REPLACEMENT
 

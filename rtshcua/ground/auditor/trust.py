@@ -7,8 +7,9 @@ from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import Genesis
-from rtshcua.evidence.rooted import octets, rooted
+from rtshcua.evidence.rooted import rooted
 from rtshcua.wire.bundle import Bundle, open_bundle
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted

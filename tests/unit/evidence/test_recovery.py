@@ -152,7 +152,7 @@ def test_a_log_of_another_key_is_not_ours(lines: list[bytes]) -> None:
 
 
 def test_a_line_without_end_is_not_read_for_ever(lines: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rtshcua.evidence.recovery.LONGEST", 2_000)
+    monkeypatch.setattr("rtshcua.evidence.reading.LONGEST", 2_000)
     found = examined([*lines, b"x" * 2_001, b"y"])
     assert found.reason is not None
     assert (found.state, found.reason.slug) == (State.TORN, "record/too-long")

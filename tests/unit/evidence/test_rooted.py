@@ -7,9 +7,10 @@ from msgspec.structs import replace
 
 from reference.forgery import LOG_KEY, ROOT_KEY, flight
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Genesis
-from rtshcua.evidence.rooted import octets, rooted
+from rtshcua.evidence.rooted import rooted
 from rtshcua.wire.keys import Duty, key_id
 from rtshcua.wire.trust import TrustRoot
 from virtual import case

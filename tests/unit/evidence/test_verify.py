@@ -131,7 +131,7 @@ def test_nothing_may_follow_the_close(log: list[bytes]) -> None:
 
 
 def test_a_line_has_a_limit(log: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "LONGEST", 2000)
+    monkeypatch.setattr("rtshcua.evidence.reading.LONGEST", 2000)
     assert failure([log[0], b"x" * 2001]) == ("record/too-long", 1)
     assert verify(log).verdict is Verdict.VERIFIED
 

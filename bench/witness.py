@@ -14,8 +14,7 @@ from time import perf_counter
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference.witnessed import WITNESSES, Judge, Log
-from rtshcua.evidence.witnessing.submission import Submission
-from rtshcua.evidence.witnessing.survey import Survey, survey
+from rtshcua.evidence.witnessing.submission import Submission, Survey, survey
 from rtshcua.evidence.witnessing.witness import Request, decode
 from rtshcua.wire.keys import Duty
 

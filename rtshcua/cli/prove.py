@@ -18,16 +18,19 @@ from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.proofs.anchor import anchored, cosigned_sizes, is_anchored, with_cosignatures
 from rtshcua.evidence.proofs.cose_receipt import TAG_18
 from rtshcua.evidence.proofs.disclosure import FIELDS
 from rtshcua.evidence.proofs.file import MAX_PROOF, Kind
 from rtshcua.evidence.proofs.make import (
     Lines,
+    anchored,
+    cosigned_sizes,
+    is_anchored,
     prove_consistency,
     prove_disclosure,
     prove_inclusion,
     receipt_of,
+    with_cosignatures,
 )
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.untrusted import Untrusted

@@ -33,21 +33,3 @@ RESPONSE: Final = Artefact("rtshcua/response", 1)
 PERMIT: Final = Artefact("rtshcua/permit", 1)
 DIAGNOSTICS: Final = Artefact("rtshcua/diagnostics", 1, "+json")
 MISSION_SPEC: Final = Artefact("rtshcua/mission-spec", 1, "+json")
-
-ALL: Final = (
-    ROOT,
-    POLICY,
-    MISSION,
-    BUNDLE,
-    APPROVAL,
-    RECALL,
-    REPLACEMENT,
-    RECEIPT,
-    LOG,
-    PROOF,
-    REQUEST,
-    RESPONSE,
-    PERMIT,
-    DIAGNOSTICS,
-    MISSION_SPEC,
-)

@@ -15,10 +15,8 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle_proofs import inclusion_ranges, proof_of
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.disclosure import Disclosure, disclosure_root
-from rtshcua.evidence.proofs.extra import Extra
-from rtshcua.evidence.proofs.file import Kind, ProofFile
-from rtshcua.evidence.proofs.make import prove_disclosure
-from rtshcua.evidence.proofs.search import find
+from rtshcua.evidence.proofs.file import Extra, Kind, ProofFile
+from rtshcua.evidence.proofs.make import find, prove_disclosure
 from rtshcua.evidence.records import encode, unsigned
 from rtshcua.evidence.report import Verdict
 

@@ -13,8 +13,7 @@ from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.note import Checkpoint, parse, sign, split
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
-from rtshcua.evidence.witnessing.submission import Submission
-from rtshcua.evidence.witnessing.survey import survey
+from rtshcua.evidence.witnessing.submission import Submission, survey
 from rtshcua.evidence.witnessing.witness import CONFLICT, FORBIDDEN, INCONSISTENT, Declined, Request, judge
 from rtshcua.wire.keys import Duty
 

@@ -13,11 +13,16 @@ from typing import Any
 
 from reference.sealed_log import LOG_KEY, PIN, SECRET, SealedLog, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.proofs.anchor import with_cosignatures
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import Received, check_receipt
 from rtshcua.evidence.proofs.disclosure import FIELDS
-from rtshcua.evidence.proofs.make import prove_consistency, prove_disclosure, prove_inclusion, receipt_of
+from rtshcua.evidence.proofs.make import (
+    prove_consistency,
+    prove_disclosure,
+    prove_inclusion,
+    receipt_of,
+    with_cosignatures,
+)
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.wire import cbor
 from rtshcua.wire.keys import Duty

@@ -3,7 +3,7 @@
 The steps, as the comments number them:
 
 1. the file, and what it carries, each in its one form
-2. the checkpoint: signed in the chain from the log key that the trust root names (`proof_trust`)
+2. the checkpoint: signed in the chain from the log key that the trust root names (`trust`)
 3. the record that carries the checkpoint: it is the one that the checkpoint vouches for
 4. what is proven: the path from the record, or between two checkpoints, gives the signed root
 """
@@ -17,8 +17,7 @@ from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import verify_consistency, verify_inclusion
 from rtshcua.evidence.note import Checkpoint
 from rtshcua.evidence.proofs.disclosure import FIELDS, combined, field_hash
-from rtshcua.evidence.proofs.extra import Extra, read_extra
-from rtshcua.evidence.proofs.file import Kind, ProofFile, read_proof
+from rtshcua.evidence.proofs.file import Extra, Kind, ProofFile, read_extra, read_proof
 from rtshcua.evidence.proofs.trust import Believed, believe
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import (

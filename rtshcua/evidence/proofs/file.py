@@ -7,15 +7,21 @@
                                     (an empty line)
     <the signed note of a checkpoint>
 
-Only the one form of each file is read: what a reader ignores could be changed unseen.
+Only the one form of each file is read: what a reader ignores could be changed unseen. The `extra` is deterministic
+CBOR: what a proof carries beside the Merkle path, so that it verifies alone. The layout authenticates none of it; every
+part of it is verified (`check`).
 """
 
-from base64 import b64encode
 from enum import StrEnum
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
+
+import msgspec
 
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.note import strict_base64
+from rtshcua.evidence.note import base64, strict_base64
+from rtshcua.wire import artefact, names
+from rtshcua.wire.cbor import CborError
+from rtshcua.wire.untrusted import Untrusted
 
 #: a longer file is refused unread, in octets
 MAX_PROOF: Final = 8 << 20
@@ -41,7 +47,7 @@ class Kind(StrEnum):
 
 
 class ProofFile(NamedTuple):
-    """A proof as it is written. `number` is a record's, or the size of the older tree; `extra` see `proof_extra`."""
+    """A proof as it is written. `number` is a record's, or the size of the older tree; `extra` see `Extra`."""
 
     kind: Kind
     extra: bytes
@@ -51,8 +57,8 @@ class ProofFile(NamedTuple):
 
     def encode(self) -> bytes:
         """The file."""
-        lines = [self.kind.value, _EXTRA + _base64(self.extra), f"{self.kind.word} {self.number}"]
-        return "\n".join([*lines, *map(_base64, self.path), "", self.note]).encode()
+        lines = [self.kind.value, _EXTRA + base64(self.extra), f"{self.kind.word} {self.number}"]
+        return "\n".join([*lines, *map(base64, self.path), "", self.note]).encode()
 
 
 def read_proof(data: bytes) -> ProofFile | Flaw:
@@ -80,5 +86,34 @@ def read_proof(data: bytes) -> ProofFile | Flaw:
     return file
 
 
-def _base64(data: bytes) -> str:
-    return b64encode(data).decode()
+#: the name of a field, and: `f` of one that is withheld; salt and value of a shown one (docs/log-format.md, section 6)
+Field: TypeAlias = tuple[str, tuple[bytes, ...]]
+
+
+class Extra(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """`root` is the signed trust root. `chain` has the notes from one that the log key signed up to, and without, that
+    of the proof: each names the key that signs the next. `signed` is the line of the record that carries the proof's
+    checkpoint, with the checkpoint as null. `record` is the line that is shown; `fields` are those of a line that is
+    shown in part.
+    """
+
+    chain: tuple[str, ...]
+    root: bytes
+    signed: bytes
+    record: bytes = b""
+    fields: tuple[Field, ...] = ()
+
+    def encode(self) -> bytes:
+        """The canonical octets. Raises `CborError` when they would be too many for a reader."""
+        return artefact.wrap(names.PROOF, msgspec.to_builtins(self, builtin_types=(bytes,)))
+
+
+def read_extra(data: bytes) -> Extra | Flaw:
+    """The extra of a proof, or what is wrong with it."""
+    try:
+        extra = msgspec.convert(artefact.unwrap(names.PROOF, data), Extra, builtin_types=(bytes,))
+        if extra.encode() == data:
+            return extra
+    except (Untrusted, CborError, msgspec.ValidationError) as error:
+        return Flaw("proof/extra", f"what the proof carries cannot be read: {error}")
+    return Flaw("proof/extra", "what the proof carries is not written in its one form")

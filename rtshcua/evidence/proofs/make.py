@@ -1,26 +1,131 @@
 """Proofs made of a log: read once for its signed records, and once more for the hashes, in bounded memory.
 
-What comes out was verified as its reader will, but for the pin; so no proof is made of a log that does not hold.
+What comes out was verified as its reader will, but for the pin; so no proof is made of a log that does not hold. Below
+the checkpoint of a proof that was made, cosignatures of witnesses are put.
 """
 
+from base64 import b64decode
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import islice
+from typing import NamedTuple
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import Range, consistency_ranges, inclusion_ranges, proof_of
-from rtshcua.evidence.proofs.check import check_proof
+from rtshcua.evidence.note import parse, split
+from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import check_receipt, make_receipt
 from rtshcua.evidence.proofs.disclosure import Disclosure
-from rtshcua.evidence.proofs.extra import Extra, Field
-from rtshcua.evidence.proofs.file import Kind, ProofFile
-from rtshcua.evidence.proofs.search import Found, find
-from rtshcua.evidence.records import Close, encode, unsigned
+from rtshcua.evidence.proofs.file import Extra, Field, Kind, ProofFile, read_extra, read_proof
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import Close, Decision, Effect, Genesis, Recover, Signed, encode, is_signed, unsigned
+from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.wire import cose
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
 
 #: gives the lines of the log from its beginning, each time that it is called
 Lines = Callable[[], Iterable[bytes]]
+
+_EVENT = b',"event":"%s"' % ANCHORED.encode()
+_MOST = 64  # lines that are tried as cosignatures
+
+
+class Found(NamedTuple):
+    """What a proof is made of: the trust root, the notes that the log key and then epoch keys signed, up to that of
+    `signed`, and the line that was asked for, if it is before it.
+    """
+
+    root: bytes
+    chain: tuple[str, ...]
+    signed: Signed
+    line: bytes
+
+
+def find(
+    lines: Iterable[bytes], number: int | None, at: int | None, *, since: int | None = None, closed: bool = False
+) -> Found | Flaw:
+    """What a proof of record `number`, or of what follows the signed record `since`, is made of.
+
+    The signed record is `at`; without it the first one after `number`, or the last one there is (`closed`, `since`).
+    """
+    if at is not None and number is not None and at < number:
+        return Flaw("proof/number", f"record {at} was signed before record {number} was written", str(at), f"{number}")
+    finder = _Finder(number, at, since, to_end=closed or (since is not None and at is None))
+    count = 0
+    for count, line in enumerate(_whole(lines), 1):
+        flaw = finder.take(count - 1, line)
+        if flaw is not None:
+            return flaw
+        if finder.done:
+            break
+    return finder.found(count)
+
+
+class _Finder:
+    def __init__(self, number: int | None, at: int | None, since: int | None, *, to_end: bool) -> None:
+        self.done = False
+        self._number, self._at, self._since, self._to_end = number, at, since, to_end
+        self._root = b""
+        self._notes: list[str] = []
+        self._sizes: set[int] = set()
+        self._signed: Signed | None = None
+        self._line = b""
+
+    def take(self, seq: int, line: bytes) -> Flaw | None:
+        if seq == self._number:
+            self._line = line
+        if not is_signed(line) and seq:
+            return None
+        record = read(line)
+        if isinstance(record, Flaw):
+            if record.slug == "genesis/format":
+                return record
+            text = f"record {seq} of the log is none: {record.text}"
+            return Flaw("proof/log" if seq else "proof/no-log", text, record.found, record.expected)
+        if isinstance(record, Decision | Effect) or isinstance(record, Genesis) != (seq == 0) or record.seq != seq:
+            return Flaw("proof/log", f"record {seq} of the log stands where it does not belong", record.type)
+        if isinstance(record, Genesis):
+            try:
+                self._root = b64decode(record.root, validate=True)
+            except ValueError:
+                return Flaw("proof/log", "the trust root in the genesis is not base64")
+        if isinstance(record, Genesis | Recover) and (self._since is None or self._since >= seq):
+            self._notes.clear()  # signed by the log key itself: nothing before it is needed
+        self._notes.append(record.checkpoint or "")
+        self._sizes.add(seq)
+        self._signed = record
+        self.done = isinstance(record, Close) or (not self._to_end and self._serves(seq))
+        return None
+
+    def _serves(self, seq: int) -> bool:
+        if self._at is not None:
+            return seq >= self._at
+        return self._number is None or seq > self._number
+
+    def found(self, count: int) -> Found | Flaw:
+        number, signed = self._number, self._signed
+        if signed is None:
+            return Flaw("proof/no-log", "there is no whole record in it")
+        if number is not None and not self._line:
+            text = f"the log has no record {number}"
+            return Flaw("proof/number", text, str(number), f"0 to {count - 1}")
+        for asked in (self._at, self._since):
+            if asked is not None and asked not in self._sizes:
+                return Flaw("proof/number", f"record {asked} is no signed record: a genesis, a seal or a close")
+        least = number if number is not None else self._since
+        assert least is not None
+        if signed.seq < least:
+            return Flaw("proof/unsealed", f"nothing after record {least} is signed yet, and so nothing vouches for it")
+        return Found(self._root, tuple(self._notes), signed, self._line)
+
+
+def _whole(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """The lines but for what a crash left of the last one."""
+    for line in lines:
+        if not line.endswith(b"\n"):
+            return
+        yield line
 
 
 def prove_inclusion(lines: Lines, number: int, at: int | None = None) -> bytes | Flaw:
@@ -132,3 +237,45 @@ def _path(ranges: Sequence[Range], hashes: Iterable[bytes]) -> list[bytes] | Fla
 def leaves(lines: Lines) -> Iterator[bytes]:
     """The leaf hashes of a log."""
     return map(leaf_hash, lines())
+
+
+def with_cosignatures(data: bytes, anchors: Iterable[str]) -> bytes:
+    """A proof that was made here, with the lines by which witnesses cosigned its checkpoint; others are left out."""
+    file = read_proof(data)
+    assert isinstance(file, ProofFile)
+    text, own = split(file.note)
+    found = (line for anchor in anchors if anchor.startswith(text) for line in split(anchor)[1] if line not in own)
+    for line in islice(found, _MOST):
+        more = file._replace(note=file.note + line)
+        if isinstance(check_proof(more.encode(), _own_pin(more)), Proven):
+            file = more
+    return file.encode()
+
+
+def is_anchored(data: bytes) -> bool:
+    """Whether enough witnesses cosigned the checkpoint of a proof that was made here."""
+    file = read_proof(data)
+    assert isinstance(file, ProofFile)
+    found = check_proof(data, _own_pin(file))
+    return isinstance(found, Proven) and found.believed.anchored
+
+
+def cosigned_sizes(anchors: Iterable[str]) -> set[int]:
+    """The sizes of the checkpoints that the anchors are of, whoever made them."""
+    found = (parse(split(anchor)[0]) for anchor in anchors)
+    return {checkpoint.size for checkpoint in found if not isinstance(checkpoint, Flaw)}
+
+
+def anchored(lines: Iterable[bytes]) -> Iterator[str]:
+    """The anchors in the records of a log."""
+    for line in lines:
+        if _EVENT in line:
+            record = read(line)
+            if isinstance(record, Effect) and record.event == ANCHORED:
+                yield record.detail
+
+
+def _own_pin(file: ProofFile) -> bytes:
+    extra = read_extra(file.extra)
+    assert isinstance(extra, Extra)
+    return cose.unverified(extra.root).kid

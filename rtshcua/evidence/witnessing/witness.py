@@ -9,7 +9,6 @@ Everything here is pure. Whoever keeps the state must have it on the disk before
 the witness contradict itself.
 """
 
-from base64 import b64encode
 from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 from urllib.parse import unquote
@@ -18,7 +17,7 @@ from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import EMPTY
 from rtshcua.evidence.merkle_proofs import verify_consistency
-from rtshcua.evidence.note import Checkpoint, open_note, parse, split, strict_base64
+from rtshcua.evidence.note import Checkpoint, base64, open_note, parse, split, strict_base64
 
 #: the most lines of a proof (c2sp.org/tlog-witness)
 MOST_PROOF: Final = 63
@@ -47,7 +46,7 @@ class Request(NamedTuple):
 
     def encode(self) -> bytes:
         """The body of c2sp.org/tlog-witness, and behind it each note of the chain after an empty line."""
-        proof = "".join(f"{b64encode(each).decode()}\n" for each in self.proof)
+        proof = "".join(f"{base64(each)}\n" for each in self.proof)
         chain = "".join(f"\n{note}" for note in self.chain)
         return f"old {self.old}\n{proof}\n{self.note}{chain}".encode()
 

@@ -2,8 +2,7 @@
 
 from reference.proof_mutations import cosigned
 from reference.sealed_log import sealed_log
-from rtshcua.evidence.proofs.anchor import cosigned_sizes, is_anchored, with_cosignatures
-from rtshcua.evidence.proofs.make import prove_inclusion
+from rtshcua.evidence.proofs.make import cosigned_sizes, is_anchored, prove_inclusion, with_cosignatures
 
 LOG = sealed_log()
 

@@ -8,12 +8,18 @@ from reference.sealed_log import LOG_KEY, PIN, SECRET, VEHICLE, SealedLog, now, 
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
-from rtshcua.evidence.proofs.anchor import anchored, with_cosignatures
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import Received, check_receipt, make_receipt
 from rtshcua.evidence.proofs.file import Kind, ProofFile, read_proof
-from rtshcua.evidence.proofs.make import prove_consistency, prove_disclosure, prove_inclusion, receipt_of
-from rtshcua.evidence.proofs.search import find
+from rtshcua.evidence.proofs.make import (
+    anchored,
+    find,
+    prove_consistency,
+    prove_disclosure,
+    prove_inclusion,
+    receipt_of,
+    with_cosignatures,
+)
 from rtshcua.evidence.records import Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.wire.keys import Duty, SigningKey

@@ -9,8 +9,13 @@ import pytest
 from reference.proof_mutations import check, cosigned
 from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.proofs.anchor import with_cosignatures
-from rtshcua.evidence.proofs.make import prove_consistency, prove_disclosure, prove_inclusion, receipt_of
+from rtshcua.evidence.proofs.make import (
+    prove_consistency,
+    prove_disclosure,
+    prove_inclusion,
+    receipt_of,
+    with_cosignatures,
+)
 
 VECTORS = Path(__file__).resolve().parents[3] / "vectors" / "proof"
 LOG = sealed_log(recovers=True)

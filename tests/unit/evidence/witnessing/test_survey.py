@@ -4,7 +4,7 @@ import pytest
 
 from reference.witnessed import Judge, Log
 from rtshcua.evidence.finding import Finding, Flaw
-from rtshcua.evidence.witnessing.survey import Survey, request_of, survey
+from rtshcua.evidence.witnessing.submission import Survey, request_of, survey
 from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Declined
 
 

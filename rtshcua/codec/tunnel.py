@@ -13,8 +13,7 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.codec.decode import Message
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import Message, Received
 
 #: Ours. Numbers from 32768 on are nobody's, for use among parties that agree (MAV_TUNNEL_PAYLOAD_TYPE).
 PAYLOAD_TYPE: Final = 0xC05E

@@ -19,6 +19,7 @@ _SIGNATURE_BYTES: Final = 64
 _HASH_BYTES: Final = 32
 _RECORD, _KEY, _AFTER = "record ", "key ", "after "
 _LONGEST_SIZE: Final = 16  # digits
+_PARTS: Final = {"note/unsigned": "note", "note/malformed": "note", "note/key": "key", "note/signature": "signature"}
 
 
 class Checkpoint(NamedTuple):
@@ -108,6 +109,11 @@ def parse(text: str) -> Checkpoint | Flaw:
         if checkpoint.text() == text and lengths == {_HASH_BYTES}:
             return checkpoint
     return Flaw("note/malformed", "the signed text is not a checkpoint of origin, size, root, record, key and after")
+
+
+def renamed(flaw: Flaw, prefix: str) -> Flaw:
+    """A flaw of `open_note` or `parse` in the words of whoever read the note: `seal/...`, `proof/...`."""
+    return flaw._replace(slug=f"{prefix}/{_PARTS[flaw.slug]}")
 
 
 def _extension(lines: list[str], name: str) -> bytes | None:

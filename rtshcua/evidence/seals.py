@@ -6,17 +6,9 @@ from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.merkle import leaf_hash
-from rtshcua.evidence.note import Checkpoint, open_note
+from rtshcua.evidence.note import Checkpoint, open_note, renamed
 from rtshcua.evidence.records import Genesis, Recover, Sealing, Signed, encode, next_key_of, unsigned
 from rtshcua.wire.keys import Duty, key_id
-
-#: what `note` says of a note, in the words of a log
-_NOTE = {
-    "note/unsigned": "seal/note",
-    "note/malformed": "seal/note",
-    "note/key": "seal/key",
-    "note/signature": "seal/signature",
-}
 
 
 class Segment(NamedTuple):
@@ -101,7 +93,7 @@ class Seals:
         public = self._log_key if isinstance(record, Genesis | Recover) else self._next_key
         opened = open_note(record.checkpoint or "", self.origin, public)
         if isinstance(opened, Flaw):
-            return opened._replace(slug=_NOTE[opened.slug])
+            return renamed(opened, "seal")
         if opened.origin != self.origin:
             return Flaw("seal/note", "the signature is for another log", opened.origin, self.origin)
         if opened.size != record.seq:

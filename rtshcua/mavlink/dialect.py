@@ -1,17 +1,17 @@
 """What the MAVLink dialect says of each message and enumeration, as a plain value.
 
 The value is read from `dialect.json`, a table that `rtshcua.codec.build_dialect` derives from pymavlink's generated
-module `ardupilotmega` (which includes `common`). Reading it takes about two milliseconds; importing pymavlink takes
-tens, which the checker would pay on every start.
+module `ardupilotmega` (which includes `common`). Reading it takes some milliseconds; importing pymavlink takes tens,
+which the checker would pay on every start.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from rtshcua.model.quantity import Datum
 
@@ -33,8 +33,6 @@ DATUM: Mapping[tuple[str, str], Datum] = MappingProxyType(
         ("HIGH_LATENCY2", "altitude"): Datum.SEA,
     }
 )
-
-V = TypeVar("V")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,30 +57,6 @@ class Message:
     fields: Mapping[str, Field]
 
 
-class _Lazy(Mapping[str, V], Generic[V]):
-    """A read-only mapping that builds each value from the table's row when it is first asked for."""
-
-    def __init__(self, rows: dict[str, Any], build: Callable[[Any], V]) -> None:
-        self._rows = rows
-        self._build = build
-        self._built: dict[str, V] = {}
-
-    def __getitem__(self, name: str) -> V:
-        value = self._built.get(name)
-        if value is None:
-            value = self._built[name] = self._build(self._rows[name])
-        return value
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._rows
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """The messages by name (`GPS_RAW_INT`), and the enumerations: by name, each entry's name and value."""
@@ -91,14 +65,14 @@ class Dialect:
     enums: Mapping[str, Mapping[str, int]]
 
 
-def _message(row: list[Any]) -> Message:
-    number, fields = row
-    return Message(number, {name: Field(*field) for name, field in fields.items()})
-
-
 def from_table(table: Mapping[str, Any]) -> Dialect:
     """The dialect that a table as in `dialect.json` describes."""
-    return Dialect(_Lazy(table["messages"], _message), _Lazy(table["enums"], MappingProxyType))
+    messages = {
+        name: Message(number, {field: Field(*row) for field, row in fields.items()})
+        for name, (number, fields) in table["messages"].items()
+    }
+    enums = {name: MappingProxyType(entries) for name, entries in table["enums"].items()}
+    return Dialect(MappingProxyType(messages), MappingProxyType(enums))
 
 
 @cache

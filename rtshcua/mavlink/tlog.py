@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from typing import BinaryIO
 
 from rtshcua.mavlink.framing import HEADER, MARKER, frame_length
@@ -35,16 +36,7 @@ def read(data: bytes) -> Iterator[Entry]:
 
     Raises `DamagedTlog` when it comes to bytes that are no whole entry, after yielding all before them.
     """
-    offset = 0
-    while offset < len(data):
-        start = offset + STAMP
-        if len(data) < start + HEADER or data[start] != MARKER:
-            raise DamagedTlog(offset)
-        end = start + frame_length(data, start)
-        if len(data) < end:
-            raise DamagedTlog(offset)
-        yield Entry(int.from_bytes(data[offset:start], "big"), data[start:end])
-        offset = end
+    yield from stream(BytesIO(data))
 
 
 def stream(file: BinaryIO) -> Iterator[Entry]:

@@ -11,8 +11,7 @@ from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Approval, Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import names
-from rtshcua.wire.bundle import parse
-from rtshcua.wire.document import DocumentError, check_person, check_times, open_document, sign_document
+from rtshcua.wire.document import DocumentError, check_person, check_times, check_vehicle, open_document, sign_document
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 
@@ -52,12 +51,10 @@ def open_approval(
     Raises `DocumentError`: its own slugs are `wrong-vehicle`, `unknown-invocation`, `binding-mismatch`, `not-asked`;
     and `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
-    opened = open_document(document, names.APPROVAL, Duty.APPROVAL, root, now)
-    said = parse(names.APPROVAL, opened.payload, ApprovalDocument)
+    said, opened = open_document(document, names.APPROVAL, ApprovalDocument, Duty.APPROVAL, root, now)
     if said.granted not in (0, 1):
         raise DocumentError("malformed", "it neither grants nor refuses")
-    if said.vehicle != vehicle:
-        raise DocumentError("wrong-vehicle", f"it is for `{said.vehicle[:80]}`, this vehicle is `{vehicle}`")
+    check_vehicle(said.vehicle, vehicle)
     check_person(opened.key, said.role, vehicle, now)
     check_times(said.issued_at_us, said.expires_at_us, now)
     invocation = next((each for each in mission.invocations if each.invocation_id == said.invocation_id), None)

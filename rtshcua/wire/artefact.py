@@ -3,10 +3,16 @@
 An array, not a map: the bytes then really begin with name and version, whatever the body's keys sort like.
 """
 
+from typing import TypeVar
+
+import msgspec
+
 from rtshcua.wire import cbor
 from rtshcua.wire.cbor import CborError, Value
 from rtshcua.wire.names import Artefact
 from rtshcua.wire.untrusted import Untrusted
+
+_S = TypeVar("_S", bound=msgspec.Struct)
 
 
 class ArtefactError(Untrusted):
@@ -35,3 +41,21 @@ def unwrap(artefact: Artefact, data: bytes) -> Value:
                 )
             return body
     raise ArtefactError("malformed", f"this is no `{artefact.name}`: not an array of format name, version and body")
+
+
+def pack(artefact: Artefact, body: msgspec.Struct) -> bytes:
+    """The canonical bytes of an artefact whose body is a struct."""
+    return wrap(artefact, msgspec.to_builtins(body, builtin_types=(bytes,)))
+
+
+def unpack(artefact: Artefact, data: bytes, shape: type[_S], error: type[Untrusted], what: str) -> _S:
+    """The body of `data`, a struct, provided that `pack` gives `data` of it. Raises `error`, slug `malformed`, with
+    `what` it is not, and `ArtefactError`.
+    """
+    try:
+        body = msgspec.convert(unwrap(artefact, data), shape, builtin_types=(bytes,))
+    except msgspec.ValidationError as invalid:
+        raise error("malformed", f"not a {what}: {invalid}") from None
+    if pack(artefact, body) != data:
+        raise error("malformed", f"not the bytes that this {what} encodes to")
+    return body

@@ -7,8 +7,6 @@ parsed, and their digests are those of the bytes that were signed.
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
-import msgspec
-
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
@@ -52,12 +50,12 @@ class Bundle:
 
 def policy_payload(policy: Policy) -> bytes:
     """The bytes that a policy key signs."""
-    return _payload(names.POLICY, policy)
+    return artefact.pack(names.POLICY, policy)
 
 
 def mission_payload(mission: Mission) -> bytes:
     """The bytes that a mission key signs."""
-    return _payload(names.MISSION, mission)
+    return artefact.pack(names.MISSION, mission)
 
 
 def policy_digest(payload: bytes) -> bytes:
@@ -82,8 +80,8 @@ def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: in
     Raises `BundleError`, `EnvelopeError` and `ArtefactError`.
     """
     first, second = envelopes(data)
-    signed_policy = _open(first, root, Duty.POLICY, names.POLICY)
-    signed_mission = _open(second, root, Duty.MISSION, names.MISSION)
+    signed_policy = open_envelope(first, root, Duty.POLICY, names.POLICY)
+    signed_mission = open_envelope(second, root, Duty.MISSION, names.MISSION)
     policy = parse(names.POLICY, signed_policy.payload, Policy)
     mission = parse(names.MISSION, signed_mission.payload, Mission)
     bundle = Bundle(
@@ -117,23 +115,16 @@ def envelopes(data: bytes) -> tuple[bytes, bytes]:
 
 def parse(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
     """The flat form in a payload that was verified. Raises `BundleError` and `ArtefactError`."""
-    try:
-        flat = msgspec.convert(artefact.unwrap(kind, payload), shape, builtin_types=(bytes,))
-    except msgspec.ValidationError as error:
-        raise BundleError("malformed", f"not a `{kind.name}`: {error}") from None
-    if _payload(kind, flat) != payload:
-        raise BundleError("malformed", f"not the bytes that this `{kind.name}` encodes to")
-    return flat
+    return artefact.unpack(kind, payload, shape, BundleError, f"`{kind.name}`")
 
 
-def _payload(kind: Artefact, flat: Flat) -> bytes:
-    return artefact.wrap(kind, msgspec.to_builtins(flat, builtin_types=(bytes,)))
+def open_envelope(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact, limit: int = MAX_BUNDLE) -> Opened:
+    """The payload of an artefact that a key of the root signed for a duty. Raises `EnvelopeError`.
 
-
-def _open(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact) -> Opened:
-    """All keys of the root are offered, so that one of another duty is told apart from one that nobody knows."""
+    All keys of the root are offered, so that one of another duty is told apart from one that nobody knows.
+    """
     keys = {key.kid: key for key in root.keys}
-    return cose.open1(envelope, keys=keys, duty=duty, content_type=kind.content_type)
+    return cose.open1(envelope, keys=keys, duty=duty, content_type=kind.content_type, limit=limit)
 
 
 def _check_belonging(bundle: Bundle) -> None:

@@ -33,11 +33,6 @@ class Opened:
     payload: bytes
     key: VerificationKey
 
-    @property
-    def kid(self) -> bytes:
-        """The signer's name."""
-        return self.key.kid
-
 
 @dataclass(frozen=True, slots=True)
 class Unverified:

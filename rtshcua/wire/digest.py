@@ -1,7 +1,7 @@
 """SHA-256 with domain separation: a digest of one kind of thing is never a digest of another."""
 
 from hashlib import sha256
-from typing import Final, NewType
+from typing import Any, Final, NewType
 
 #: what a digest is over; a label holds no NUL, so that label and data cannot run into each other
 Domain = NewType("Domain", bytes)
@@ -16,7 +16,18 @@ KEY: Final = Domain(b"rtshcua/key")  # a duty and a public key
 #: length of a digest in bytes
 DIGEST_BYTES: Final = 32
 
+_BLOCK: Final = 64  # of SHA-256
+
 
 def digest(domain: Domain, data: bytes) -> bytes:
     """SHA-256 over label, 0x00 and data: 32 bytes."""
     return sha256(domain + b"\0" + data).digest()
+
+
+def hmac_halves(key: bytes) -> tuple[Any, Any]:
+    """The inner and the outer hash of HMAC-SHA256 (RFC 2104) under a key, as far as no message comes in.
+
+    Who makes many under one key copies these: half the time of `hmac.digest`.
+    """
+    padded = (sha256(key).digest() if len(key) > _BLOCK else key).ljust(_BLOCK, b"\0")
+    return sha256(bytes(octet ^ 0x36 for octet in padded)), sha256(bytes(octet ^ 0x5C for octet in padded))

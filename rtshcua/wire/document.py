@@ -4,13 +4,12 @@ Each is a COSE_Sign1 around an artefact of its own content type, so that none ca
 speaks for a bounded time: it says when it was issued and when it ends, in UTC us.
 """
 
-from typing import Final
-
-import msgspec
+from typing import Final, TypeVar
 
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import artefact, cose, names
+from rtshcua.wire.bundle import open_envelope, parse
 from rtshcua.wire.cbor_strict import CborError, head
 from rtshcua.wire.cose import Opened
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
@@ -31,6 +30,9 @@ _STRING: Final = 2
 _EMPTY_MAP: Final = b"\xa0"
 
 _KINDS: Final = {kind.content_type: kind for kind in (names.APPROVAL, names.RECALL, names.REPLACEMENT)}
+
+
+_F = TypeVar("_F", bound=Flat)
 
 
 class DocumentError(Untrusted):
@@ -86,24 +88,32 @@ def _outlined(document: bytes) -> bool:
 
 def sign_document(kind: Artefact, body: Flat, key: SigningKey, duty: Duty) -> bytes:
     """The signed document. Raises `WrongDuty` for a key of another duty."""
-    payload = artefact.wrap(kind, msgspec.to_builtins(body, builtin_types=(bytes,)))
-    return cose.sign1(payload, key=key, duty=duty, content_type=kind.content_type)
+    return cose.sign1(artefact.pack(kind, body), key=key, duty=duty, content_type=kind.content_type)
 
 
-def open_document(document: bytes, kind: Artefact, duty: Duty, root: TrustRoot, now: Now) -> Opened:
-    """The payload, if a key that the root trusts for the duty signed it, and the root is still good for certain.
+def open_document(
+    document: bytes, kind: Artefact, shape: type[_F], duty: Duty, root: TrustRoot, now: Now
+) -> tuple[_F, Opened]:
+    """What a document says, if a key that the root trusts for the duty signed it, and the root is still good for
+    certain; and what was signed, by which key.
 
-    Raises `DocumentError` and `EnvelopeError`.
+    Raises `DocumentError`, `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
     check_root(root, now)
-    keys = {key.kid: key for key in root.keys}
-    return cose.open1(document, keys=keys, duty=duty, content_type=kind.content_type, limit=MAX_DOCUMENT)
+    opened = open_envelope(document, root, duty, kind, MAX_DOCUMENT)
+    return parse(kind, opened.payload, shape), opened
 
 
 def check_root(root: TrustRoot, now: Now) -> None:
     """Whether the root is still good, for certain."""
     if now.utc_us + now.utc_error_us >= root.expires_at_us:
         raise DocumentError("root-expired", f"trust root version {root.version} has expired, or may have")
+
+
+def check_vehicle(named: str, vehicle: str) -> None:
+    """Whether a document is for this vehicle."""
+    if named != vehicle:
+        raise DocumentError("wrong-vehicle", f"it is for `{named[:80]}`, this vehicle is `{vehicle}`")
 
 
 def check_key(key: VerificationKey, vehicle: str, now: Now) -> None:

@@ -6,20 +6,18 @@ A step's permit is the standing permit for the links behind it too, so that one 
 """
 
 from functools import lru_cache
-from hashlib import sha256
 from hmac import compare_digest
 from struct import Struct
 from typing import Any
 
 import msgspec
 
+from rtshcua.wire.digest import hmac_halves
+
 VERSION = 1
 _DOMAIN = b"rtshcua/permit\x00"
 _BODY = Struct(">BBhhQBBq")
 _MAC = 32
-_BLOCK = 64  # of SHA-256
-#: RFC 2104: each octet of the key with 0x36, and with 0x5c
-_INNER, _OUTER = (bytes(octet ^ pad for octet in range(256)) for pad in (0x36, 0x5C))
 SIZE = _BODY.size + _MAC
 
 #: How long a permit for a link that was just decided may be used, in us.
@@ -86,5 +84,6 @@ def _mac(key: bytes, body: bytes) -> bytes:
 @lru_cache(maxsize=4)
 def _begun(key: bytes) -> tuple[Any, Any]:
     """The two hashes of the MAC, as far as they are the same for all permits: that takes longer than the rest."""
-    padded = (sha256(key).digest() if len(key) > _BLOCK else key).ljust(_BLOCK, b"\0")
-    return sha256(padded.translate(_INNER) + _DOMAIN), sha256(padded.translate(_OUTER))
+    inner, outer = hmac_halves(key)
+    inner.update(_DOMAIN)
+    return inner, outer

@@ -9,8 +9,15 @@ from collections.abc import Collection
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import names
-from rtshcua.wire.bundle import parse
-from rtshcua.wire.document import HUMAN, DocumentError, check_key, check_times, open_document, sign_document
+from rtshcua.wire.document import (
+    HUMAN,
+    DocumentError,
+    check_key,
+    check_times,
+    check_vehicle,
+    open_document,
+    sign_document,
+)
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 
@@ -47,15 +54,13 @@ def open_recall(
     its own slugs are `wrong-vehicle`, `wrong-source`, `key-expired`, `other-mission`, `other-policy`,
     `before-mission`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
-    opened = open_document(document, names.RECALL, Duty.APPROVAL, root, now)
-    said = parse(names.RECALL, opened.payload, RecallDocument)
+    said, opened = open_document(document, names.RECALL, RecallDocument, Duty.APPROVAL, root, now)
     if bool(said.mission) == bool(said.policy):
         raise DocumentError("malformed", "a recall names either a mission or a policy")
-    if said.vehicle != vehicle:
-        raise DocumentError("wrong-vehicle", f"it is for `{said.vehicle[:80]}`, this vehicle is `{vehicle}`")
+    check_vehicle(said.vehicle, vehicle)
     check_key(opened.key, vehicle, now)
     if HUMAN not in opened.key.sources:
-        raise DocumentError("wrong-source", f"key {opened.kid.hex()} may not speak in person")
+        raise DocumentError("wrong-source", f"key {opened.key.kid.hex()} may not speak in person")
     check_times(said.issued_at_us, said.expires_at_us, now)
     if said.mission and said.mission not in missions:
         raise DocumentError("other-mission", "it recalls another mission than the one that flies")

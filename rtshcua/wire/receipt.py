@@ -37,7 +37,7 @@ class Receipt(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_field
 
 def encode(receipt: Receipt) -> bytes:
     """The octets of a receipt."""
-    return artefact.wrap(names.RECEIPT, msgspec.to_builtins(receipt))
+    return artefact.pack(names.RECEIPT, receipt)
 
 
 def decode(data: bytes) -> Receipt | Refusal:

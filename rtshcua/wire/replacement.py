@@ -17,7 +17,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import cbor, names
 from rtshcua.wire.binding import bind
-from rtshcua.wire.bundle import Bundle, check_bundle, parse
+from rtshcua.wire.bundle import Bundle, check_bundle
 from rtshcua.wire.digest import MISSION, digest
 from rtshcua.wire.document import DocumentError, open_document, sign_document
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
@@ -72,8 +72,7 @@ def open_replacement(document: bytes, *, root: TrustRoot, vehicle: str, bundle: 
     Whether it fits what has flown is for `fit_replacement`. Raises `DocumentError` (`issued-in-future`, `no-step`),
     `BundleError` as for a mission in a bundle, `EnvelopeError` and `ArtefactError`.
     """
-    opened = open_document(document, names.REPLACEMENT, Duty.MISSION, root, now)
-    said = parse(names.REPLACEMENT, opened.payload, ReplacementDocument)
+    said, opened = open_document(document, names.REPLACEMENT, ReplacementDocument, Duty.MISSION, root, now)
     found = Replacement(said.supersedes, said.kept, said.mission, digest(MISSION, opened.payload), opened.key)
     candidate = with_fields(bundle, mission=found.mission, mission_digest=found.digest, mission_key=opened.key)
     check_bundle(candidate, vehicle, now.utc_us + now.utc_error_us)

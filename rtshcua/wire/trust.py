@@ -66,17 +66,12 @@ class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def encode(self) -> bytes:
         """The payload that a root key signs."""
-        return artefact.wrap(names.ROOT, msgspec.to_builtins(self, builtin_types=(bytes,)))
+        return artefact.pack(names.ROOT, self)
 
     @classmethod
     def decode(cls, payload: bytes) -> Self:
         """A root from its payload, which says nothing about who signed it. Raises `RootError` and `ArtefactError`."""
-        try:
-            root = msgspec.convert(artefact.unwrap(names.ROOT, payload), cls, builtin_types=(bytes,))
-        except msgspec.ValidationError as error:
-            raise RootError("malformed", f"not a trust root: {error}") from None
-        if root.encode() != payload:
-            raise RootError("malformed", "not the bytes that this trust root encodes to")
+        root = artefact.unpack(names.ROOT, payload, cls, RootError, "trust root")
         _check(root)
         return root
 
@@ -153,7 +148,7 @@ def speaker_refusal(key: VerificationKey, *, role: str, source: str, vehicle: st
 def _open(data: bytes, keys: dict[bytes, VerificationKey], now_us: int) -> TrustRoot:
     opened = cose.open1(data, keys=keys, duty=Duty.ROOT, content_type=names.ROOT.content_type, limit=MAX_ROOT)
     root = TrustRoot.decode(opened.payload)
-    signer = _check_signer(root, opened.kid)
+    signer = _check_signer(root, opened.key.kid)
     if now_us >= root.expires_at_us:
         raise RootError("expired", f"root version {root.version} has expired")
     if signer.expires_us is not None and now_us >= signer.expires_us:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from rtshcua.codec.decode import kind_of
+from rtshcua.codec.frames import kind_of
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import COMMAND_LONG, TEXT_OCTETS
 from rtshcua.mavlink.modes import CopterMode, Px4Mode

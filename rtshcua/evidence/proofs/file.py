@@ -105,7 +105,7 @@ class Extra(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
     def encode(self) -> bytes:
         """The canonical octets. Raises `CborError` when they would be too many for a reader."""
-        return artefact.wrap(names.PROOF, msgspec.to_builtins(self, builtin_types=(bytes,)))
+        return artefact.pack(names.PROOF, self)
 
 
 def read_extra(data: bytes) -> Extra | Flaw:

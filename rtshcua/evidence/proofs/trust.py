@@ -9,18 +9,11 @@ from urllib.parse import unquote
 
 from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.note import ID_BYTES, Checkpoint, key_id, open_note, parse, read_signature, split
+from rtshcua.evidence.note import ID_BYTES, Checkpoint, key_id, open_note, parse, read_signature, renamed, split
 from rtshcua.evidence.rooted import may_not_sign, trusted_root
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
 from rtshcua.wire.keys import Duty, VerificationKey
 from rtshcua.wire.trust import TrustRoot
-
-_NOTE = {
-    "note/unsigned": "proof/note",
-    "note/malformed": "proof/note",
-    "note/key": "proof/key",
-    "note/signature": "proof/signature",
-}
 
 
 class Name(NamedTuple):
@@ -57,7 +50,7 @@ def believe(notes: tuple[str, ...], root: bytes, pinned: bytes, now_us: int) -> 
     """
     first = parse(split(notes[0])[0])
     if isinstance(first, Flaw):
-        return first._replace(slug=_NOTE[first.slug])
+        return renamed(first, "proof")
     name = name_of(first.origin)
     if isinstance(name, Flaw):
         return name
@@ -102,7 +95,7 @@ def _follow(notes: tuple[str, ...], name: Name, log_key: VerificationKey, root: 
             public = log_key.public if certified else last.key
         opened = open_note(note, name.origin, public)
         if isinstance(opened, Flaw):
-            return opened._replace(slug=_NOTE[opened.slug])
+            return renamed(opened, "proof")
         if opened.origin != name.origin:
             return Flaw("proof/chain", "the checkpoints are of different logs", opened.origin, name.origin)
         if checkpoints and opened.size <= checkpoints[-1].size:

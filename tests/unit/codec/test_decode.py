@@ -5,8 +5,7 @@ from random import Random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.decode import decode, kind_of
-from rtshcua.codec.frames import Codec
+from rtshcua.codec.frames import Codec, decode, kind_of
 from rtshcua.mavlink.framing import checksum
 
 NOT_MADE = ("_header", "_payload", "_msgbuf", "_crc")

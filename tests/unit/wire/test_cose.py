@@ -41,7 +41,7 @@ def rebuilt(protected=None, unprotected=None, payload=None, signature=None):
 
 def test_what_is_signed_is_opened():
     assert opened(ENVELOPE) == cose.Opened(PAYLOAD, PUBLIC)
-    assert opened(ENVELOPE).kid == KEY.kid
+    assert opened(ENVELOPE).key.kid == KEY.kid
     assert cose.sign1(PAYLOAD, key=KEY, duty=Duty.POLICY, content_type=TYPE) == ENVELOPE
 
 

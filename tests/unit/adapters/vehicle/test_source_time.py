@@ -9,8 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference.stamped_link import LinkKind, StampedVehicle
 from rtshcua.adapters.vehicle.source_time import APART_US, DRIFT_US, EACH_US, GAP_US, STEP_US, SourceTime
-from rtshcua.codec.decode import kind_of
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import Received, kind_of
 from rtshcua.mavlink import dialect
 
 S = 1_000_000

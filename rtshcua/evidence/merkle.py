@@ -50,23 +50,25 @@ class Tree:
     def graft(self, height: int, node: bytes) -> None:
         """Adds a perfect subtree of 2**height leaves by its root; `size` is a multiple of that."""
         self._fold()
-        self._join(self.size >> height, node)
+        self._join(self.size >> height, (node,))
         self.size += 1 << height
 
     def _fold(self) -> None:
-        for number, leaf in enumerate(self._leaves, self.size - len(self._leaves)):
-            self._join(number, leaf)
+        self._join(self.size - len(self._leaves), self._leaves)
         self._leaves.clear()
 
-    def _join(self, bits: int, node: bytes) -> None:
-        """Puts a node behind the perfect subtrees, with those of its size that stand before it joined to it: as many as
-        `bits`, the number of such nodes before it, ends in ones.
+    def _join(self, number: int, nodes: Iterable[bytes]) -> None:
+        """Puts nodes of one size behind the perfect subtrees, of which `number` of that size come before: each is
+        joined to those of its size that stand before it, as many as its number ends in ones.
         """
         perfect = self._perfect
-        while bits & 1:
-            node = node_hash(perfect.pop(), node)
-            bits >>= 1
-        perfect.append(node)
+        for node in nodes:
+            bits = number
+            while bits & 1:
+                node = node_hash(perfect.pop(), node)
+                bits >>= 1
+            perfect.append(node)
+            number += 1
 
     def root(self) -> bytes:
         """The root hash MTH(D[n]) of the leaves so far."""

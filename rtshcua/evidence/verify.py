@@ -98,7 +98,7 @@ class Verifier:
         return record._replace(found=shown(line)) if isinstance(record, Flaw) and not record.found else record
 
     def _check_place(self, record: AnyRecord) -> Flaw | None:
-        number = self.records
+        number = self._head.seq
         # 3 the genesis
         if isinstance(record, Genesis):
             if number:
@@ -131,7 +131,7 @@ class Verifier:
         # 6 the epochs
         head = self._head
         if isinstance(record, Decision | Effect):
-            if head.records > MOST_RECORDS or record.at_us - self._signed_us > LONGEST_US:
+            if head.seq - head.first > MOST_RECORDS or record.at_us - self._signed_us > LONGEST_US:
                 text = f"the epoch that record {head.first} began should have been sealed before"
                 found = f"{head.records} records, {record.at_us - self._signed_us} us after it"
                 return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {LONGEST_US} us")

@@ -78,7 +78,7 @@ def _array(items: Sequence[object], depth: int) -> bytes:
     parts = [_head(4, len(items))]
     add = parts.append
     for item in items:
-        # Requests and lowered code are mostly integers: the common widths are written with one call at most.
+        # Lowered code is mostly integers: the common widths are written with one call at most.
         if type(item) is not int:
             add(_item(item, depth))
         elif -257 < item < 256:

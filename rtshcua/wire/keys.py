@@ -12,9 +12,10 @@ from rtshcua.model.flat.contract import SourceKind
 from rtshcua.wire import digest
 from rtshcua.wire.untrusted import Untrusted
 
-#: length of a key identifier and of a public key in bytes
+#: length of a key identifier, a public key and a seed in bytes
 KID_BYTES: Final = 16
 PUBLIC_BYTES: Final = 32
+SEED_BYTES: Final = 32
 
 #: stands for every role or every vehicle; a source is always named
 ANY: Final = "*"

@@ -3,11 +3,10 @@
 A command line that holds anything else than the options listed here, in their usual forms, is left to typer: help,
 mistakes, abbreviations, and whatever is not understood.
 
-Fast twin of `check` and `lint` by typer. Goal: 20 files are linted within 80 times `python -c pass` (bench/lint.py), and
-a mission is checked within 90 (bench/startup.py); on a busy machine 96 and 45 with it, 104 and 56 without
-(docs/adr/0037).
-tests/unit/cli/test_quick.py holds the lists against the commands that typer knows, and what is read here against what
-typer reads.
+Fast twin of `check` and `lint` by typer. Goal: 20 files are linted within 80 times `python -c pass` (bench/lint.py), a
+mission is checked within 90 (bench/startup.py); on a busy machine 96 and 45 with it, 104 and 56 without
+(docs/adr/0037). tests/unit/cli/test_quick.py holds the lists against the commands that typer knows, and what is read
+here against what typer reads.
 """
 
 from collections.abc import Callable, Mapping, Sequence

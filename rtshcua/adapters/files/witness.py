@@ -20,8 +20,7 @@ from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, lock, m
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.note import parse, split
 from rtshcua.evidence.witnessing.cosign import cosign, cosignatures
-from rtshcua.evidence.witnessing.submission import anchor
-from rtshcua.evidence.witnessing.submission import request_of, survey
+from rtshcua.evidence.witnessing.submission import anchor, request_of, survey
 from rtshcua.evidence.witnessing.witness import (
     CONFLICT,
     INCONSISTENT,

@@ -3,9 +3,9 @@
 Lark's own driver makes an object of each token and a tree of each rule. This one keeps offsets, hands the parts of a
 rule straight to the builder, and leaves its stacks as they are when it stops, so that `recovery` can go on from there.
 
-Fast twin of Lark's driver. Goal: text to IR in at most the time of a bare Lark parse (bench/parse.py); 0.34 of it, where
-Lark's tree would have to be walked besides (docs/adr/0006 and 0037). tests/unit/ground/language/test_any_text.py holds
-that both take the same texts.
+Fast twin of Lark's driver. Goal: text to IR in at most the time of a bare Lark parse (bench/parse.py); 0.34 of it,
+where Lark's tree would have to be walked besides (docs/adr/0006 and 0037). tests/unit/ground/language/test_any_text.py
+holds that both take the same texts.
 """
 
 from dataclasses import dataclass, field

@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from virtual import once
+
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 # Wall time says nothing on a shared machine, so no deadline. `make test` tries the same few examples everywhere;
@@ -42,11 +44,16 @@ NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "te
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Where no byte code may be kept, all processes of a run share theirs, away from the checkout.
+    """All processes of a run share a folder; and where no byte code may be kept, theirs, away from the checkout.
 
     What is installed has its byte code, and is linked to it; the rest is compiled by whoever comes first.
     """
-    if hasattr(config, "workerinput") or not os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+    if hasattr(config, "workerinput"):
+        return
+    shared = TemporaryDirectory(prefix="rtshcua_once_")
+    config.add_cleanup(shared.cleanup)
+    os.environ[once.FOLDER] = shared.name
+    if not os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
         return
     folder = TemporaryDirectory(prefix="rtshcua_byte_code_")
     config.add_cleanup(folder.cleanup)

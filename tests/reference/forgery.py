@@ -18,10 +18,11 @@ from reference.resealing import resealed
 from reference.verifiers import ROOT_KEY, agree
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit, audit
-from rtshcua.simulation.faults import BatteryLevel
+from rtshcua.simulation.faults import BatteryLevel, Fault
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
 from virtual.flight import Flight
+from virtual.once import once
 
 LOG_KEY = case.KEYS[Duty.LOG]
 SIGNED = ("genesis", "seal", "recover", "close")
@@ -29,18 +30,22 @@ SIGNED = ("genesis", "seal", "recover", "close")
 STRANGER = b"\x77" * 32
 
 
+def flown(bundle: bytes, *faults: Fault) -> tuple[bytes, ...]:
+    """The lines of a flight's log."""
+    return tuple(Flight(bundle, case.simulated("px4", faults=faults)).fly().lines)
+
+
 @cache
 def flight() -> tuple[bytes, ...]:
     """A short flight that completes."""
-    return tuple(Flight(case.seal(case.mission(case.short_steps())), case.simulated("px4")).fly().lines)
+    return once("flight", lambda: flown(case.seal(case.mission(case.short_steps()))))
 
 
 @cache
 def other_flight() -> tuple[bytes, ...]:
     """Another mission, which comes home early on a low battery."""
     bundle = case.seal(case.mission(case.short_steps(), issued_at_us=case.flat.ISSUED + 1))
-    config = case.simulated("px4", faults=(BatteryLevel(18_000_000, 2_000),))
-    return tuple(Flight(bundle, config).fly().lines)
+    return once("other_flight", lambda: flown(bundle, BatteryLevel(18_000_000, 2_000)))
 
 
 def prove(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> Audit:

@@ -11,6 +11,7 @@ from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.simulation.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
 from virtual import case
 from virtual.flight import Flight
+from virtual.once import once
 
 FAULTS: dict[str, tuple[Fault, ...]] = {
     "none": (),
@@ -23,6 +24,8 @@ FAULTS: dict[str, tuple[Fault, ...]] = {
     "pilot": (PilotMode(15 * S),),
     "silence": (LinkSilence(15 * S),),
 }
+#: those that are flown with the whole reference mission; the others with its first leg, on which the fault comes
+WHOLE = ("none", "obstacle")
 
 
 class Recorded(NamedTuple):
@@ -34,11 +37,15 @@ class Recorded(NamedTuple):
 
 @cache
 def recorded(fault: str, flavour: str, mode: Mode = Mode.SOFTWARE) -> Recorded:
-    """The reference mission with one of `FAULTS`. A vehicle that is never heard again flies for 6 minutes at most."""
+    """A mission with one of `FAULTS`. A vehicle that is never heard again flies for 4 minutes at most."""
+    return once(f"{fault}-{flavour}-{mode}", lambda: _flown(fault, flavour, mode))
+
+
+def _flown(fault: str, flavour: str, mode: Mode) -> Recorded:
     policy = case.policy()
     if fault == "silence":
-        policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=6 * MIN))
-    config = case.simulated(flavour, faults=FAULTS[fault])
-    flight = Flight(case.seal(case.mission(), policy), config, mode=mode)
+        policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=4 * MIN))
+    steps = None if fault in WHOLE else case.short_steps()
+    flight = Flight(case.seal(case.mission(steps), policy), case.simulated(flavour, faults=FAULTS[fault]), mode=mode)
     entries = kept(flight)
     return Recorded(tuple(flight.fly().lines), entries)

@@ -91,7 +91,7 @@ def test_a_log_that_fails_proves_nothing() -> None:
 
 
 def test_mode_none_needs_no_permits_and_says_so() -> None:
-    report = sound_without_permits(recorded("none", "px4", Mode.NONE).lines)
+    report = sound_without_permits(recorded("wind", "ardupilot", Mode.NONE).lines)
     assert "enforcement" in [claim.slug for claim in report.report.unproven]
     assert "dispatches" not in [claim.slug for claim in report.report.proven]
 

@@ -41,7 +41,7 @@ def test_log_and_frames_of_every_kind_of_flight_are_sound(fault: str, flavour: s
     assert (dispatches, frames.count) == (0, 0) if "ground" in fault else frames.count >= 2, "to arm, to take off"
 
 
-UNENFORCED = {("none", "px4"), ("wind", "ardupilot")}
+UNENFORCED = {("low battery", "px4"), ("wind", "ardupilot")}
 
 
 @pytest.mark.parametrize(

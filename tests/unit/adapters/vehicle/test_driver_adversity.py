@@ -14,6 +14,7 @@ from rtshcua.simulation.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss
 from rtshcua.simulation.kinematics import Body
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home
+from virtual.sampling import each_once
 
 Make = Callable[..., Any]
 #: where nothing depends on the autopilot, `make test` tries one of them
@@ -106,7 +107,7 @@ def goes_on(one: Any, command: int) -> None:
         assert isinstance(one.fly(MotionKind.HOME), Succeeded)
 
 
-@pytest.mark.parametrize("command", OURS)
+@pytest.mark.parametrize(("command", "flavour"), each_once(OURS, ["px4", "ardupilot"]))
 def test_lost_acknowledgements_change_nothing(flyer: Make, command: int) -> None:
     """What was obeyed and not acknowledged is seen by its effect; the retry's refusal is not taken for the first's."""
 
@@ -122,7 +123,7 @@ def test_lost_acknowledgements_change_nothing(flyer: Make, command: int) -> None
     goes_on(one, command)
 
 
-@pytest.mark.parametrize("command", OURS)
+@pytest.mark.parametrize(("command", "flavour"), each_once(OURS, ["ardupilot", "px4"]))
 def test_lost_commands_are_sent_again(flyer: Make, flavour: str, command: int) -> None:
     confirmations: list[int] = []
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import AirState, Ready, Sent, Succeeded
+from rtshcua.onboard.ports import AirState, Crashed, Ready, Sent, Succeeded
 from rtshcua.simulation.modes import Mode
 
 Make = Callable[..., Any]
@@ -66,14 +66,20 @@ def test_holds_for_its_time_and_no_longer(aloft: Make) -> None:
 def test_holds_on_without_a_time(aloft: Make) -> None:
     one = aloft()
     one.begin(MotionKind.HOLD)
-    assert not any(isinstance(event, Succeeded) for event in one.wait(60))
+    assert not any(isinstance(event, Succeeded) for event in one.wait(20))
+
+
+def rests(one: Any) -> bool:
+    """It has landed, and that was no crash."""
+    one.wait(10)
+    return not one.truth.armed and not any(isinstance(event, Crashed) for event in one.events)
 
 
 def test_comes_home_and_lands_there(aloft: Make) -> None:
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (50_000, 0), altitude=20_000, speed=8_000), Succeeded)
     assert isinstance(one.fly(MotionKind.HOME), Succeeded)
-    assert not one.truth.armed
+    assert rests(one)
     assert abs(one.truth.east_mm) < 2_000
 
 
@@ -81,7 +87,7 @@ def test_lands_where_it_is(aloft: Make) -> None:
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (50_000, 0), altitude=20_000, speed=8_000), Succeeded)
     assert isinstance(one.fly(MotionKind.LAND), Succeeded)
-    assert not one.truth.armed
+    assert rests(one)
     assert abs(one.truth.east_mm - 50_000) < 4_000
 
 

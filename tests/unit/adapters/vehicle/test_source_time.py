@@ -315,7 +315,7 @@ links = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=settings().max_examples * 2)
 @given(
     links,
     st.integers(0, 1 << 30),
@@ -336,7 +336,6 @@ def test_nothing_is_ever_taken_for_younger_than_it_is(link: LinkKind, seed: int,
     assert known > 10 or link.loss == 70 or link.down_us > 1_000_000
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 1 << 30), st.integers(-1_000, 1_000))
 def test_on_a_good_link_ages_are_right_to_some_ms(seed: int, ppm: int) -> None:
     """The error is the way up, what drift is allowed for between two round trips, and for what has no stamp of its own
@@ -357,7 +356,7 @@ def kinds() -> list[Any]:
     return [kind for kind in map(kind_of, every) if kind is not None]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=settings().max_examples * 4)
 @given(st.data())
 def test_hostile_frames_neither_raise_nor_make_anything_younger_than_it_came(data: st.DataObject) -> None:
     ear = Ear()

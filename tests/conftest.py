@@ -16,6 +16,7 @@ import pytest
 from hypothesis import settings
 
 from virtual import once
+from virtual.forked import Forked, forked
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
@@ -154,6 +155,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def checkout() -> Path:
     """The top of the checkout."""
     return CHECKOUT
+
+
+@pytest.fixture(scope="session")
+def commands() -> Iterator[Forked]:
+    """`rtshcua` in processes that need not load it first."""
+    with forked() as made:
+        yield made
 
 
 @pytest.fixture(scope="session")

@@ -1,23 +1,14 @@
 """Threat: a pipe lies where a source, a configuration or a bundle is expected. Who reads it would wait for ever."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from rtshcua.diagnostics.exits import ExitCode
+from virtual.forked import Forked
 
 PATIENCE_S = 60
-
-
-def run(words: list[str], folder: Path) -> tuple[int, str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", *words],
-        cwd=folder, check=False, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    return done.returncode, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
@@ -38,18 +29,18 @@ def run(words: list[str], folder: Path) -> tuple[int, str]:
     ],
     ids=" ".join,
 )
-def test_a_pipe_is_refused_and_not_waited_for(words: list[str], tmp_path: Path) -> None:
+def test_a_pipe_is_refused_and_not_waited_for(commands: Forked, words: list[str], tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.rts")
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "imports.rts").write_text('import "pipe.rts"\n')
-    code, said = run(words, tmp_path)
-    assert code == ExitCode.INPUT, said
-    assert "no regular file" in said
+    done = commands.run(words, tmp_path, PATIENCE_S)
+    assert done.code == ExitCode.INPUT, done
+    assert "no regular file" in done.out + done.err
 
 
-def test_an_import_of_a_pipe_is_a_finding(tmp_path: Path) -> None:
+def test_an_import_of_a_pipe_is_a_finding(commands: Forked, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.rts")
     (tmp_path / "imports.rts").write_text('import "pipe.rts"\n')
-    code, said = run(["check", "imports.rts"], tmp_path)
-    assert code == ExitCode.DIAGNOSTICS
-    assert "error[E0108]: cannot read `pipe.rts`: no regular file" in said
+    done = commands.run(["check", "imports.rts"], tmp_path, PATIENCE_S)
+    assert done.code == ExitCode.DIAGNOSTICS
+    assert "error[E0108]: cannot read `pipe.rts`: no regular file" in done.out + done.err

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.simulator import Simulator
+from virtual.forked import Forked
 
 COMMAND = [sys.executable, "-m", "rtshcua.cli.app", "doctor"]
 
@@ -44,9 +45,8 @@ def test_a_vehicle_over_real_udp() -> None:
         ([], 2, "--connect"),
     ],
 )
-def test_wrong_words(words: list[str], code: int, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = doctor(*words)
-    assert done.returncode == code
-    assert says in done.stderr
-    assert "Traceback" not in done.stderr
+def test_wrong_words(commands: Forked, words: list[str], code: int, says: str, tmp_path: Path) -> None:
+    done = commands.run(["doctor", *words], tmp_path, 120)
+    assert done.code == code
+    assert says in done.err
+    assert "Traceback" not in done.err

@@ -6,6 +6,7 @@ what it was made by.
 
 import os
 import sys
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -15,8 +16,9 @@ from rtshcua import __version__
 _PARTS = ("cli/linting", "decision", "diagnostics", "ground", "mavlink", "model", "wire")
 
 
+@cache
 def mark() -> str:
-    """The mark: a digest."""
+    """The mark: a digest. What runs is what was there when it was first asked for."""
     package = Path(__file__).resolve().parents[2]
     whole = sha256(f"{__version__} {sys.version_info[:3]}".encode())
     for part in _PARTS:

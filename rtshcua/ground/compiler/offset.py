@@ -7,6 +7,7 @@ less or more than what rounding may have moved. What may fall into parts or encl
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 
 from rtshcua.ground.checker.polygons import crossing, doubled_area
 from rtshcua.ground.compiler import convex, convolution
@@ -41,6 +42,7 @@ class Unshapely(Exception):
         self.reason = reason
 
 
+@lru_cache(maxsize=256)  # programs share zones, and an editor asks again at every change
 def inner(shape: Shape, margin: int) -> Shape:
     """A region within the points nearer than `margin` to `shape` (or, negative, further than that from its outside)."""
     if margin == 0:
@@ -60,6 +62,7 @@ def inner(shape: Shape, margin: int) -> Shape:
     )
 
 
+@lru_cache(maxsize=256)
 def outer(shape: Shape, margin: int) -> Shape:
     """A region around the points nearer than `margin` to `shape` (or, negative, further than that from its outside)."""
     if margin == 0:

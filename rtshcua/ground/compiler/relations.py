@@ -4,6 +4,7 @@ The rings of two areas part the plane into faces; each face is wholly inside an 
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 from rtshcua.ground.compiler.arrangement import TooManyPieces, faces
 from rtshcua.ground.compiler.distance import far
@@ -32,6 +33,7 @@ def _above(high: int, low: int, high_within: int, low_within: int, surely: bool)
     return high - slack >= low if surely else high + slack >= low
 
 
+@lru_cache(maxsize=1024)  # programs share zones, and an editor asks again at every change
 def _flat_within(inner: Shape, outer: Shape, surely: bool) -> bool:
     if isinstance(outer, Disc):
         if isinstance(inner, Disc):
@@ -58,6 +60,7 @@ def have_nothing_in_common(one: Region, other: Region, *, surely: bool = True) -
     return _flat_disjoint(one.shape, other.shape, surely)
 
 
+@lru_cache(maxsize=1024)
 def _flat_disjoint(one: Shape, other: Shape, surely: bool) -> bool:
     if isinstance(one, Disc):
         if isinstance(other, Disc):

@@ -1,6 +1,7 @@
 """Which names a piece of a source mentions. It may say too many, never too few: what is mentioned counts as used."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 from rtshcua.ground.checker.scope import ENTRY
@@ -16,7 +17,10 @@ def mentions(*nodes: Node | None) -> frozenset[str]:
 
     `bridge_a.entry` mentions `bridge_a` too. The type of a parameter is a word of the language.
     """
-    return frozenset(name for node in nodes for name in _mentioned(node))
+    found: set[str] = set()
+    for node in nodes:
+        _mentioned(node, found)
+    return frozenset(found)
 
 
 def mentioned_by(unit: Unit) -> frozenset[str]:
@@ -29,18 +33,25 @@ def _declarations(unit: Unit) -> Iterator[Node]:
     yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions, *unit.nominals, *unit.tests)
 
 
-def _mentioned(node: Any) -> Iterator[str]:
-    if isinstance(node, Reference):
-        yield node.name
-        yield node.name.removesuffix(ENTRY)
-    elif isinstance(node, Name):
-        yield node.text
-    elif isinstance(node, Named):  # in a test: a signal, or a parameter of a skill
-        yield node.name.text
-    elif isinstance(node, Node):
-        for field in type(node).__struct_fields__:
-            if field not in ("span", "name") and not (field == "type" and isinstance(node, Parameter)):
-                yield from _mentioned(getattr(node, field))
-    elif type(node) is tuple:
+def _mentioned(node: Any, found: set[str]) -> None:
+    kind = type(node)
+    if kind is tuple:
         for part in node:
-            yield from _mentioned(part)
+            _mentioned(part, found)
+    elif kind is Reference:
+        found.add(node.name)
+        found.add(node.name.removesuffix(ENTRY))
+    elif kind is Name:
+        found.add(node.text)
+    elif kind is Named:  # in a test: a signal, or a parameter of a skill
+        found.add(node.name.text)
+    elif isinstance(node, Node):
+        for field in _fields(kind):
+            _mentioned(getattr(node, field), found)
+
+
+@cache
+def _fields(kind: type[Node]) -> tuple[str, ...]:
+    """The fields of a node that may mention something."""
+    given = ("span", "name", "type") if issubclass(kind, Parameter) else ("span", "name")
+    return tuple(field for field in kind.__struct_fields__ if field not in given)

@@ -23,11 +23,12 @@ from rtshcua.model.ir.missions import Step
 
 
 class Part(NamedTuple):
-    """Something that must hold: what it is, where it is written, its condition."""
+    """Something that must hold: what it is, where it is written, its condition; of a clause, what that comes from."""
 
     words: str
     span: Span
     node: tree.Node
+    code: tuple[int, ...] = ()
 
 
 def prove(ground: Ground) -> None:
@@ -38,7 +39,7 @@ def prove(ground: Ground) -> None:
     for number, contract in enumerate(ground.prepared.policy.contracts):
         space = ground.questions.space(number)
         parts = list(_clauses(ground, contract))
-        _vacuous(ground, contract, parts, space)
+        _vacuous(ground, number, contract, parts)
         name = ground.context.symbols.skills[contract.name].name.span
         together = (
             f"this part of `{contract.name}` can never hold",
@@ -64,7 +65,7 @@ def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> No
         skills = ground.prepared.policy.contracts[flat.skill]
         known = {clause.span for clause in _clauses(ground, skills)}
         own = [part for part in _clauses(ground, flat.contract) if part.span not in known]
-        _vacuous(ground, flat.contract, own, ground.questions.space(flat.skill))
+        _vacuous(ground, flat.skill, flat.contract, own)
     space = ground.questions.space(flat.skill)._replace(arguments=invocation.arguments)
     parts = [*_clauses(ground, flat.contract), *_airspace(ground)]
     name = flat.contract.name
@@ -82,7 +83,7 @@ def _clauses(ground: Ground, contract: Contract) -> Iterator[Part]:
         ("maintains", contract.maintain),
     ):
         for clause in clauses:
-            yield Part(words, ground.span(clause), ground.prepared.compiler.node(clause, contract))
+            yield Part(words, ground.span(clause), ground.prepared.compiler.node(clause, contract), clause.code)
 
 
 def _airspace(ground: Ground) -> Iterator[Part]:
@@ -133,9 +134,11 @@ def _together(
     )
 
 
-def _vacuous(ground: Ground, contract: Contract, parts: Sequence[Part], space: Space) -> None:
+def _vacuous(ground: Ground, skill: int, contract: Contract, parts: Sequence[Part]) -> None:
+    space = ground.questions.space(skill)
     for part in parts:
-        if isinstance(satisfiable([(part.node, FALSE | UNKNOWN)], space), No):
+        goal = (part.node, FALSE | UNKNOWN)
+        if isinstance(ground.questions.ask(("fails", skill, part.code), lambda goal=goal: [goal], space), No):
             ground.context.report.add(
                 codes.ALWAYS_HOLDS,
                 part.span,

@@ -6,6 +6,8 @@ It fakes the port, never the calls: the bundle is sealed, loaded and decided by 
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from typing import Any
 
 from msgspec.structs import replace
 
@@ -85,26 +87,49 @@ ROOT = TrustRoot(
 )
 
 
+class The:
+    """A thing, told by which one it is: what equals it may be made of other types, and have other bytes."""
+
+    __slots__ = ("thing",)
+
+    def __init__(self, thing: Any) -> None:
+        self.thing = thing
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, The) and self.thing is other.thing
+
+    def __hash__(self) -> int:
+        return id(self.thing)
+
+
+# Most tests begin with the same few bundles: these are sealed and opened once.
+_kept = lru_cache(maxsize=64)
+
+
 def sealed(policy: Policy = POLICY, mission: Mission = MISSION) -> bytes:
     """A bundle of both, bound and signed."""
-    return _seal(policy, binding.bind(mission, bundle.policy_digest(bundle.policy_payload(policy))))
+    return _sealed(The(policy), The(mission))
 
 
-def _seal(policy: Policy, bound: Mission) -> bytes:
-    payload, mission = bundle.policy_payload(policy), bundle.mission_payload(bound)
+@_kept
+def _sealed(policy: The, mission: The) -> bytes:
+    return _seal(policy, The(binding.bind(mission.thing, bundle.policy_digest(bundle.policy_payload(policy.thing)))))
+
+
+@_kept
+def _seal(policy: The, bound: The) -> bytes:
+    payload, mission = bundle.policy_payload(policy.thing), bundle.mission_payload(bound.thing)
     return bundle.seal(payload, mission, policy_key=POLICY_KEY, mission_key=MISSION_KEY)
 
 
-#: bundles of runs, by the digests of policy and mission: hundreds of runs have the same
-_bundles: dict[tuple[bytes, bytes], bytes] = {}
+@cache
+def _signed_root() -> bytes:
+    return ROOT.sign(ROOT_KEY)
 
 
 def sealed_again(of: Loaded) -> bytes:
     """The bundle that this came from."""
-    digests = of.bundle.policy_digest, of.bundle.mission_digest
-    if digests not in _bundles:
-        _bundles[digests] = _seal(of.bundle.policy, of.bundle.mission)
-    return _bundles[digests]
+    return _seal(The(of.bundle.policy), The(of.bundle.mission))
 
 
 def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = False) -> Loaded | Refusal:
@@ -122,7 +147,12 @@ def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = F
 
 def loaded(policy: Policy = POLICY, mission: Mission = MISSION, mode: Mode = Mode.SOFTWARE) -> Loaded:
     """The bundle of both, in force."""
-    result = try_load(sealed(policy, mission), mode, own_simulator=True)
+    return renewed(_loaded(The(policy), The(mission), mode))
+
+
+@_kept
+def _loaded(policy: The, mission: The, mode: Mode) -> Loaded:
+    result = try_load(sealed(policy.thing, mission.thing), mode, own_simulator=True)
     assert isinstance(result, Loaded), result
     return result
 
@@ -233,7 +263,7 @@ class Run:
             recorder.genesis(
                 START,
                 bundle=sealed_again(self.loaded),
-                root=ROOT.sign(ROOT_KEY),
+                root=_signed_root(),
                 boot=bytes(16),
                 vehicle=VEHICLE,
                 mission=self.loaded.bundle.mission.name,

@@ -27,6 +27,19 @@ _Edge = tuple[Corner, Corner, int]
 MOST_MEETINGS = 1 << 18
 
 
+class _Crossing(Fraction):
+    """A coordinate of a place where edges cross; its hash, which is slow to compute, is asked for often."""
+
+    __slots__ = ("_hash",)
+
+    def __hash__(self) -> int:
+        try:
+            return self._hash
+        except AttributeError:
+            self._hash: int = super().__hash__()
+            return self._hash
+
+
 class TooManyPieces(Exception):
     """The curves meet more often than `MOST_MEETINGS`."""
 
@@ -117,7 +130,7 @@ def _common(one: _Edge, other: _Edge) -> list[Node]:
         return [b if t else a]
     if s in (0, cross):
         return [d if s else c]
-    return [(Fraction(a[0] * cross + ux * t, cross), Fraction(a[1] * cross + uy * t, cross))]
+    return [(_Crossing(a[0] * cross + ux * t, cross), _Crossing(a[1] * cross + uy * t, cross))]
 
 
 def _wind(pieces: dict[Key, Piece], edges: Sequence[_Edge], groups: int) -> None:

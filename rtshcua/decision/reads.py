@@ -5,11 +5,6 @@ from collections.abc import Iterable
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.policy import Monitor, Vehicle
 
-# Plain numbers: an enumeration is slow to be asked for, and code is long.
-_ONE = frozenset(map(int, (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN)))
-_PLACE = frozenset(map(int, (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT)))
-_MONITOR = int(Op.MONITOR)
-
 
 def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Monitor, ...] = ()) -> tuple[int, ...]:
     """The slots that well-formed clauses read, themselves or through the policy's temporal monitors, ascending; asking
@@ -21,11 +16,11 @@ def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Moni
         code = left.pop().code
         for at in range(0, len(code), 3):
             op = code[at]
-            if op in _ONE:
+            if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN):
                 slots.add(code[at + 1])
-            elif op in _PLACE:
+            elif op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT):
                 slots.update(where(vehicle))
-            elif op == _MONITOR and code[at + 1] not in seen:
+            elif op == Op.MONITOR and code[at + 1] not in seen:
                 seen.add(code[at + 1])
                 left.append(monitors[code[at + 1]].when)
     return tuple(sorted(slots))
@@ -33,7 +28,7 @@ def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Moni
 
 def monitored(clauses: Iterable[Clause]) -> bool:
     """Whether well-formed clauses ask a temporal monitor anything."""
-    return any(_MONITOR in clause.code[::3] for clause in clauses)
+    return any(Op.MONITOR in clause.code[::3] for clause in clauses)
 
 
 def where(vehicle: Vehicle) -> tuple[int, ...]:

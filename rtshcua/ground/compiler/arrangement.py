@@ -32,7 +32,7 @@ class _Crossing(Fraction):
 
     __slots__ = ("_hash",)
 
-    def __hash__(self) -> int:
+    def __hash__(self) -> int:  # type: ignore[override]  # typeshed takes it from `Complex`, which has none
         try:
             return self._hash
         except AttributeError:

@@ -46,7 +46,7 @@ def _mentioned(node: Any, found: set[str]) -> None:
     elif kind is Named:  # in a test: a signal, or a parameter of a skill
         found.add(node.name.text)
     elif isinstance(node, Node):
-        for field in _fields(kind):
+        for field in _fields(type(node)):
             _mentioned(getattr(node, field), found)
 
 

@@ -6,6 +6,7 @@ airspace hold together at the moment at which a step begins.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from rtshcua.decision import tree
@@ -138,7 +139,7 @@ def _vacuous(ground: Ground, skill: int, contract: Contract, parts: Sequence[Par
     space = ground.questions.space(skill)
     for part in parts:
         goal = (part.node, FALSE | UNKNOWN)
-        if isinstance(ground.questions.ask(("fails", skill, part.code), lambda goal=goal: [goal], space), No):
+        if isinstance(ground.questions.ask(("fails", skill, part.code), partial(list, (goal,)), space), No):
             ground.context.report.add(
                 codes.ALWAYS_HOLDS,
                 part.span,

@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle.effects import apart, still
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
-from rtshcua.adapters.vehicle.supervision import NEVER, Brakes, StageProgress, Stopping, TargetWatch
+from rtshcua.adapters.vehicle.supervision import NEVER, Brakes, BrakingWatch, StageProgress, TargetWatch
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Succeeded, TakenOver
 
@@ -206,7 +206,7 @@ class Manoeuvre:
         self._entered_us = 0
         self._waits = False  # the message of the stage was not sent yet
         self._progress: StageProgress | None = None
-        self._stop: Stopping | None = None
+        self._stop: BrakingWatch | None = None
         self._held_us: int | None = None
         self._stands: tuple[int, int] | None = None
         self._before = before if seen.mode is None else before | {seen.mode}
@@ -274,7 +274,7 @@ class Manoeuvre:
         self._before, self._modes = self.modes, stage.modes
         self._progress = None if stage.progress is None else StageProgress(stage.progress)
         if stage.stops and self._stop is None:
-            self._stop = Stopping(self._aids.brakes, seen)
+            self._stop = BrakingWatch(self._aids.brakes, seen)
         self._waits = stage.message is not None
         if not self._waits:
             self._commander.start(stage, seen.up_us)

@@ -88,7 +88,7 @@ class Brakes:
         return self.reaction_us + speed * _SECOND // self.braking + 2 * LAG_US
 
 
-class Stopping:
+class BrakingWatch:
     """Follows a vehicle that was told to stop, from the speed that it then had."""
 
     def __init__(self, brakes: Brakes, seen: ObservedVehicle) -> None:

@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.effects import STILL
 from rtshcua.adapters.vehicle.flavour import ExpectedProgress
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
-from rtshcua.adapters.vehicle.supervision import LAG_US, Brakes, StageProgress, Stopping
+from rtshcua.adapters.vehicle.supervision import LAG_US, Brakes, BrakingWatch, StageProgress
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Crashed, Failed, Ready, Succeeded, TakenOver
 from rtshcua.simulation.faults import Kill, LinkDelay, Pillar
@@ -135,7 +135,9 @@ def test_the_fastest_that_it_may_be(passed_s: float, fastest: int) -> None:
     assert BRAKES.fastest(10_000, round(passed_s * S)) == fastest
 
 
-def speeds(stop: Stopping, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0) -> float | None:
+def speeds(
+    stop: BrakingWatch, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0
+) -> float | None:
     """When a stop from 10 m/s fails, where the speed is `of` the seconds since; None: it does not."""
     for tick in range(round(until_s * 10)):
         seen = ObservedVehicle(up_us=tick * S // 10, speed=of(tick / 10))
@@ -144,8 +146,8 @@ def speeds(stop: Stopping, of: Callable[[float], int | None], until_s: float = 2
     return None
 
 
-def stop_from(speed: int | None) -> Stopping:
-    return Stopping(BRAKES, ObservedVehicle(speed=speed))
+def stop_from(speed: int | None) -> BrakingWatch:
+    return BrakingWatch(BRAKES, ObservedVehicle(speed=speed))
 
 
 def test_a_vehicle_that_brakes_as_declared_does_not_fail() -> None:

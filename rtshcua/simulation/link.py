@@ -31,7 +31,7 @@ class Link:
 
     def send(self, datagram: bytes, now_us: int) -> None:
         """Puts a datagram on its way."""
-        if self.silent or self._happens(self.loss):
+        if self.silent or (self.loss and self._happens(self.loss)):
             return
         if self.held:
             self._waiting.append(datagram)
@@ -39,9 +39,12 @@ class Link:
             self._launch(datagram, now_us)
 
     def _launch(self, datagram: bytes, now_us: int) -> None:
-        jitter_us = self._chance.randrange(self.jitter_us + 1) if self.jitter_us else 0
-        at_us = max(now_us + self.delay_us + jitter_us, self._free_us)
-        if self._happens(self.reordered):
+        at_us = now_us + self.delay_us
+        if self.jitter_us:
+            at_us += self._chance.randrange(self.jitter_us + 1)
+        if at_us < self._free_us:
+            at_us = self._free_us
+        if self.reordered and self._happens(self.reordered):
             at_us += OVERTAKEN_US
         else:
             self._free_us = at_us
@@ -64,4 +67,4 @@ class Link:
         return arrived
 
     def _happens(self, part: int) -> bool:
-        return part > 0 and self._chance.randrange(10_000) < part
+        return self._chance.randrange(10_000) < part

@@ -34,12 +34,6 @@ class ReceiverFault(Fault):
     __slots__ = ()
 
 
-class Hindrance(Fault):
-    """Something in the way."""
-
-    __slots__ = ()
-
-
 class AutopilotFault(Fault):
     """Of the autopilot itself."""
 
@@ -189,7 +183,7 @@ class LinkQuality(LinkFault):
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle(Hindrance):
+class Obstacle(Fault):
     """The sensor sees something ahead at this distance, and goes on seeing it there wherever the vehicle goes."""
 
     distance_mm: int
@@ -197,7 +191,7 @@ class Obstacle(Hindrance):
 
 
 @dataclass(frozen=True, slots=True)
-class Pillar(Hindrance):
+class Pillar(Fault):
     """A round thing stands in the world, from the ground up: what is seen of it depends on where the vehicle is.
 
     The place of its middle, and its height, are from home. Who flies into it crashes.

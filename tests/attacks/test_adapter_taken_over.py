@@ -51,5 +51,5 @@ def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason
     assert flown.dispatched()[:2] == ["takeoff", "goto"]
     assert "return_home" in flown.dispatched()
     assert flown.vehicle.simulation.truth().armed is False
-    assert highest < 36_000, "a return climbs to 30 m, and nothing climbs higher"
+    assert highest < 20_000, "a return climbs to 16 m, and nothing climbs higher"
     assert flown.audit().report.verdict is Verdict.VERIFIED

@@ -5,14 +5,13 @@ import pytest
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import Boot
 from rtshcua.virtual.vehicle import SECOND, START
-from virtual import case
 from virtual.flight import Flight
-from virtual.shipped import shipped
+from virtual.shipped import shipped, simulated
 
 
 @pytest.mark.parametrize(("flavour", "earliest_s", "latest_s"), [("px4", 5, 8), ("ardupilot", 41.6, 45)])
 def test_ready_when_the_estimator_is_and_not_before(flavour: str, earliest_s: float, latest_s: float) -> None:
-    flown = Flight(shipped("short"), case.simulated(flavour, boot=Boot.RECORDED)).fly()
+    flown = Flight(shipped("short"), simulated(flavour, boot=Boot.RECORDED)).fly()
     assert flown.ending is Ending.COMPLETED
     (ready,) = (r["at_us"] - START.monotonic_us for r in flown.records if r.get("event") == "ready")
     assert earliest_s * SECOND <= ready <= latest_s * SECOND

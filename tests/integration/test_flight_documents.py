@@ -15,6 +15,7 @@ from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.replacement import sign_replacement
 from virtual import case
 from virtual.flight import Flight, Flown
+from virtual.shipped import simulated
 
 S = case.S
 MISSION = """import "lib:policies/bridge_inspection.rts"
@@ -53,7 +54,7 @@ def shorter(tmp_path_factory: pytest.TempPathFactory) -> Mission:
 
 def fly(bundle: bytes, flavour: str, when: str, document: Callable[[Flight], bytes]) -> Flown:
     """Fly, and hand the document in 2 s after a record with these words; the log verifies."""
-    flight = Flight(bundle, case.simulated(flavour))
+    flight = Flight(bundle, simulated(flavour))
     since: list[int] = []
 
     def each(flight: Flight) -> Sequence[Event]:

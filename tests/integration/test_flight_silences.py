@@ -15,7 +15,7 @@ from rtshcua.onboard.runtime.view import Stage
 from rtshcua.simulation.faults import LinkReorder, LinkSilence, Way, WindStep
 from virtual import case
 from virtual.flight import Flight, Flown
-from virtual.shipped import shipped
+from virtual.shipped import shipped, simulated
 
 FLAVOURS = ("px4", "ardupilot")
 SECONDS = (0.5, 1.0, 2.5, 3.5, 5.0, 8.0, 20.0, 45.0)
@@ -59,7 +59,7 @@ STAGES: dict[str, Callable[[Flight], bool]] = {
 
 def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
     """The standard mission; what falls back does so for the wind."""
-    flight = Flight(shipped("standard"), case.simulated(flavour, seed=round(seconds * 10)))
+    flight = Flight(shipped("standard"), simulated(flavour, seed=round(seconds * 10)))
     since_us: list[int] = []
     blown: list[bool] = []
     under_way = WAITED if stage == "waiting" else UNDER_WAY
@@ -107,7 +107,7 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
 @pytest.mark.parametrize(
     ("flavour", "stage", "seconds", "way"),
     [
-        ("px4", "leg", 8.0, Way.UP),
+        ("px4", "return link", 8.0, Way.UP),
         ("ardupilot", "survey", 45.0, Way.DOWN),
         ("px4", "hover link", 5.0, Way.BOTH),
     ],

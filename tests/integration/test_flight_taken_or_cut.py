@@ -2,6 +2,7 @@
 `test_takeovers`).
 """
 
+from itertools import product
 from typing import Any
 
 import pytest
@@ -10,17 +11,19 @@ import pytest
 SPEED = 5
 FLAVOURS = ("px4", "ardupilot")
 
-pytestmark = pytest.mark.parametrize("flavour", FLAVOURS)
-
 
 def moments(run: Any, event: str) -> list[int]:
     """When an effect was recorded, in us."""
     return [record["at_us"] for record in run.log() if record["type"] == "effect" and record["event"] == event]
 
 
-@pytest.mark.parametrize(
-    "way", ["both", pytest.param("down", marks=pytest.mark.soak), pytest.param("up", marks=pytest.mark.soak)]
-)
+def others_in_soak(tried: tuple[str, str], *others: str) -> list[Any]:
+    """One (flavour, case) for `make test`; both flavours of it and of the other cases for soak."""
+    every = product(FLAVOURS, (tried[1], *others))
+    return [pytest.param(*each, marks=() if each == tried else pytest.mark.soak) for each in every]
+
+
+@pytest.mark.parametrize(("flavour", "way"), others_in_soak(("px4", "both"), "down", "up"))
 def test_a_silence_of_some_seconds_ends_no_flight(ground: Any, flavour: str, way: str) -> None:
     """What is only not heard of us is noted, and what is flown goes on; what is not heard is waited for."""
     direction = "" if way == "both" else f",way={way}"
@@ -34,13 +37,11 @@ def test_a_silence_of_some_seconds_ends_no_flight(ground: Any, flavour: str, way
         assert all(not lost < at_us < back for at_us in moments(run, "dispatched"))
 
 
+GOTO = "pilot-goto,at=14s,north=-30m,east=-30m,up=20m"
+
+
 @pytest.mark.parametrize(
-    "fault",
-    [
-        pytest.param("pilot,at=14s,mode=position", marks=pytest.mark.soak),
-        pytest.param("pilot-pause,at=14s", marks=pytest.mark.soak),
-        "pilot-goto,at=14s,north=-30m,east=-30m,up=20m",
-    ],
+    ("flavour", "fault"), others_in_soak(("ardupilot", GOTO), "pilot,at=14s,mode=position", "pilot-pause,at=14s")
 )
 def test_nothing_is_sent_after_a_takeover(ground: Any, flavour: str, fault: str) -> None:
     if flavour == "ardupilot":

@@ -16,7 +16,7 @@ from virtual import case
 from virtual.copying import copied
 from virtual.flight import Flight, Flown
 from virtual.sampling import each_once
-from virtual.shipped import NAMES, shipped
+from virtual.shipped import NAMES, shipped, simulated
 
 STEPS = {"short": 3, "standard": 6, "extended": 12, "one_bridge": 6}
 FLAVOURS = ("px4", "ardupilot")
@@ -38,13 +38,13 @@ def verified(flown: Flown) -> Flown:
 
 
 def fly(name: str, flavour: str, *faults: str, **more: Any) -> Flown:
-    config = case.simulated(flavour, faults=tuple(parse_fault(fault) for fault in faults))
+    config = simulated(flavour, faults=tuple(parse_fault(fault) for fault in faults))
     return verified(Flight(shipped(name), config, **more).fly())
 
 
 @cache
 def begun(flavour: str, fence: bool) -> Flight:
-    flight = Flight(shipped("standard"), case.simulated(flavour), fence=fence)
+    flight = Flight(shipped("standard"), simulated(flavour), fence=fence)
     while flight.clock.elapsed_us < SHARED_US:
         assert flight.loop.turn() is None
     return flight
@@ -71,7 +71,7 @@ class Short(NamedTuple):
 
 @cache
 def short(flavour: str) -> Short:
-    flight, heard = Flight(shipped("short"), case.simulated(flavour)), []
+    flight, heard = Flight(shipped("short"), simulated(flavour)), []
 
     def listen(frame: bytes) -> bool:
         heard.extend(each.message.text for each in Codec(0, 0).parse(frame) if each.name == "STATUSTEXT")
@@ -119,7 +119,7 @@ def test_ground_stations_hear_each_decision_and_the_log_what_the_vehicle_said(fl
 
 def test_equal_flights_leave_equal_logs_and_so_does_one_that_goes_on_from_a_copy() -> None:
     fault = parse_fault("battery,at=12s,level=24%")
-    flight = Flight(shipped("short"), case.simulated("px4"))
+    flight = Flight(shipped("short"), simulated("px4"))
     while flight.clock.elapsed_us < 10 * case.S:
         assert flight.loop.turn() is None
     copy = copied(flight)
@@ -272,7 +272,7 @@ def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
         pressed.append(True)
         return [Interrupted(flight.clock.now().monotonic_us)]
 
-    flight = Flight(shipped("standard"), case.simulated("px4")) if at_s * case.S < SHARED_US else under_way("px4")
+    flight = Flight(shipped("standard"), simulated("px4")) if at_s * case.S < SHARED_US else under_way("px4")
     flown = verified(flight.fly(press))
     assert flown.ending is Ending.INTERRUPTED
 

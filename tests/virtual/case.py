@@ -107,6 +107,6 @@ def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
     return made, made.sign(KEYS[Duty.ROOT])
 
 
-def simulated(flavour: str, **fields: object) -> SimulationConfig:
-    """A simulated vehicle that fits the policy."""
-    return SimulationConfig(flavour=Kind(flavour), **fields)
+def simulated(flavour: str, *, return_mm: int = 16 * M, **fields: object) -> SimulationConfig:
+    """A simulated vehicle that fits the policy; it returns little above where it flies, and so is down soon."""
+    return SimulationConfig(flavour=Kind(flavour), return_mm=return_mm, **fields)

@@ -17,8 +17,9 @@ from virtual.policy import POLICY, geo
 class Flyer:
     """Begins commands and remembers every event."""
 
-    def __init__(self, flavour: str, **config: Any) -> None:
-        self.vehicle = VirtualVehicle(POLICY, SimulationConfig(flavour=Kind(flavour), **config))
+    def __init__(self, flavour: str, *, return_mm: int = 22_000, **config: Any) -> None:
+        """A return climbs little: it is down soon."""
+        self.vehicle = VirtualVehicle(POLICY, SimulationConfig(flavour=Kind(flavour), return_mm=return_mm, **config))
         self.events: list[Event] = []
         self.token = 0
 

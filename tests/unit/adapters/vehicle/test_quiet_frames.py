@@ -7,16 +7,15 @@ import pytest
 from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
 from rtshcua.onboard.ports import Event
 from rtshcua.simulation.faults import parse_fault
-from virtual import case
 from virtual.flight import Flight
 from virtual.sampling import each_once
-from virtual.shipped import shipped
+from virtual.shipped import shipped, simulated
 
 FAULTS = ("link-loss,at=5s,loss=40%", "link-delay,at=0s,delay=400ms")
 
 
 def flown(flavour: str, fault: str) -> tuple[list[bytes], Sequence[Event]]:
-    flight = Flight(shipped("short"), case.simulated(flavour, faults=(parse_fault(fault),)))
+    flight = Flight(shipped("short"), simulated(flavour, faults=(parse_fault(fault),)))
     return flight.fly().lines, flight.events
 
 

@@ -79,6 +79,7 @@ class Slabs:
 
     def entries(self) -> int:
         """How many edges are kept, each counted once for each node."""
+        # slabs share the rows of a node, and two nodes may have rows that are equal
         return sum(len(row) for row in {id(row): row for table in self._tables for row in table}.values())
 
 

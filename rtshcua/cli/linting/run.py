@@ -97,7 +97,7 @@ def _told(
     laid = {shown(str(path)) for path in about.widths}
     told = gathered(programs, session.sources, about.configured(), tuple(names), laid)
     if changed is None:
-        projects = {id(each): each for each in about.projects.values()}.values()
+        projects = {(each.file, each.root): each for each in about.projects.values()}.values()
         more = list(idle(projects, told.used, options.paths)) if not told.untold else []
         found = (*told.found, *(each for each, _ in more))
         told = told._replace(found=found, sources={**told.sources, **{each.file: each for _, each in more}})

@@ -39,13 +39,13 @@ def scope(options: Options) -> Scope | Refusal:
         return files
     projects = Projects(options.config, isolated=options.isolated)
     found: dict[Path, Project] = {}
-    looked_at: set[int] = set()
+    looked_at: set[tuple[Path | None, Path]] = set()
     for path in files:
         project = projects.of(path)
         if isinstance(project, Refusal):
             return project
-        if id(project) not in looked_at and not options.with_:
-            looked_at.add(id(project))
+        if (project.file, project.root) not in looked_at and not options.with_:
+            looked_at.add((project.file, project.root))
             wrong = _no_further(project)
             if wrong is not None:
                 return wrong

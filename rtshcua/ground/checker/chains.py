@@ -25,7 +25,7 @@ def check_link(context: Context, link: LinkDecl) -> SkillDecl | None:
         return None
     bound = bind_arguments(context, skill, link.arguments, link.span)
     if bound is not None:
-        context.bound[id(link)] = bound
+        context.bind(link, bound)
     quantity(context, link.limit, Dimension.DURATION)
     _limit(context, link, skill)
     if skill.motion is not None and skill.motion.kind == "cover":

@@ -11,17 +11,20 @@ from rtshcua.ground.checker.scope import Argument, Scope, parameter_type
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.checker.values import whole_range
 from rtshcua.mavlink.dialect import Dialect
-from rtshcua.model.ir.expression import Coordinates
-from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.expression import Coordinates, Value
+from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.policies import Rule, TemplateDecl
-from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, SkillDecl
 
 #: what has parameters
 Parametric = SkillDecl | TemplateDecl | MissionDecl
 
 #: what an argument is bound to: a canonical integer (a choice's ordinal too), a zone, or a place
 Bound = int | ZoneDecl | Coordinates
+
+#: what calls a skill with arguments
+Call = Step | LinkDecl
 
 
 class Instance(NamedTuple):
@@ -33,20 +36,23 @@ class Instance(NamedTuple):
 
 @dataclass(slots=True)
 class Context:
-    """One compilation's checks; `bound` keeps what arguments were resolved to, for the lowering.
+    """One compilation's checks.
 
-    `instances` has, of each mission with parameters, those that are checked; `samples` the rules of templates that no
-    policy uses, with values that their parameters might have. `data` are the files that zones are read from.
+    What the arguments of a call were bound to is kept by its skill and the arguments as written, the place included
+    (`bind`, `bound`); `given` has the values that premises give to signals, by the signal's name and the value as
+    written. `instances` has, of each mission with parameters, those that are checked; `samples` the rules of templates
+    that no policy uses, with values that their parameters might have. `data` are the files that zones are read from.
     """
 
     symbols: Symbols
     report: Report
     dialect: Dialect
-    bound: dict[int, tuple[Bound, ...]] = field(default_factory=dict)
+    given: dict[tuple[str, Value], Bound] = field(default_factory=dict)
     instances: dict[str, tuple[Instance, ...]] = field(default_factory=dict)
     samples: tuple[Rule, ...] = ()
     data: DataFiles = field(default_factory=DataFiles)
-    _arguments: dict[int, tuple[Parametric, dict[str, Argument]]] = field(default_factory=dict)
+    _bound: dict[tuple[str, tuple[ArgumentValue, ...]], tuple[Bound, ...]] = field(default_factory=dict)
+    _arguments: dict[Span, dict[str, Argument]] = field(default_factory=dict)
     _plain: Scope | None = None
 
     def scope(self) -> Scope:
@@ -55,12 +61,19 @@ class Context:
             self._plain = Scope(self.symbols, self.report)
         return self._plain
 
+    def bind(self, call: Call, arguments: tuple[Bound, ...]) -> None:
+        """Keep what the arguments of a call mean, one for each parameter of its skill, for the lowering."""
+        self._bound[call.skill.text, call.arguments] = arguments
+
+    def bound(self, call: Call) -> tuple[Bound, ...]:
+        """What the arguments of a call mean that was checked and in which nothing was found."""
+        return self._bound[call.skill.text, call.arguments]
+
     def arguments(self, skill: Parametric) -> dict[str, Argument]:
         """The parameters of a skill, a template or a mission that have a type, by name."""
-        known = self._arguments.get(id(skill))
-        found: dict[str, Argument] = {} if known is None else known[1]
-        if known is None:
-            self._arguments[id(skill)] = (skill, found)  # held, so that nothing else gets its identity
+        found = self._arguments.get(skill.name.span)  # each declaration's name stands in a place of its own
+        if found is None:
+            found = self._arguments[skill.name.span] = {}
             unheard = Scope(self.symbols, Report(self.report.sources))  # the declaration itself is checked elsewhere
             for parameter in skill.parameters:
                 type = parameter_type(parameter)

@@ -50,11 +50,11 @@ def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission) -> Bounds
     steps = [step for phase in declared.phases for step in phase.steps]
     times = [_time(ground, mission, invocation) for invocation in mission.invocations]
     energies = [invocation.contract.energy for invocation in mission.invocations]
-    chains = {id(chain): chain for chain in (policy.contingency, *(i.contract.fallback for i in mission.invocations))}
+    chains = {policy.contingency, *(each.contract.fallback for each in mission.invocations)}
     found = Bounds(
         len(mission.invocations),
-        START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains.values()),
-        sum(energies) + max(_chain_energy(chain, policy) for chain in chains.values()) + _way_home(mission, policy),
+        START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains),
+        sum(energies) + max(_chain_energy(chain, policy) for chain in chains) + _way_home(mission, policy),
     )
     _count(ground, declared, found.invocations)
     _within(ground, declared, found, steps, times, energies)

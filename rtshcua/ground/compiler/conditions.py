@@ -75,7 +75,7 @@ class Conditions:
         self._files = files
         self.sets = Sets()
         self.monitors = Monitors()
-        self._monitored: dict[tuple[int, MonitorKind, int, bool], int] = {}
+        self._monitored: dict[tuple[Condition, MonitorKind, int, bool], int] = {}
 
     def clause(self, node: Condition, place: Place, at: Node | None = None) -> Clause:
         """A condition with its text and place; `at` is what to quote, the condition itself if None."""
@@ -95,7 +95,7 @@ class Conditions:
 
     def monitors_of(self, operand: Condition, kind: MonitorKind, window_us: int) -> tuple[int, ...]:
         """The monitors that an operand which was lowered is kept by: one for each safe side that was asked for."""
-        keys = ((id(operand), kind, window_us, safe) for safe in (True, False))
+        keys = ((operand, kind, window_us, safe) for safe in (True, False))
         return tuple(sorted({self._monitored[key] for key in keys if key in self._monitored}))
 
     def _condition(self, code: Code, node: Condition, place: Place, safe: bool) -> None:
@@ -159,7 +159,7 @@ class Conditions:
     def _monitor(
         self, code: Code, kind: MonitorKind, operand: Condition, window_us: int, place: Place, safe: bool
     ) -> None:
-        key = (id(operand), kind, window_us, safe)
+        key = (operand, kind, window_us, safe)
         number = self._monitored.get(key)
         if number is None:
             when = self.clause(operand, Place(place.scope, {}, safe))

@@ -124,7 +124,7 @@ class Contracts:
         text, source, start, end = self._files.place(link.span)
         return Link(
             skill=self._numbers[link.skill.text],
-            arguments=self.cells(self._context.bound[id(link)]),
+            arguments=self.cells(self._context.bound(link)),
             limit_us=0 if link.limit is None else link.limit.value,
             text=text,
             source=source,

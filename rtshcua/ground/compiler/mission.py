@@ -59,7 +59,7 @@ def lower_mission(
         contract = tightened.contract(step)
         if contract is None:
             continue
-        bound = context.bound[id(step)]
+        bound = context.bound(step)
         arguments = under.contracts.cells(bound)
         plan = plan_of(context, step, bound, arguments, under)
         if plan is None or not _in_phase(context, mission, phase, step, contract):
@@ -135,7 +135,7 @@ def _known(context: Context, step: Step, under: LoweredPolicy) -> bool:
         )
         return False
     good = True
-    for bound, span in zip(context.bound[id(step)], _spans(context, step), strict=True):
+    for bound, span in zip(context.bound(step), _spans(context, step), strict=True):
         if isinstance(bound, ZoneDecl) and bound.name.text not in under.zones.index:
             good = False
             context.report.add(

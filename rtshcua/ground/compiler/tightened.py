@@ -40,14 +40,14 @@ class Tightened:
         self._under = under
         self._files = files
         self._trial: _Trial | None = None
-        self._made: dict[tuple[str, int], Contract | None] = {}
+        self._made: dict[tuple[str, Overrides], Contract | None] = {}
 
     def contract(self, step: Step) -> Contract | None:
         """The contract of a step; None after a finding."""
         skills = self._under.policy.contracts[self._under.skills[step.skill.text]]
         if step.overrides is None:
             return skills
-        key = step.skill.text, id(step.overrides)  # a repeated step has the same
+        key = step.skill.text, step.overrides  # a repeated step has the same
         if key not in self._made:
             self._made[key] = self._tightened(step, step.overrides, skills)
         return self._made[key]
@@ -164,6 +164,7 @@ class _Trial(NamedTuple):
 
 def _trial(context: Context, under: LoweredPolicy, files: Files) -> _Trial:
     """A copy of what the policy was lowered into; places are those of `files`."""
+    # `deepcopy` asks by identity what to leave as it is
     memo: dict[int, Any] = {id(each): each for each in (context, context.report, context.symbols)}
     memo[id(under.files)] = files
     return _Trial(deepcopy(under.conditions, memo), deepcopy(under.slots, memo), deepcopy(under.zones, memo))

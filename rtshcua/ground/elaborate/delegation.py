@@ -31,9 +31,9 @@ def delegated(context: Context, policy: PolicyDecl, rules: Sequence[Rule], *, wh
     if _too_many(context.report, policy.delegations):
         return tuple(found)
     ordered = list(_ordered(context.report, policy.delegations))
-    made = set(map(id, ordered))
+    made = {each.span for each in ordered}
     # roles that may lack something, for a reason that is reported
-    lacking = {each.grantee.text for each in policy.delegations if id(each) not in made}
+    lacking = {each.grantee.text for each in policy.delegations if each.span not in made}
     for delegation in ordered:
         before = len(context.report.found)
         found += _made(context, delegation, found, whole=whole and delegation.grantor.text not in lacking)
@@ -72,8 +72,8 @@ def _ordered(report: Report, delegations: Sequence[Delegation]) -> Iterator[Dele
         if not ready:
             ready = _circle(waiting)
             _report_circle(report, ready)
-        made = set(map(id, ready))
-        waiting = [each for each in waiting if id(each) not in made]
+        made = {each.span for each in ready}
+        waiting = [each for each in waiting if each.span not in made]
 
 
 def _circle(waiting: Sequence[Delegation]) -> list[Delegation]:

@@ -44,17 +44,18 @@ def cases_of(context: Context, lower: Lower, names: Mapping[str, str]) -> Iterat
     `lower` gives a policy for a vehicle, `names` what files are called in what is signed.
     """
     symbols = context.symbols
-    known: dict[int, _Under] = {}
+    known: dict[tuple[str, str], _Under] = {}
     for test in symbols.tests:
         nominal = nominal_of(context, test)
         if nominal is None or test.request is None:
             continue
-        policy = lower(symbols.policies[nominal.policy.text], symbols.vehicles[nominal.vehicle.text])
+        key = nominal.policy.text, nominal.vehicle.text
+        policy = lower(symbols.policies[key[0]], symbols.vehicles[key[1]])
         if policy is None:
             continue
-        if id(policy) not in known:
-            known[id(policy)] = _Under(context, policy, names)
-        yield from _Cases(context, known[id(policy)], test, test.request, start_of(test, nominal)).made()
+        if key not in known:
+            known[key] = _Under(context, policy, names)
+        yield from _Cases(context, known[key], test, test.request, start_of(test, nominal)).made()
 
 
 class _Cases:

@@ -120,9 +120,8 @@ class Requests:
         self, mission: MissionDecl, step: Step, skill: SkillDecl, bound: list[Bound], issued_at_us: int
     ) -> PreparedInvocation | None:
         context, under = self._context, self._policy.lowered
-        context.bound[id(step)] = self._within(skill, bound)
+        context.bind(step, self._within(skill, bound))
         lowered = lower_mission(context, mission, under, self._names, issued_at_us)
-        del context.bound[id(step)]  # another step may come to have its identity
         if lowered is None:
             return None
         flat = _with(lowered.mission, under.contracts.cells(bound))

@@ -91,10 +91,9 @@ class Situations:
         return [name for name, signal in self._signals.items() if signal.slot in slots and name not in given]
 
     def _cells(self, signal: Signal, cell: Cell) -> tuple[int | None, ...]:
-        bound = self._context.bound.get(id(cell))
-        if cell.value is None or bound is None:
+        value = None if cell.value is None else self._context.given.get((signal.name, cell.value))
+        if value is None:
             return (None, None) if signal.kind == POSITION else (None,)
-        (value,) = bound
         if isinstance(value, Coordinates):
             place = self._policy.lowered.zones.place(value)
             return (None, None) if place is None else (place[0], place[1])

@@ -60,6 +60,6 @@ def _step(context: Context, step: Step) -> None:
     if skill is not None:
         bound = bind_arguments(context, skill, step.arguments, step.span)
         if bound is not None:
-            context.bound[id(step)] = bound
+            context.bind(step, bound)
         if step.overrides is not None:
             check_overrides(context, skill, step.overrides)

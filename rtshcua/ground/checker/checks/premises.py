@@ -12,7 +12,7 @@ from rtshcua.ground.checker.scope import Argument, signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import MAX_PHASES
-from rtshcua.model.ir.expression import Coordinates, Edge, ForLast, Reference, WithinLast
+from rtshcua.model.ir.expression import Coordinates, Edge, ForLast, Reference, Value, WithinLast
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.ir.skills import Parameter
@@ -67,7 +67,7 @@ def check_subject(context: Context, subject: Subject) -> None:
 
 
 def check_cell(context: Context, subject: Subject, cell: Cell) -> None:
-    """Report a value that the subject cannot have, and keep the one that it has, in `Context.bound`."""
+    """Report a value that the subject cannot have, and keep the one that it has, in `Context.given`."""
     quantity(context, cell.measured, Dimension.DURATION, positive=False)
     if isinstance(subject, OverTime):
         _truth(context, cell)
@@ -79,22 +79,16 @@ def check_cell(context: Context, subject: Subject, cell: Cell) -> None:
     if type is None:  # reported where the signal is declared
         return
     seen = Parameter(span=signal.name.span, name=signal.name, type=signal.type, range=None, choices=(), default=None)
-    keep(context, cell, bind_value(context.scope(), Argument(seen, type), cell.value), type.dimension)
+    bound = bind_value(context.scope(), Argument(seen, type), cell.value)
+    if bound is not None and check_size(context, cell.value, bound, type.dimension):
+        context.given[signal.name.text, cell.value] = bound
 
 
-def keep(context: Context, cell: Cell, bound: Bound | None, dimension: Dimension | None) -> None:
-    """Keep the value of a cell, if it is one that fits."""
-    if bound is None:
-        return
-    assert cell.value is not None
+def check_size(context: Context, value: Value, bound: Bound, dimension: Dimension | None) -> bool:
+    """Report a value that is no place on earth, or a number that is too large; whether it is neither."""
     if isinstance(bound, Coordinates):
-        fits = on_globe(context, bound)
-    elif isinstance(bound, int) and dimension is not None:
-        fits = size(context, cell.value, dimension, bound)
-    else:
-        fits = True
-    if fits:
-        context.bound[id(cell)] = (bound,)
+        return on_globe(context, bound)
+    return not isinstance(bound, int) or dimension is None or size(context, value, dimension, bound)
 
 
 def signal_of(context: Context, subject: Named) -> SignalDecl | None:

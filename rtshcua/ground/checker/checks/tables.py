@@ -2,7 +2,7 @@
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_value
-from rtshcua.ground.checker.checks.premises import check_cell, check_subject, keep, once, signal_of
+from rtshcua.ground.checker.checks.premises import check_cell, check_size, check_subject, once, signal_of
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.symbols import correction, suggestion
@@ -105,4 +105,5 @@ def _cell(context: Context, column: Subject, cell: Cell, arguments: dict[str, Ar
         )
     else:
         bound = bind_value(context.scope(), unranged(argument), cell.value)
-        keep(context, cell, bound, argument.type.dimension)
+        if bound is not None:
+            check_size(context, cell.value, bound, argument.type.dimension)

@@ -69,7 +69,7 @@ def _overridden(skill: _Times, step: _Times) -> _Times:
 
 def _coherent(context: Context, times: _Times, of: Iterable[Quantity | None] = ()) -> None:
     """Report what contradicts each other; with `of`, only what one of these contributes to."""
-    own = {id(quantity) for quantity in of if quantity is not None}
+    own = {quantity for quantity in of if quantity is not None}
     deadline, validity, duration, grace = times
     for short, long, words, help in (
         (validity, deadline, "the deadline is {}, and the decision is valid for {}", "a step could begin too late"),
@@ -78,9 +78,9 @@ def _coherent(context: Context, times: _Times, of: Iterable[Quantity | None] = (
     ):
         if short is None or long is None or long.value <= short.value:
             continue
-        if own and own.isdisjoint((id(short), id(long))):
+        if own and own.isdisjoint((short, long)):
             continue
-        at, other = (long, short) if not own or id(long) in own else (short, long)
+        at, other = (long, short) if not own or long in own else (short, long)
         context.report.add(
             codes.INCOHERENT_TIMING,
             at.span,
@@ -88,7 +88,7 @@ def _coherent(context: Context, times: _Times, of: Iterable[Quantity | None] = (
             help=f"{help}: at most `{_words(short)}` fits",
             labels=[(other.span, "does not fit with this")],
         )
-    if grace is not None or duration is None or (own and id(duration) not in own):
+    if grace is not None or duration is None or (own and duration not in own):
         return
     if 0 < duration.value < DEFAULT_GRACE_US:
         context.report.add(

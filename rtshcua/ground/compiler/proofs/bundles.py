@@ -41,11 +41,11 @@ def prove(rules: Ruleset, alive: list[Group], gone: AbstractSet[int]) -> None:
 
 def _bundles(rules: Ruleset) -> list[tuple[Node, list[int]]]:
     """The rules that each `use` and `delegate` of the policy brought about, in their order."""
-    found: dict[int, tuple[Node, list[int]]] = {}
+    found: dict[Node, list[int]] = {}
     for number, declared in enumerate(rules.ground.lowered.rules):
         for node in declared.origin:
-            found.setdefault(id(node), (node, []))[1].append(number)
-    return sorted(found.values(), key=lambda each: each[0].span.start)
+            found.setdefault(node, []).append(number)
+    return sorted(found.items(), key=lambda each: each[0].span.start)
 
 
 def _covered(rules: Ruleset, numbers: list[int], but: set[int]) -> tuple[Span, ...] | None:

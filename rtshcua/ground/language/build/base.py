@@ -39,7 +39,7 @@ class Base:
         self.broken: set[str] = set()
         self.whole = True  # whether every import was understood
         self._settled = 0  # how many findings there were when the last declaration ended
-        self._depths: dict[int, int] = {}
+        self._depths: dict[Span, int] = {}  # how deep what stands there is nested
 
     def report(
         self,
@@ -97,12 +97,12 @@ class Base:
 
     def nested(self, node: Node, *inner: Node, help: str = "split it into several clauses, joined by `and`") -> Node:
         """`node`, counting how deeply such are nested; one level too many is reported once, and not built."""
-        depth = 1 + max((self._depths.get(id(part), 0) for part in inner), default=0)
+        depth = 1 + max((self._depths.get(part.span, 0) for part in inner), default=0)
         if depth == MAX_DEPTH + 1:
             self.report(TOO_DEEP, f"this is nested more than {MAX_DEPTH} deep", node.span, help)
         if depth > MAX_DEPTH:
             node = inner[0]
-        self._depths[id(node)] = depth
+        self._depths[node.span] = depth
         return node
 
     def parts(

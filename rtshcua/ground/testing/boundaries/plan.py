@@ -9,7 +9,7 @@ from rtshcua.ground.testing.boundaries.base import Asker, askers, others, starts
 from rtshcua.ground.testing.boundaries.blocks import Frame, block
 from rtshcua.ground.testing.boundaries.reading import Play, Read, allowed, read, scene_of
 from rtshcua.ground.testing.boundaries.scene import Made, Variable
-from rtshcua.ground.testing.boundaries.suite import Draft
+from rtshcua.ground.testing.boundaries.suite import Block, Draft
 from rtshcua.ground.testing.boundaries.values import reported
 from rtshcua.ground.testing.case import Case, Tested
 from rtshcua.model.flat.contract import SourceKind
@@ -118,10 +118,10 @@ def _at(frame: Frame, start: tuple[int, int, int]) -> Made:
     return frame.made | {Variable(False, vehicle.position): (x, y), Variable(False, vehicle.height): height}
 
 
-def _by_frame(frames: Sequence[T], blocks: Sequence[object], found: Sequence[Read]) -> list[tuple[T, tuple[Case, ...]]]:
+def _by_frame(frames: Sequence[T], blocks: Sequence[Block], found: Sequence[Read]) -> list[tuple[T, tuple[Case, ...]]]:
     """What was read of the block of each frame, but for those that the language refused."""
-    by_block = {id(each.block): each.cases for each in found}
-    return [(frame, by_block[id(one)]) for frame, one in zip(frames, blocks, strict=True) if id(one) in by_block]
+    by_block = {each.block: each.cases for each in found}
+    return [(frame, by_block[one]) for frame, one in zip(frames, blocks, strict=True) if one in by_block]
 
 
 def _case_of(draft: Draft, frames: Sequence[Frame], play: Play) -> Case | None:

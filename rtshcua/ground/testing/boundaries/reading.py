@@ -67,17 +67,17 @@ def expectation(case: Case) -> str:
 
 def _leave_out(draft: Draft, errors: Sequence[Diagnostic]) -> bool:
     """Take away the rows that errors are about, or else their blocks; whether there were any."""
-    wrong: dict[int, set[int]] = {}
+    wrong: dict[Block, set[int]] = {}
     starts = [each.span.start for each in errors if each.span is not None]
     at = 0
     for piece, block in draft.pieces():
         for start in starts:
             if block is not None and at <= start < at + len(piece):
-                wrong.setdefault(id(block), set()).add(start - at)
+                wrong.setdefault(block, set()).add(start - at)
         at += len(piece)
     kept: list[Block] = []
     for block in draft.blocks:
-        rows = {block.row_at(offset) for offset in wrong.get(id(block), ())}
+        rows = {block.row_at(offset) for offset in wrong.get(block, ())}
         left = [row for number, row in enumerate(block.rows) if number not in rows]
         if None not in rows and left:
             block.rows = left

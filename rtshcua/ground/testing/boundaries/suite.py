@@ -22,10 +22,10 @@ class Row(NamedTuple):
     cells: tuple[str, ...] = ()
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Block:
-    """One `test`. `comments` name the limits that it surrounds, `premises` are lines before `when`, `request` is what
-    stands after it, `columns` are those of its table; without any there is one row.
+    """One `test`; two that read the same are two. `comments` name the limits that it surrounds, `premises` are lines
+    before `when`, `request` is what stands after it, `columns` are those of its table; without any there is one row.
     """
 
     title: str

@@ -19,11 +19,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference import flat_case as flat
 from rtshcua.decision.authority import authority
-from rtshcua.decision.case import Case, situation
+from rtshcua.decision.case import PASSED, Case, situation
 from rtshcua.decision.decide import decide
 from rtshcua.decision.prepare import prepare, prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.verdict import PASSED
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind

@@ -18,10 +18,8 @@ import shapely
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference.outlines import Ring, area, zig_zag
-from rtshcua.decision.bands import Bands
-from rtshcua.decision.checks.rings import rings
-from rtshcua.decision.outline import edges
-from rtshcua.decision.slabs import Slabs
+from rtshcua.decision.checks.zones import rings
+from rtshcua.decision.outline import Bands, Slabs, edges
 
 LIMIT_US, LIMIT_VERTICES = 5.0, 200
 ROUNDS, PLACES = 15, 1_000

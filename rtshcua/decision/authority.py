@@ -1,14 +1,38 @@
-"""Step 3: the source may use the timing class, no `forbid` matches, and some `permit` does.
+"""Steps 1, 3 and 3b: the request is what was signed, somebody may ask for it, and whoever must confirm it did.
 
-An unknown `forbid` may match, so it defers; an unknown `permit` may not, so it does not count.
+1: it is for this vehicle and the policy in force, within its own ranges. Signatures were verified once, at load; what
+is compared here is the digest that they cover.
+
+3: the source may use the timing class, no `forbid` matches, and some `permit` does. An unknown `forbid` may match, so
+it defers; an unknown `permit` may not, so it does not count.
+
+3b: a `confirm` rule that matches, or may match, needs an approval by its role. The approval moves the release (design
+4.3). A refusal, or an approval that did not come within the rule's time after the release, denies.
 """
 
-from rtshcua.decision.case import Case
-from rtshcua.decision.rules import PreparedRule
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.verdict import PASS, PASSED, Found, Verdict
+from rtshcua.decision.case import PASS, PASSED, Case, Found, Verdict
+from rtshcua.decision.prepared import PreparedRule
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.outcome import Outcome, Reason
+
+_BINDING = (Verdict(Outcome.DENY, Reason.BINDING_MISMATCH, None),)
+_VEHICLE = (Verdict(Outcome.DENY, Reason.WRONG_VEHICLE, None),)
+_VERSION = (Verdict(Outcome.DENY, Reason.POLICY_VERSION, None),)
+_ARGUMENT = (Verdict(Outcome.DENY, Reason.ARGUMENT_RANGE, None),)
+
+
+def integrity(case: Case) -> Found:
+    """Denies what differs from what was signed. An invocation prepared under another policy is of another version."""
+    context, invocation, policy = case.context, case.invocation, case.policy
+    if context.binding != invocation.invocation.binding:
+        return _BINDING
+    if context.vehicle != policy.policy.vehicle.identity:
+        return _VEHICLE
+    if context.policy_version != policy.policy.version or invocation.policy is not policy:
+        return _VERSION
+    return PASSED if invocation.misfit is None else _ARGUMENT
+
 
 #: the timing classes that a source may use: an agent never reacts, a reflex does nothing else
 CLASSES: dict[int, frozenset[int]] = {
@@ -62,3 +86,39 @@ def authority(case: Case) -> Found:
 def _without_permit(permits: tuple[PreparedRule, ...]) -> Verdict:
     """No permit speaks of this skill, role and source at all; or one does, and its condition is not met."""
     return Verdict(Outcome.DENY, Reason.OUT_OF_SCOPE, permits[0].rule) if permits else _NOT_PERMITTED
+
+
+def confirmation(case: Case) -> Found:
+    """Denied when any rule's answer denies, else deferred when any is awaited."""
+    verdicts: list[Verdict] = []
+    doubt: Verdict | None = None
+    passes = True
+    (earliest, latest), released_us = case.monotonic, case.context.released_us
+    for rule in case.invocation.candidates.confirms:
+        truth = rule.condition(case.at)
+        if truth == FALSE:
+            continue
+        certain, end = not truth & FALSE, released_us + rule.rule.within_us
+        key = (rule.number, rule.rule.approver)
+        answers = [each for each in case.context.approvals if (each.rule, each.role) == key]
+        refused = not all(each.granted for each in answers)
+        times = [] if refused else [each.monotonic_us for each in answers if each.monotonic_us <= end]
+        if times:
+            granted, (first, last) = min(times), case.release
+            case.release = (max(first, granted) if certain else first, max(last, granted))
+            continue
+        awaited = not refused and earliest <= end
+        if refused:
+            verdicts.append(Verdict(Outcome.DENY, Reason.APPROVAL_REFUSED, rule.rule))
+        elif latest > end:
+            verdicts.append(Verdict(Outcome.DENY, Reason.APPROVAL_TIMED_OUT, rule.rule))
+        if not awaited and certain:
+            return tuple(verdicts)
+        if awaited and doubt is None:
+            doubt = Verdict(Outcome.DEFER, Reason.AWAITING_APPROVAL, rule.rule)
+        passes = passes and not certain
+    if doubt is not None:
+        verdicts.append(doubt)
+    if not passes:
+        return tuple(verdicts)
+    return (*verdicts, PASS) if verdicts else PASSED

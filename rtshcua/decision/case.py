@@ -1,12 +1,17 @@
-"""One case to decide: everything that the steps read, as sets of values; a single situation is a set of one."""
+"""One case to decide, everything that the steps read, as sets of values; and what a step answers: the verdicts that are
+possible. A single situation is a set of one, and has exactly one verdict.
+"""
 
 from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy, Seen
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import MAYBE, MISSING, PRESENT, Sets, Span, Value
+from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOWN, Sets, Span, Truth, Value
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
 
 #: what a single situation may say of a temporal monitor
 SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
@@ -29,7 +34,7 @@ class Case:
 
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     """A set of situations, as conditions read it; `phase` is that of the invocation, -1 where there is none."""
-    seen = policy.latest.seen
+    seen = policy.seen
     if seen is None or seen.sets is not sets:
         return _environment(sets, policy, arguments, phase)
     for at in seen.environments:
@@ -58,9 +63,9 @@ def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
 
 def remembered(state: State, policy: PreparedPolicy, now: Now) -> Seen:
     """This situation, with what was answered about it so far."""
-    seen = policy.latest.seen
+    seen = policy.seen
     if seen is None or seen.now != now or seen.state != state:
-        seen = policy.latest.seen = Seen(state, now, _situation(state, policy, now), [], [], [])
+        seen = policy.seen = Seen(state, now, _situation(state, policy, now), [], [], [])
     return seen
 
 
@@ -91,3 +96,22 @@ def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:
     if len(sets.monitors) != len(policy.monitors) or not SINGLE.issuperset(sets.monitors):
         return False
     return points and len(sets.utc_us) == 1 and all(low == high for low, high in spans)
+
+
+#: what can decide; None where it is a field of the contract itself, or of the request
+Decisive: TypeAlias = Clause | Rule | Airspace | None
+
+
+class Verdict(NamedTuple):
+    """An outcome with its reason and the clause that decided."""
+
+    outcome: Outcome
+    reason: Reason
+    clause: Decisive
+
+
+#: Verdicts of a step in the order of the rule; `PASS`, if passing is possible, comes last.
+Found: TypeAlias = tuple[Verdict, ...]
+
+PASS = Verdict(Outcome.ALLOW, Reason.ADMITTED, None)
+PASSED: Found = (PASS,)

@@ -9,20 +9,14 @@ from typing import NamedTuple
 
 import msgspec
 
-from rtshcua.decision.authority import authority
-from rtshcua.decision.case import Case, is_situation, situation
-from rtshcua.decision.confirmation import confirmation
-from rtshcua.decision.freshness import freshness
-from rtshcua.decision.integrity import integrity
+from rtshcua.decision.authority import authority, confirmation, integrity
+from rtshcua.decision.case import PASS, PASSED, Case, Decisive, Found, Verdict, is_situation, situation
 from rtshcua.decision.links import START, fallbacks
-from rtshcua.decision.phase import phase
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import safety
-from rtshcua.decision.state import state as state_step
-from rtshcua.decision.timing import timing
-from rtshcua.decision.validity import valid_until
+from rtshcua.decision.safety import state as state_step
+from rtshcua.decision.timing import freshness, phase, timing, valid_until
 from rtshcua.decision.values import Sets
-from rtshcua.decision.verdict import PASS, PASSED, Decisive, Found, Verdict
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason

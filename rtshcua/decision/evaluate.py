@@ -5,11 +5,9 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
-from rtshcua.decision.daytime import Daytime
-from rtshcua.decision.places import Place, WellKnown, here
-from rtshcua.decision.truth import AND, FALSE, NOT, OR, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import ABSENT, Span, Value
-from rtshcua.decision.zones import PreparedZone
+from rtshcua.decision.times import Daytime
+from rtshcua.decision.values import ABSENT, AND, FALSE, NOT, OR, TRUE, UNKNOWN, Span, Truth, Value
+from rtshcua.decision.zones import Place, PreparedZone, WellKnown, here
 
 #: the phase of what belongs to no mission, and of a phase that the policy does not name
 NO_PHASE: Final = -1

@@ -7,15 +7,12 @@ the airspace already, as far as its position error tells, may always go home.
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.airspace import keeps
 from rtshcua.decision.case import environment, remembered, situation
+from rtshcua.decision.contracts import longest
 from rtshcua.decision.evaluate import NO_PHASE, Environment
-from rtshcua.decision.lasting import longest
-from rtshcua.decision.link import Choice as Choice
-from rtshcua.decision.link import PreparedLink
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import Sets
+from rtshcua.decision.prepared import Choice as Choice
+from rtshcua.decision.prepared import PreparedInvocation, PreparedLink, PreparedPolicy
+from rtshcua.decision.values import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Sets, Truth
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State
 
@@ -94,7 +91,7 @@ def _chosen(
 
 def admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: bool, phase: int) -> Truth:
     """Whether a link may fly, over a set of situations."""
-    seen = policy.latest.seen
+    seen = policy.seen
     if not exact or seen is None or seen.sets is not sets:
         return _admissible(link, sets, policy, exact, phase)
     for known, its_phase, truth in seen.links:
@@ -119,16 +116,13 @@ def _deepens_no_breach(link: PreparedLink, at: Environment, policy: PreparedPoli
     """Whether a link that moves stays in the airspace, or goes home from where the vehicle should not be."""
     airspace, known = policy.airspace, policy.tables.known
     assert airspace is not None
-    along = keeps(link.planner.volume(at.slots, known).place, airspace, at, _through(link, policy))
+    through = longest(policy.policy.contracts[link.link.skill], policy.policy.vehicle, link.link.limit_us)
+    along = airspace.keeps(link.planner.volume(at.slots, known).place, at, through)
     if exact:
         along = EVERYWHERE[along]
     if link.motion != MotionKind.HOME:
         return along
-    now = keeps(policy.still.volume(at.slots, known).place, airspace, at, 0)
+    now = airspace.keeps(policy.still.volume(at.slots, known).place, at, 0)
     if exact:
         now = EVERYWHERE[now]
     return (TRUE if now & FALSE else 0) | (along if now & TRUE else 0) | now & UNKNOWN
-
-
-def _through(link: PreparedLink, policy: PreparedPolicy) -> int:
-    return longest(policy.policy.contracts[link.link.skill], policy.policy.vehicle, link.link.limit_us)

@@ -6,21 +6,18 @@ malformed is refused with a value that names it. Signatures, digests and binding
 
 from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.decision.checks.policy import problems
-from rtshcua.decision.compiler import Compiler
-from rtshcua.decision.energy import Energy
+from rtshcua.decision.contracts import Energy, longest, misfit
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.lasting import longest
-from rtshcua.decision.parameters import misfit
 from rtshcua.decision.prepared import (
-    Latest,
+    Compiler,
     Limit,
     PreparedAirspace,
     PreparedInvocation,
     PreparedMonitor,
     PreparedPolicy,
+    RuleIndex,
 )
-from rtshcua.decision.reads import monitored, slots_read, where
-from rtshcua.decision.rules import RuleIndex
+from rtshcua.decision.tree import monitored, slots_read, where
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner, flown_at
 from rtshcua.diagnostics.refusal import Refusal
@@ -44,7 +41,7 @@ def prepare(policy: Policy) -> PreparedPolicy | Refusal:
         compiler=compiler,
         tables=compiler.tables,
         limits=_limits(policy),
-        rules=RuleIndex(policy.rules, compiler.condition, compiler.link),
+        rules=RuleIndex(policy.rules, compiler),
         airspace=None if policy.airspace is None else _airspace(policy.airspace, compiler),
         contingency=compiler.links(policy.contingency),
         still=Planner(MotionKind.HOLD, (), None, policy.vehicle.position_error),
@@ -52,7 +49,6 @@ def prepare(policy: Policy) -> PreparedPolicy | Refusal:
             PreparedMonitor(monitor.kind, monitor.window_us, compiler.monitored(monitor, number))
             for number, monitor in enumerate(policy.monitors)
         ),
-        latest=Latest(),
     )
 
 

@@ -1,24 +1,73 @@
-"""Step 7: the vehicle's envelope, airspace and invariants over the planned volume, energy, and `degrade` rules.
+"""Steps 6 and 7: what must be so now, and over the planned volume.
 
-The invariants (`maintain`, paper symbol `inv`) are evaluated with position and height ranging over the planned volume,
-with zones as they exist from now to the end of the contract's longest duration, everything else as it is now; a
-temporal monitor says what it says now.
+6: the preconditions (`require`, paper symbol `pre`) and the assumptions (`assume`, `sc`) hold now.
+
+7: the vehicle's envelope, airspace and invariants over the planned volume, energy, and `degrade` rules. The invariants
+(`maintain`, `inv`) are evaluated with position and height ranging over the planned volume, with zones as they exist
+from now to the end of the contract's longest duration, everything else as it is now; a temporal monitor says what it
+says now.
 """
 
-from rtshcua.decision.airspace import keeps
-from rtshcua.decision.case import Case
+from rtshcua.decision.case import PASS, PASSED, Case, Decisive, Found, Verdict
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.truth import FALSE, NOT, TRUE
-from rtshcua.decision.verdict import Found, Tally
+from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, TRUE, UNKNOWN, Truth
 from rtshcua.decision.volume import Volume
-from rtshcua.model.outcome import Reason
+from rtshcua.model.outcome import Outcome, Reason
 
-_UNKNOWN = Reason.SAFETY_UNKNOWN
+_STATE_UNKNOWN, _SAFETY_UNKNOWN = Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN
+
+
+class Tally:
+    """A step that passes when all its conditions are true: false falls back, else unknown defers.
+
+    `exact` says that a single situation is judged, so that a mixed truth is one over the places of one volume, where
+    the condition must hold everywhere. Otherwise it is one over many situations, each with a volume of its own.
+    """
+
+    __slots__ = ("_doubt", "_exact", "_passes", "_unknown", "_verdicts")
+
+    def __init__(self, unknown: Reason, exact: bool) -> None:
+        self._unknown, self._exact = unknown, exact
+        self._verdicts: list[Verdict] = []
+        self._doubt: Verdict | None = None
+        self._passes = True
+
+    def fails(self, truth: Truth, reason: Reason, clause: Decisive) -> bool:
+        """Count a condition that is not simply TRUE; whether the step surely fails, so that no other needs a look."""
+        if self._exact:
+            truth = EVERYWHERE[truth]
+        if truth & FALSE:
+            self._verdicts.append(Verdict(Outcome.FALLBACK, reason, clause))
+        if truth & UNKNOWN and self._doubt is None:
+            self._doubt = Verdict(Outcome.DEFER, self._unknown, clause)
+        self._passes = self._passes and truth & TRUE != 0
+        return truth == FALSE
+
+    def found(self, failed: bool) -> Found:
+        """The verdicts, given whether some condition surely fails."""
+        if failed:
+            return tuple(self._verdicts)
+        if self._doubt is not None:
+            self._verdicts.append(self._doubt)
+        if not self._passes:
+            return tuple(self._verdicts)
+        return (*self._verdicts, PASS) if self._verdicts else PASSED
+
+
+def state(case: Case) -> Found:
+    """Falls back on the first clause that is false, else defers on the first that is unknown."""
+    tally = Tally(_STATE_UNKNOWN, case.exact)
+    for guards in (case.invocation.require, case.invocation.assume):
+        for clause, condition in guards:
+            truth = condition(case.at)
+            if truth != TRUE and tally.fails(truth, Reason.STATE_VIOLATED, clause):
+                return tally.found(failed=True)
+    return tally.found(failed=False)
 
 
 def safety(case: Case) -> Found:
     """Falls back on the first condition that is false, else defers on the first that is unknown."""
-    tally = Tally(_UNKNOWN, case.exact)
+    tally = Tally(_SAFETY_UNKNOWN, case.exact)
     return tally.found(failed=_fails(case, tally))
 
 
@@ -30,7 +79,7 @@ def _fails(case: Case, tally: Tally) -> bool:
         return tally.fails(FALSE, Reason.ENVELOPE, None)
     volume = invocation.planner.volume(at.slots, known)
     if policy.airspace is not None:
-        truth = keeps(volume.place, policy.airspace, at, invocation.lasts_us)
+        truth = policy.airspace.keeps(volume.place, at, invocation.lasts_us)
         if truth != TRUE and tally.fails(truth, Reason.AIRSPACE, policy.airspace.airspace):
             return True
     if invocation.maintain:

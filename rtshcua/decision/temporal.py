@@ -29,7 +29,7 @@ from typing import Final, NamedTuple
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.prepared import PreparedMonitor, PreparedPolicy
-from rtshcua.decision.truth import AND, FALSE, NOT, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import AND, FALSE, NOT, TRUE, UNKNOWN, Truth
 from rtshcua.model.flat.limits import MAX_GAP
 from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.flat.situation import Now, State

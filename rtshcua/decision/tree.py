@@ -1,14 +1,86 @@
-"""Postfix code, read into a tree and type-checked on the way. The bundle's code is never trusted to be well-formed.
+"""Postfix code, read into a tree and type-checked on the way, and the slots that it reads. The bundle's code is never
+trusted to be well-formed.
 
 Every number is a sum of state slots and argument cells times constants, plus a constant, so each comparison becomes
 `sum <= bound` or `sum == bound`. A slot whose factor is 0 stays in the sum: the comparison is still unknown without it.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
 
-from rtshcua.decision.scope import Scope
-from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Op
+from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Clause, Op
+from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract
 from rtshcua.model.flat.limits import DAY, MAX_MAGNITUDE, MAX_VALUE
+from rtshcua.model.flat.policy import Monitor, Policy, Vehicle
+from rtshcua.model.flat.signal import ENUMERATION, POSITION
+
+
+class Scope(NamedTuple):
+    """What code may name: the slots, cells, zones, tables, sets and monitors that exist, and of what kind they are.
+
+    Each method answers what is wrong with naming an index, or None.
+
+    `kinds` is the signal kind of each slot. `cells` is, for each skill that the code may speak of, the parameter kind
+    at each first cell: an argument must exist, of the same kind, in all of them, and in at least one. `members` are
+    the policy's sets; `phases` counts its phase names, None where code may not ask for the phase.
+    """
+
+    kinds: tuple[int, ...]
+    zones: int
+    tables: int
+    members: tuple[tuple[int, ...], ...]
+    cells: tuple[dict[int, int], ...]
+    monitors: int
+    phases: int | None
+
+    def index(self, what: str, index: int, count: int) -> str | None:
+        """One of so many zones, tables and the like."""
+        return None if 0 <= index < count else f"there is no {what} {index}"
+
+    def number(self, slot: int) -> str | None:
+        """A slot that holds a number (an enumeration's ordinal is one)."""
+        if not 0 <= slot < len(self.kinds):
+            return f"there is no slot {slot}"
+        return f"slot {slot} is a position, not a number" if self.kinds[slot] == POSITION else None
+
+    def enumeration(self, slot: int) -> str | None:
+        """A slot that holds an enumeration."""
+        found = 0 <= slot < len(self.kinds) and self.kinds[slot] == ENUMERATION
+        return None if found else f"slot {slot} is no enumeration"
+
+    def argument(self, cell: int, kinds: tuple[int, ...], name: str) -> str | None:
+        """The first cell of a parameter of one of these kinds, in every skill."""
+        if not self.cells:
+            return "an argument is named, but no skill is"
+        found = all(kinds_of.get(cell) in kinds for kinds_of in self.cells)
+        return None if found else f"argument cell {cell} is no {name}"
+
+    def set_of_phases(self, index: int) -> str | None:
+        """A membership set of phase names."""
+        phases = self.phases
+        if phases is None:
+            return "the phase is asked for where there is none"
+        if not 0 <= index < len(self.members):
+            return f"there is no set {index}"
+        return None if all(0 <= member < phases for member in self.members[index]) else f"set {index} is none of phases"
+
+    def about(self, *contracts: Contract) -> "Scope":
+        """The same, for code that may name the arguments of these contracts' skills."""
+        return self._replace(cells=tuple({each.cell: each.kind for each in one.parameters} for one in contracts))
+
+    def inside_monitor(self, number: int) -> "Scope":
+        """The same, for the code of a temporal monitor: it may read those before it, no argument and no phase."""
+        return self._replace(cells=(), monitors=number, phases=None)
+
+
+def scope_of(policy: Policy) -> Scope:
+    """What code may name anywhere in a policy; `policy.signals` own its slots."""
+    kinds = [0] * policy.slots
+    for signal in policy.signals:
+        for slot in signal.slots:
+            kinds[slot] = signal.kind
+    monitors, phases = len(policy.monitors), len(policy.phases)
+    return Scope(tuple(kinds), len(policy.zones), len(policy.tables), policy.sets, (), monitors, phases)
 
 
 class Term(NamedTuple):
@@ -174,35 +246,52 @@ def _push_number(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope
         problem = None if -MAX_VALUE <= a <= MAX_VALUE else f"constant {a} is out of range"
         number = _Sum((), a)
     else:
-        problem = scope.number(a) if op == Op.SIGNAL else scope.quantity(a)
+        problem = scope.number(a) if op == Op.SIGNAL else scope.argument(a, (QUANTITY, CHOICE), "number")
         number = _Sum((Term(op == Op.ARGUMENT, a, 1),), 0)
     stack.append(number)
     return problem or _unused(b)
 
 
+def _numbers(stack: list[_Sum | Node], count: int) -> list[_Sum]:
+    """The last `count` values, taken off the stack if they are numbers; else none."""
+    found = [each for each in stack[-count:] if isinstance(each, _Sum)]
+    if len(found) < count:
+        return []
+    del stack[-count:]
+    return found
+
+
+def _truths(stack: list[_Sum | Node], count: int) -> list[Node]:
+    """The last `count` values, taken off the stack if they are truth values; else none."""
+    found = [each for each in stack[-count:] if not isinstance(each, _Sum)]
+    if len(found) < count:
+        return []
+    del stack[-count:]
+    return found
+
+
 def _arithmetic(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
     if op == Op.SCALE:
-        operand = stack.pop() if stack else None
-        if not isinstance(operand, _Sum):
+        operands = _numbers(stack, 1)
+        if not operands:
             return "one number is needed on the stack"
         if not -MAX_VALUE <= a <= MAX_VALUE:
             return f"factor {a} is out of range"
-        result, problem = operand.scaled(a), _unused(b)
+        result, problem = operands[0].scaled(a), _unused(b)
     else:
-        right, left = (stack.pop(), stack.pop()) if len(stack) > 1 else (None, None)
-        if not isinstance(left, _Sum) or not isinstance(right, _Sum):
+        operands = _numbers(stack, 2)
+        if not operands:
             return "two numbers are needed on the stack"
-        result, problem = left.plus(right.scaled(1 if op == Op.ADD else -1)), _unused(a, b)
+        result, problem = operands[0].plus(operands[1].scaled(1 if op == Op.ADD else -1)), _unused(a, b)
     stack.append(result)
     return problem or (None if result.magnitude() <= MAX_MAGNITUDE else "the number may exceed 64 bits")
 
 
 def _compare(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
-    right, left = (stack.pop(), stack.pop()) if len(stack) > 1 else (None, None)
-    if not isinstance(left, _Sum) or not isinstance(right, _Sum):
+    operands = _numbers(stack, 2)
+    if not operands:
         return "two numbers are needed on the stack"
-    if op in (Op.GT, Op.GE):  # l > r is r < l
-        left, right = right, left
+    left, right = reversed(operands) if op in (Op.GT, Op.GE) else operands  # l > r is r < l
     sum_ = left.plus(right.scaled(-1))  # l < r is l - r <= -1, for integers
     if sum_.magnitude() > MAX_MAGNITUDE:
         return "the number may exceed 64 bits"
@@ -215,16 +304,10 @@ def _compare(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
 
 
 def _connect(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
-    if op == Op.NOT:
-        operand = stack.pop() if stack else None
-        if operand is None or isinstance(operand, _Sum):
-            return "one truth value is needed on the stack"
-        stack.append(Not(operand))
-        return _unused(a, b)
-    right, left = (stack.pop(), stack.pop()) if len(stack) > 1 else (None, None)
-    if left is None or right is None or isinstance(left, _Sum) or isinstance(right, _Sum):
-        return "two truth values are needed on the stack"
-    stack.append(Both(left, right) if op == Op.AND else Either(left, right))
+    operands = _truths(stack, 1 if op == Op.NOT else 2)
+    if not operands:
+        return "one truth value is needed on the stack" if op == Op.NOT else "two truth values are needed on the stack"
+    stack.append(Not(*operands) if op == Op.NOT else Both(*operands) if op == Op.AND else Either(*operands))
     return _unused(a, b)
 
 
@@ -233,24 +316,28 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
     node: Node
     match op:
         case Op.SIGNAL_IN:
-            problem, node = scope.enumeration(a) or scope.set_of_members(b), Member(False, a, b)
+            problem, node = scope.enumeration(a) or scope.index("set", b, len(scope.members)), Member(False, a, b)
         case Op.ARGUMENT_IN:
-            problem, node = scope.choice_or_zone(a) or scope.set_of_members(b), Member(True, a, b)
+            problem = scope.argument(a, (CHOICE, ZONE), "choice and no zone")
+            problem, node = problem or scope.index("set", b, len(scope.members)), Member(True, a, b)
         case Op.KNOWN:
-            problem, node = scope.slot(a) or _unused(b), Known(a)
+            problem, node = scope.index("slot", a, len(scope.kinds)) or _unused(b), Known(a)
         case Op.POSITION_IN:
-            problem, node = scope.zone(a) or _unused(b), Inside(a)
+            problem, node = scope.index("zone", a, scope.zones) or _unused(b), Inside(a)
         case Op.POSITION_IN_ARGUMENT:
-            problem, node = scope.zone_argument(a) or scope.table(b), InsideArgument(a, b)
+            problem = scope.argument(a, (ZONE,), "zone") or scope.index("table", b, scope.tables)
+            node = InsideArgument(a, b)
         case Op.ARGUMENT_POINT_IN:
-            problem, node = scope.place(a) or scope.zone(b), PointInside(a, b)
+            problem = scope.argument(a, (PLACE,), "place") or scope.index("zone", b, scope.zones)
+            node = PointInside(a, b)
         case Op.TIME_IN:
             within = 0 <= a < DAY and 0 <= b <= DAY
             problem, node = None if within else f"{a}..{b} us is not a time of day", InWindow(a, b)
         case Op.PHASE_IN:
             problem, node = scope.set_of_phases(b) or _unused(a), InPhase(b)
         case Op.MONITOR:
-            problem, node = scope.monitor(a) or _unused(b), Monitored(a)
+            known = None if 0 <= a < scope.monitors else f"there is no monitor {a} here"
+            problem, node = known or _unused(b), Monitored(a)
         case _:
             return f"no instruction has the number {op}"
     stack.append(node)
@@ -259,3 +346,34 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
 
 def _unused(*operands: int) -> str | None:
     return "an unused operand is not 0" if any(operands) else None
+
+
+def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Monitor, ...] = ()) -> tuple[int, ...]:
+    """The slots that well-formed clauses read, themselves or through the policy's temporal monitors, ascending; asking
+    where the vehicle is reads its position and height.
+    """
+    slots: set[int] = set()
+    left, seen = list(clauses), set[int]()
+    while left:
+        code = left.pop().code
+        for at in range(0, len(code), 3):
+            op = code[at]
+            if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN):
+                slots.add(code[at + 1])
+            elif op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT):
+                slots.update(where(vehicle))
+            elif op == Op.MONITOR and code[at + 1] not in seen:
+                seen.add(code[at + 1])
+                left.append(monitors[code[at + 1]].when)
+    return tuple(sorted(slots))
+
+
+def monitored(clauses: Iterable[Clause]) -> bool:
+    """Whether well-formed clauses ask a temporal monitor anything."""
+    return any(Op.MONITOR in clause.code[::3] for clause in clauses)
+
+
+def where(vehicle: Vehicle) -> tuple[int, ...]:
+    """The slots that tell where the vehicle is, as far as it has them."""
+    position = () if vehicle.position == -1 else (vehicle.position, vehicle.position + 1)
+    return position if vehicle.height == -1 else (*position, vehicle.height)

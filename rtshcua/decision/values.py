@@ -1,10 +1,45 @@
-"""What is known of a number, an enumeration or a time: one value, or a set of values.
+"""What is known: truths, numbers, enumerations and times; of each one value, or a set of values.
 
 The runtime knows points, the checker sets; every rule is written for sets, so that one rule serves both (design 4.2).
+
+Abstract truth is a non-empty subset of {true, false, unknown}, as a bit mask. A point has exactly one of the three; a
+set of points has every truth that one of its points may have. The connectives are Kleene's strong ones, lifted to
+subsets: `AND[a][b]` holds `x and y` for every x in a and y in b. That is exact when the two sides are independent, and
+sound (never too small) when they are not.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple, TypeAlias
+
+Truth: TypeAlias = int
+
+TRUE: Truth = 1
+FALSE: Truth = 2
+UNKNOWN: Truth = 4
+
+Table: TypeAlias = tuple[tuple[Truth, ...], ...]
+
+
+def singles(truth: Truth) -> tuple[Truth, ...]:
+    """The single truths in an abstract one, in Kleene's order: `and` is the least of two, `or` the greatest."""
+    return tuple(single for single in (FALSE, UNKNOWN, TRUE) if truth & single)
+
+
+def _lifted(pick: Callable[..., Truth]) -> Table:
+    """What the least or the greatest of two single truths is, for every pair of abstract ones."""
+    rank = (FALSE, UNKNOWN, TRUE).index
+    return tuple(
+        tuple(sum({pick(x, y, key=rank) for x in singles(a) for y in singles(b)}) for b in range(8)) for a in range(8)
+    )
+
+
+#: tables indexed by two abstract truths; row and column 0 (the empty set, which no rule makes) are 0
+AND, OR = _lifted(min), _lifted(max)
+#: swaps true and false
+NOT: tuple[Truth, ...] = tuple((a & UNKNOWN) | (a & TRUE) << 1 | (a & FALSE) >> 1 for a in range(8))
+#: what a condition over every point of one volume amounts to: false if false anywhere, else unknown if unknown anywhere
+EVERYWHERE: tuple[Truth, ...] = tuple(FALSE if a & FALSE else UNKNOWN if a & UNKNOWN else a for a in range(8))
+
 
 #: A set of integers, `low`..`high`, both included. `gap` says whether it may be missing; `members` names the elements
 #: when not every integer between the bounds is one (enumerations). A point has `low == high`.

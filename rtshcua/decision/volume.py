@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from math import isqrt
 from typing import NamedTuple
 
-from rtshcua.decision.bands import Box
-from rtshcua.decision.places import NOWHERE, Part, Place, Sweep, WellKnown
-from rtshcua.decision.truth import UNKNOWN
-from rtshcua.decision.values import ABSENT, MISSING, Span, Value
+from rtshcua.decision.outline import Box
+from rtshcua.decision.values import ABSENT, MISSING, UNKNOWN, Span, Value
+from rtshcua.decision.zones import NOWHERE, Part, Place, Sweep, WellKnown
 from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Vehicle
 

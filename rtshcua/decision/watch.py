@@ -1,16 +1,120 @@
-"""What a running skill's assumptions and limits are now (paper symbols `sc`, `inv`)."""
+"""What must hold while a skill runs (paper symbols `sc`, `inv`), and while a vehicle waits in the air for its next step
+(design 4.4: holding is bounded by energy), there and on the predicted path.
 
-from collections.abc import Iterator
+The predicted path is every place where a vehicle may be before it stands still, if it is told to stop now. Since its
+state was measured it flew on as it did (the older the state, the further); told to stop, it goes on so for its declared
+reaction, and then loses its declared braking of its speed. With v the velocity over ground, |v| its length, t the age
+of what was measured and the reaction together, and a the braking, it comes to stand v*t + v*|v|/(2a) from where it was
+measured, on the straight line there. All is rounded away from the vehicle and widened by its position error like a
+planned volume. A vehicle that declares no braking is taken to be where it was measured.
+"""
 
-from rtshcua.decision.ahead import ahead
-from rtshcua.decision.airspace import keeps
+from collections.abc import Iterator, Sequence
+from math import isqrt
+from typing import NamedTuple
+
 from rtshcua.decision.case import environment, situation
+from rtshcua.decision.contracts import SECOND
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.holding import WAY_HOME, Unkept, way_home
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
-from rtshcua.decision.truth import EVERYWHERE, FALSE, NOT, TRUE, UNKNOWN
+from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, PRESENT, TRUE, UNKNOWN, Truth, Value
+from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume, distance
+from rtshcua.decision.zones import Place, Sweep
+from rtshcua.model.flat.limits import FULL, MAX_SPEED
 from rtshcua.model.flat.situation import Now, State
+
+
+class Ahead(NamedTuple):
+    """A predicted path, as a volume, and how long it takes to stand still from now on, at most, in us."""
+
+    volume: Volume
+    lasts_us: int
+
+
+UNKNOWN_AHEAD = Ahead(UNKNOWN_VOLUME, 0)
+
+
+def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -> Ahead:
+    """The predicted path in one situation, and the ages of its slots; nothing is known where a signal of it is."""
+    known, vehicle = policy.tables.known, policy.policy.vehicle
+    x, _, x_gap, _ = slots[known.x]
+    y, _, y_gap, _ = slots[known.y]
+    height, _, height_gap, _ = slots[known.height]
+    if x_gap != PRESENT or y_gap != PRESENT or height_gap != PRESENT:
+        return UNKNOWN_AHEAD
+    if not vehicle.braking:
+        return Ahead(policy.still.volume(slots, known), 0)
+    east, _, east_gap, _ = slots[known.east]
+    north, _, north_gap, _ = slots[known.north]
+    down, _, down_gap, _ = slots[known.down]
+    if east_gap != PRESENT or north_gap != PRESENT or down_gap != PRESENT:
+        return UNKNOWN_AHEAD
+    speed = _root(east * east + north * north + down * down)
+    if speed > MAX_SPEED:
+        return UNKNOWN_AHEAD
+    age_us = max(
+        ages[known.x], ages[known.y], ages[known.height], ages[known.east], ages[known.north], ages[known.down]
+    )
+    goes_us, braking = age_us + vehicle.reaction_us, vehicle.braking
+    part, whole = 2 * braking * goes_us + speed * SECOND, 2 * braking * SECOND
+    to_x, to_y = x + _away(east * part, whole), y + _away(north * part, whole)
+    to_height = height + _away(-down * part, whole)
+    reach = vehicle.position_error + 1  # what the ends were rounded by bends the line by less than 1 mm
+    low, high = min(height, to_height), max(height, to_height)
+    sweep = Sweep((x, y, to_x, to_y), (-reach, -reach, reach, reach))
+    farthest = max(distance(x, y), distance(to_x, to_y))
+    volume = Volume(Place(((sweep, low, high),), 0), (low, high, PRESENT, None), (farthest, farthest))
+    return Ahead(volume, goes_us - age_us - (-speed * SECOND // braking))
+
+
+def _root(square: int) -> int:
+    """The square root, rounded up."""
+    return isqrt(square - 1) + 1 if square else 0
+
+
+def _away(numerator: int, denominator: int) -> int:
+    """A quotient rounded away from zero."""
+    return -(-numerator // denominator) if numerator >= 0 else numerator // denominator
+
+
+WAY_HOME = "the reserve and the way home"
+
+
+class Unkept(NamedTuple):
+    """The text of something that should hold, and is FALSE or UNKNOWN."""
+
+    text: str
+    truth: Truth
+
+
+def holding(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> tuple[Unkept, ...]:
+    """What stands against waiting for `invocation` here: the airspace, its `degrade` rules, the charge to come home.
+
+    The place is every place that it may be at before it stands still, see `ahead`.
+    """
+    sets = situation(state, policy, now)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
+    volume, lasts_us = ahead(at.slots, state.ages, policy)
+    checks = [Unkept(rule.rule.text, NOT[rule.condition(at)]) for rule in invocation.candidates.degrades]
+    if policy.airspace is not None:
+        truth = policy.airspace.keeps(volume.place, at, lasts_us)
+        checks.append(Unkept(policy.airspace.airspace.text, EVERYWHERE[truth]))
+    checks.append(Unkept(WAY_HOME, way_home(at, volume, policy)))
+    return tuple(check for check in checks if check.truth != TRUE)
+
+
+def way_home(at: Environment, volume: Volume, policy: PreparedPolicy) -> Truth:
+    """Whether the battery holds the reserve and the way home from anywhere in a volume, position error aside.
+
+    The way is counted as when a skill is admitted (`energy`): its length at the vehicle's speed, rounded up.
+    """
+    vehicle = policy.policy.vehicle
+    charge, _, gap, _ = at.slots[policy.tables.known.battery]
+    if gap != PRESENT or volume.height[2] != PRESENT:
+        return UNKNOWN
+    home = -(-volume.farthest[1] * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
+    return TRUE if charge >= vehicle.reserve + home else FALSE
 
 
 def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> Iterator[Unkept]:
@@ -49,7 +153,7 @@ def _unkept_ahead(
             if truth != TRUE:
                 yield Unkept(clause.text, truth)
     if policy.airspace is not None:
-        truth = EVERYWHERE[keeps(volume.place, policy.airspace, at, lasts_us)]
+        truth = EVERYWHERE[policy.airspace.keeps(volume.place, at, lasts_us)]
         if truth != TRUE:
             yield Unkept(policy.airspace.airspace.text, truth)
     if invocation.energy.stays:

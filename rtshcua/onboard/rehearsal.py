@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import Decision, decide
 from rtshcua.decision.nearest import Nearest, nearest
-from rtshcua.decision.reads import slots_read
+from rtshcua.decision.tree import slots_read
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle

@@ -2,7 +2,7 @@
 
 from random import Random
 
-from rtshcua.decision.checks.rings import rings as problems
+from rtshcua.decision.checks.zones import rings as problems
 from rtshcua.model.flat.zone import AREA, HIGHEST, LOWEST, POLYGON, Zone
 
 Point = tuple[int, int]

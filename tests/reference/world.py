@@ -28,7 +28,7 @@ from reference.flat_case import (
 )
 from reference.seeds import epoch_seeds
 from reference.verifiers import agree
-from rtshcua.decision.in_force import InForce
+from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.ground.auditor.audit import audit

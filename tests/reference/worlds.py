@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import M, S
-from rtshcua.decision.reads import slots_read
+from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import MISSING, Sets, Value, interval, maybe, members, point
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract, SourceKind

@@ -6,11 +6,10 @@ from typing import NamedTuple
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
-from rtshcua.decision.nearest import Nearest
-from rtshcua.decision.offer import DAYTIME
+from rtshcua.decision.case import Decisive
+from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.verdict import Decisive
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.why.reads import Read, reads
 from rtshcua.ground.why.trace import Check, Trace, Traced
 from rtshcua.model.flat.contract import Link

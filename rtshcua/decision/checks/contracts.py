@@ -1,14 +1,17 @@
-"""Skill contracts, their clauses, and the links of chains."""
+"""Skill contracts, their clauses, the links of chains; and a mission may only tighten: its copy of a contract is the
+policy's, or stricter (design 5).
+"""
 
+from collections import Counter
 from collections.abc import Iterator
 
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.checks.zones import place
-from rtshcua.decision.parameters import cells, first_cell, misfit
-from rtshcua.decision.reads import slots_read
-from rtshcua.decision.scope import Scope
-from rtshcua.decision.tree import parse
+from rtshcua.decision.contracts import cells, first_cell, misfit
+from rtshcua.decision.durability import recorded_as
+from rtshcua.decision.tree import Scope, parse, slots_read
 from rtshcua.model.durability import BUFFERED, WORDS
+from rtshcua.model.flat import limits
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import (
     CHOICE,
@@ -20,15 +23,6 @@ from rtshcua.model.flat.contract import (
     MotionKind,
     Parameter,
     TimingClass,
-)
-from rtshcua.model.flat.limits import (
-    FULL,
-    MAX_CELLS,
-    MAX_CLAUSES,
-    MAX_DURATION,
-    MAX_LINKS,
-    MAX_PARAMETERS,
-    MAX_VALUE,
 )
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import HIGHEST, LOWEST
@@ -52,8 +46,8 @@ def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
         ("duration", contract.duration_us),
         ("grace", contract.grace_us),
     ):
-        yield from within(name, duration, 0, MAX_DURATION)
-    yield from within("energy", contract.energy, 0, FULL)
+        yield from within(name, duration, 0, limits.MAX_DURATION)
+    yield from within("energy", contract.energy, 0, limits.FULL)
     yield from _record(contract)
     about = scope.about(contract)
     for name, clauses in (
@@ -61,7 +55,7 @@ def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
         ("assume", contract.assume),
         ("maintain", contract.maintain),
     ):
-        yield from within(f"number of {name} clauses", len(clauses), 0, MAX_CLAUSES)
+        yield from within(f"number of {name} clauses", len(clauses), 0, limits.MAX_CLAUSES)
         for number, one in enumerate(clauses):
             yield from at(f"{name} {number}", clause(one, about))
     clauses = (*contract.require, *contract.assume, *contract.maintain)
@@ -79,20 +73,20 @@ def _record(contract: Contract) -> Iterator[str]:
 
 
 def _parameters(contract: Contract, policy: Policy) -> Iterator[str]:
-    yield from within("number of parameters", len(contract.parameters), 0, MAX_PARAMETERS)
+    yield from within("number of parameters", len(contract.parameters), 0, limits.MAX_PARAMETERS)
     cell = 0
     for parameter in contract.parameters:
         if parameter.cell != cell:
             yield f"parameter `{parameter.name}`: cell {parameter.cell} is not the next, {cell}"
         yield from at(f"parameter `{parameter.name}`", _parameter(parameter, policy))
         cell += 2 if parameter.kind == PLACE else 1
-    yield from within("number of cells", cell, 0, MAX_CELLS)
+    yield from within("number of cells", cell, 0, limits.MAX_CELLS)
 
 
 def _parameter(parameter: Parameter, policy: Policy) -> Iterator[str]:
     yield from within("kind", parameter.kind, QUANTITY, PLACE)
-    yield from within("low bound", parameter.low, -MAX_VALUE, MAX_VALUE)
-    yield from within("high bound", parameter.high, parameter.low, MAX_VALUE)
+    yield from within("low bound", parameter.low, -limits.MAX_VALUE, limits.MAX_VALUE)
+    yield from within("high bound", parameter.high, parameter.low, limits.MAX_VALUE)
     if parameter.kind == CHOICE:
         yield from index("label", parameter.low, len(parameter.labels))
         yield from index("label", parameter.high, len(parameter.labels))
@@ -127,7 +121,7 @@ def arguments(values: tuple[int, ...], contract: Contract) -> Iterator[str]:
 
 def chain(links: tuple[Link, ...], policy: Policy) -> Iterator[str]:
     """What is wrong with the links of a chain; the contracts are well-formed."""
-    yield from within("number of links", len(links), 0, MAX_LINKS)
+    yield from within("number of links", len(links), 0, limits.MAX_LINKS)
     for number, one in enumerate(links):
         yield from at(f"link {number}", link(one, policy))
 
@@ -139,7 +133,7 @@ def link(link: Link, policy: Policy) -> Iterator[str]:
     if called.motion.kind == MotionKind.COVER:
         yield "a link has no path to cover a zone along"
     yield from arguments(link.arguments, called)
-    yield from within("limit", link.limit_us, 0, MAX_DURATION)
+    yield from within("limit", link.limit_us, 0, limits.MAX_DURATION)
     motion = called.motion
     for name, cell, low, high in (
         ("altitude", motion.altitude, LOWEST, HIGHEST),
@@ -150,3 +144,45 @@ def link(link: Link, policy: Policy) -> Iterator[str]:
     if motion.kind == MotionKind.FLY:
         cell = first_cell(called, PLACE)
         yield from place(policy.projection, link.arguments[cell], link.arguments[cell + 1])
+
+
+def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
+    """Where a mission's contract is looser than the policy's; no duration (0) is no limit, so looser than any."""
+    for name, same in (
+        ("name", mine.name == policys.name),
+        ("motion", mine.motion == policys.motion),
+        ("timing class", mine.timing_class == policys.timing_class),
+        ("fallback", _calls(mine.fallback) == _calls(policys.fallback)),
+        ("parameters", _same_parameters(mine, policys)),
+        ("phases", not policys.phases or (bool(mine.phases) and set(mine.phases) <= set(policys.phases))),
+        ("deadline", mine.deadline_us <= policys.deadline_us),
+        ("validity", mine.validity_us <= policys.validity_us),
+        ("duration", not policys.duration_us or 0 < mine.duration_us <= policys.duration_us),
+        ("grace", mine.grace_us <= policys.grace_us),
+        ("energy", mine.energy >= policys.energy),
+        ("require", _codes(mine.require) >= _codes(policys.require)),
+        ("assume", _codes(mine.assume) >= _codes(policys.assume)),
+        ("maintain", _codes(mine.maintain) >= _codes(policys.maintain)),
+        ("record", {*mine.record, *WORDS} >= set(policys.record)),
+        ("durability", recorded_as(mine.record) >= recorded_as(policys.record)),
+    ):
+        if not same:
+            yield f"`{name}` is looser than in the policy"
+
+
+def _calls(links: tuple[Link, ...]) -> list[tuple[int, tuple[int, ...], int]]:
+    return [(link.skill, link.arguments, link.limit_us) for link in links]
+
+
+def _codes(clauses: tuple[Clause, ...]) -> Counter[tuple[int, ...]]:
+    return Counter(clause.code for clause in clauses)
+
+
+def _same_parameters(mine: Contract, policys: Contract) -> bool:
+    """The same parameters, in ranges that are not wider."""
+    return len(mine.parameters) == len(policys.parameters) and all(
+        (a.name, a.kind, a.dimension, a.cell, a.labels) == (b.name, b.kind, b.dimension, b.cell, b.labels)
+        and b.low <= a.low
+        and a.high <= b.high
+        for a, b in zip(mine.parameters, policys.parameters, strict=True)
+    )

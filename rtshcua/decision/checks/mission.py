@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.checks.contracts import contract
+from rtshcua.decision.checks.contracts import contract, tightens
 from rtshcua.decision.checks.indexes import at, index, within
-from rtshcua.decision.checks.tighten import tightens
 from rtshcua.decision.checks.zones import place
-from rtshcua.decision.parameters import cells, first_cell
-from rtshcua.decision.scope import scope_of
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.contracts import cells, first_cell
+from rtshcua.decision.tree import scope_of
+from rtshcua.decision.values import TRUE
 from rtshcua.decision.zones import NO_BOX, PreparedZone
 from rtshcua.model.flat.contract import PLACE, ZONE, Contract, MotionKind, SourceKind
 from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PATH, MAX_PHASES, MAX_SPEED, MAX_VALUE

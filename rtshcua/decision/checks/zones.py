@@ -1,9 +1,16 @@
-"""Zones, tables of derived zones, and the projection."""
+"""Zones, tables of derived zones, and the projection; and the rings that bound an area: each simple, no two with a
+common point, outer ones counter-clockwise, holes clockwise.
 
-from collections.abc import Generator, Iterator
+A line sweeps the plane from south to north (along it from west to east), and the edges that it crosses are kept in
+order. Two edges can only meet after they have become neighbours, so comparing neighbours finds any that do (Shamos and
+Hoey 1976). Where a ring begins, the number of edges west of it tells whether its inside should be inside of the area.
+The effort grows as n log n with the number of corners, whatever the outline.
+"""
+
+from collections.abc import Generator, Iterator, Sequence
 
 from rtshcua.decision.checks.indexes import at, index, within
-from rtshcua.decision.checks.rings import rings
+from rtshcua.decision.outline import Corner, Leg
 from rtshcua.decision.outline import rings as outline
 from rtshcua.model.flat.limits import DAY, MAX_TABLES, MAX_TOTAL_VERTICES, MAX_VALUE, MAX_ZONES
 from rtshcua.model.flat.policy import Policy
@@ -22,6 +29,126 @@ from rtshcua.model.flat.zone import (
     Zone,
     unproject,
 )
+
+MEET = "edges cross or touch"
+FEW_CORNERS = 3
+
+
+def rings(given: Sequence[Sequence[Corner]]) -> Iterator[str]:
+    """The first thing that is wrong with the rings of an area."""
+    short = (f"ring {number} has {len(ring)} corners" for number, ring in enumerate(given) if len(ring) < FEW_CORNERS)
+    problem = next(short, None) or _Sweep(given).problem()
+    if problem is not None:
+        yield problem
+
+
+class _Sweep:
+    """Corners are numbered through all rings; an edge has the number of the corner at which it begins in its ring."""
+
+    def __init__(self, given: Sequence[Sequence[Corner]]) -> None:
+        self._corners = [corner for ring in given for corner in ring]
+        self._rings = [number for number, ring in enumerate(given) for _ in ring]
+        self._before: list[int] = []
+        self._edges: list[Leg] = []  # from the end that the sweep meets first
+        for ring in given:
+            at = len(self._before)
+            self._before += (at + len(ring) - 1, *range(at, at + len(ring) - 1))
+            self._edges += (_upward(*a, *b) for a, b in zip(ring, (*ring[1:], ring[0]), strict=True))
+        self._crossed: list[int] = []  # the edges that the line crosses, from west to east
+
+    def problem(self) -> str | None:
+        """What is wrong, or None."""
+        order = sorted(range(len(self._corners)), key=lambda corner: self._corners[corner][::-1])
+        last: Corner | None = None
+        for number in order:
+            x, y = corner = self._corners[number]
+            if corner == last:
+                return f"two corners are at {x}, {y}"
+            last = corner
+            incoming, outgoing = self._before[number], number
+            begins = self._edges[incoming][:2] == corner, self._edges[outgoing][:2] == corner
+            if all(begins):
+                problem = self._begin(incoming, outgoing, corner)
+            elif any(begins):
+                old, new = (incoming, outgoing) if begins[1] else (outgoing, incoming)
+                problem = self._go_on(old, new, corner)
+            else:
+                problem = self._end({incoming, outgoing}, corner)
+            if problem is not None:
+                return f"ring {self._rings[number]}: {problem} at {x}, {y}"
+        return None
+
+    def _begin(self, incoming: int, outgoing: int, corner: Corner) -> str | None:
+        at = self._place(corner)
+        turn = _turn(self._edges[incoming], self._edges[outgoing])
+        if turn == 0 or (at < len(self._crossed) and _side(self._edges[self._crossed[at]], corner) == 0):
+            return MEET
+        # the area is between the two where an even number of edges lies west of them; it is to the left of each edge
+        if (turn < 0) != (at % 2 == 0):
+            return "it goes round the wrong way, or is nested wrongly"
+        self._crossed[at:at] = (incoming, outgoing) if turn < 0 else (outgoing, incoming)
+        return MEET if self._meets(at - 1) or self._meets(at + 1) else None
+
+    def _go_on(self, old: int, new: int, corner: Corner) -> str | None:
+        at = self._place(corner)
+        other = self._crossed[at : at + 1] != [old]
+        self._crossed[at : at + 1] = [new]
+        return MEET if other or self._meets(at - 1) or self._meets(at) else None
+
+    def _end(self, ending: set[int], corner: Corner) -> str | None:
+        at = self._place(corner)
+        others = set(self._crossed[at : at + 2]) != ending
+        del self._crossed[at : at + 2]
+        return MEET if others or self._meets(at - 1) else None
+
+    def _place(self, corner: Corner) -> int:
+        """How many of the crossed edges are west of a corner."""
+        crossed, edges, (x, y) = self._crossed, self._edges, corner
+        low, high = 0, len(crossed)
+        while low < high:
+            middle = (low + high) >> 1
+            x0, y0, x1, y1 = edges[crossed[middle]]
+            if (x1 - x0) * (y - y0) < (y1 - y0) * (x - x0):
+                low = middle + 1
+            else:
+                high = middle
+        return low
+
+    def _meets(self, at: int) -> bool:
+        """Whether a crossed edge and the next have a common point that is not the corner between them."""
+        if not 0 <= at < len(self._crossed) - 1:
+            return False
+        return _meet(self._edges[self._crossed[at]], self._edges[self._crossed[at + 1]])
+
+
+def _upward(x0: int, y0: int, x1: int, y1: int) -> Leg:
+    """An edge from the end that is further south, or further west at the same height."""
+    return (x0, y0, x1, y1) if (y0, x0) < (y1, x1) else (x1, y1, x0, y0)
+
+
+def _side(edge: Leg, corner: Corner) -> int:
+    """Above 0 where an upward edge passes east of a corner, below 0 where it passes west."""
+    x0, y0, x1, y1 = edge
+    return (x1 - x0) * (corner[1] - y0) - (y1 - y0) * (corner[0] - x0)
+
+
+def _turn(a: Leg, b: Leg) -> int:
+    """Below 0 where `a` leads further west than `b`."""
+    return (a[2] - a[0]) * (b[3] - b[1]) - (a[3] - a[1]) * (b[2] - b[0])
+
+
+def _meet(a: Leg, b: Leg) -> bool:
+    """Whether two upward edges that the line crosses at once (so that on one straight line they overlap) have a common
+    point, other than an end of both when they lead apart from there.
+    """
+    start, end = _side(a, b[:2]), _side(a, b[2:])
+    if a[:2] == b[:2] or a[2:] == b[2:]:
+        return start == end == 0
+    if (start > 0 and end > 0) or (start < 0 and end < 0):
+        return False
+    start, end = _side(b, a[:2]), _side(b, a[2:])
+    return not ((start > 0 and end > 0) or (start < 0 and end < 0))
+
 
 #: 1e-7 degree is about 11 mm at the equator
 MAX_FACTOR = 32 << SHIFT

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from math import gcd
 
 from rtshcua.decision import tree
-from rtshcua.decision.daytime import Daytime
 from rtshcua.decision.evaluate import known
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import ABSENT, MAYBE, Value
+from rtshcua.decision.times import Daytime
+from rtshcua.decision.values import ABSENT, FALSE, MAYBE, TRUE, UNKNOWN, Truth, Value
 from rtshcua.ground.analysis.box import Box, Cell, Form, absent, chosen, clipped, present
 from rtshcua.ground.analysis.moments import cuts, moments_split
 from rtshcua.ground.analysis.space import Space

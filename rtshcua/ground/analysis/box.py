@@ -3,8 +3,7 @@
 from typing import Final, TypeAlias
 
 from rtshcua.decision.tree import Term
-from rtshcua.decision.truth import Truth
-from rtshcua.decision.values import ABSENT, PRESENT, Span, Value
+from rtshcua.decision.values import ABSENT, PRESENT, Span, Truth, Value
 
 #: an argument cell (True) or a state slot (False), by its index
 Cell: TypeAlias = tuple[bool, int]

@@ -3,7 +3,7 @@
 from typing import TypeAlias
 
 from rtshcua.decision import tree
-from rtshcua.decision.truth import AND, FALSE, NOT, OR, TRUE, Truth
+from rtshcua.decision.values import AND, FALSE, NOT, OR, TRUE, Truth
 from rtshcua.ground.analysis.atoms import MOST, Atom, Chosen, Linear, Local, Monitor, Phase
 from rtshcua.ground.analysis.box import Box
 from rtshcua.ground.analysis.places import PointIn, There, VehicleIn, VehicleInArgument

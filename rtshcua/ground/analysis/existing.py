@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 
 from rtshcua.decision.times import Times
-from rtshcua.decision.truth import TRUE, Truth
-from rtshcua.decision.values import Span
+from rtshcua.decision.values import TRUE, Span, Truth
 from rtshcua.ground.analysis.box import Box
 from rtshcua.ground.analysis.moments import cuts, moments_split
 from rtshcua.ground.analysis.space import Space

@@ -1,7 +1,6 @@
 """What a box rules out by itself: sums against their parts, and zones against each other."""
 
-from rtshcua.decision.truth import FALSE, TRUE, Truth
-from rtshcua.decision.values import Value
+from rtshcua.decision.values import FALSE, TRUE, Truth, Value
 from rtshcua.ground.analysis.box import VEHICLE, Box, Form, clipped
 from rtshcua.ground.analysis.plane import Plane
 

@@ -1,7 +1,6 @@
 """Atoms about zones over boxes: where the vehicle is, or where a place is that was given as an argument."""
 
-from rtshcua.decision.truth import AND, FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import ABSENT, MAYBE, PRESENT, Value
+from rtshcua.decision.values import ABSENT, AND, FALSE, MAYBE, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.ground.analysis.atoms import Atom, initial
 from rtshcua.ground.analysis.box import VEHICLE, Box, Cell, Who, absent, clipped, present
 from rtshcua.ground.analysis.existing import Existing

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.ground.analysis.box import Box
 from rtshcua.ground.analysis.condition import Condition, over_boxes, undecided
 from rtshcua.ground.analysis.narrow import narrow

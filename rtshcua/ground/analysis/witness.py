@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.truth import TRUE, Truth
-from rtshcua.decision.values import ABSENT, MISSING, PRESENT, Value, point
+from rtshcua.decision.values import ABSENT, MISSING, PRESENT, TRUE, Truth, Value, point
 from rtshcua.ground.analysis.box import VEHICLE, Box, Cell, Who, clipped
 from rtshcua.ground.analysis.narrow import narrow
 from rtshcua.ground.analysis.space import Space

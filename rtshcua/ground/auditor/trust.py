@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from rtshcua.decision.in_force import InForce
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import octets

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable, Sequence
 from math import isqrt
 from typing import NamedTuple
 
-from rtshcua.decision.lasting import longest
+from rtshcua.decision.contracts import longest
 from rtshcua.decision.prepare import prepare_invocation
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span

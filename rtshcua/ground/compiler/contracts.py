@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from rtshcua.decision.reads import slots_read
+from rtshcua.decision.tree import slots_read
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.types import Kind

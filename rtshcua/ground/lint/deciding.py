@@ -9,8 +9,7 @@ language's doing, and no policy's.
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.decision.values import MAYBE, Value
+from rtshcua.decision.values import FALSE, MAYBE, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.values import Span as Between
 from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.solve import Goal, No

@@ -6,8 +6,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rtshcua.decision.case import Decisive
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.verdict import Decisive
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.compiler.policy import LoweredPolicy

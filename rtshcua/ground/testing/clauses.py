@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from rtshcua.decision.case import Decisive
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.verdict import Decisive
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.context import Context

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.decision.decide import Decision
 from rtshcua.decision.nearest import Nearest
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.ground.testing.case import Case

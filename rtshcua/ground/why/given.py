@@ -2,7 +2,7 @@
 
 import re
 
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.exact import exact

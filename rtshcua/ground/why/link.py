@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.link import PreparedLink
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.truth import EVERYWHERE
+from rtshcua.decision.prepared import PreparedInvocation, PreparedLink, PreparedPolicy
+from rtshcua.decision.values import EVERYWHERE
 from rtshcua.evidence.records import Decision
 from rtshcua.ground.why.recorded import now_of, state_of
 from rtshcua.ground.why.trace import Check, Tried

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.case import environment, situation
-from rtshcua.decision.change import Changes, nearest_in
+from rtshcua.decision.nearest import Changes, nearest_in
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.model.flat.code import Clause

@@ -6,18 +6,15 @@ It calls the very steps that `decide` calls, and the conditions that they call; 
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from rtshcua.decision.airspace import keeps
-from rtshcua.decision.case import Case, situation
+from rtshcua.decision.case import PASS, Case, Decisive, situation
+from rtshcua.decision.contracts import longest
 from rtshcua.decision.decide import STEPS, Decision, decide
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.lasting import longest
-from rtshcua.decision.link import Guards
 from rtshcua.decision.links import link_admissible
 from rtshcua.decision.nearest import Nearest, nearest
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepared import Guards, PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
-from rtshcua.decision.truth import EVERYWHERE, Truth
-from rtshcua.decision.verdict import PASS, Decisive
+from rtshcua.decision.values import EVERYWHERE, Truth
 from rtshcua.model.flat.situation import Context, Now, State
 
 _AUTHORITY, _CONFIRMATION, _STATE, _SAFETY = 2, 3, 6, 7  # indexes into `STEPS`
@@ -111,7 +108,7 @@ def _safety(case: Case) -> Iterator[Check]:
     volume = invocation.planner.volume(at.slots, known)
     through = longest(invocation.invocation.contract, policy.policy.vehicle)
     if policy.airspace is not None:
-        yield Check("airspace", policy.airspace.airspace, EVERYWHERE[keeps(volume.place, policy.airspace, at, through)])
+        yield Check("airspace", policy.airspace.airspace, EVERYWHERE[policy.airspace.keeps(volume.place, at, through)])
     yield from _clauses("maintain", invocation.maintain, ranging(at, volume, known.height, through))
     yield Check("energy", None, EVERYWHERE[invocation.energy.suffices(at.slots[known.battery], volume)])
     for rule in invocation.candidates.degrades:

@@ -7,10 +7,9 @@ the permits. Bytes go in and bytes come out, so that an isolated process or a tr
 from typing import Final
 
 from rtshcua.decision.decide import Decision
-from rtshcua.decision.in_force import InForce
 from rtshcua.decision.links import DEGRADE
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.session import Session
+from rtshcua.decision.session import InForce, Session
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link

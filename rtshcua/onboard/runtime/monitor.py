@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from rtshcua.decision.prepared import PreparedPolicy
-from rtshcua.decision.reads import where
 from rtshcua.decision.temporal import initial, observe
-from rtshcua.decision.truth import UNKNOWN
+from rtshcua.decision.tree import where
+from rtshcua.decision.values import UNKNOWN
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings

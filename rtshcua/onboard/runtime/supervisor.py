@@ -2,11 +2,10 @@
 
 from collections.abc import Iterable
 
-from rtshcua.decision.holding import holding
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.session import may_ask_again
-from rtshcua.decision.truth import FALSE, Truth
-from rtshcua.decision.watch import watch
+from rtshcua.decision.values import FALSE, Truth
+from rtshcua.decision.watch import holding, watch
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Reason

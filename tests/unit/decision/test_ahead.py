@@ -11,14 +11,11 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.asking import STEP, loaded, ready
 from reference.flat_case import HEIGHT, NOW, POSITION_X, POSITION_Y, M, S
-from rtshcua.decision.ahead import UNKNOWN_AHEAD, ahead
 from rtshcua.decision.case import situation
-from rtshcua.decision.holding import WAY_HOME, holding
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
-from rtshcua.decision.truth import FALSE, UNKNOWN
-from rtshcua.decision.values import MISSING
-from rtshcua.decision.watch import watch
+from rtshcua.decision.values import FALSE, MISSING, UNKNOWN
+from rtshcua.decision.watch import UNKNOWN_AHEAD, WAY_HOME, ahead, holding, watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.policy import Policy

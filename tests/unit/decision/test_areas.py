@@ -8,10 +8,8 @@ from hypothesis import given
 from reference import worlds
 from reference.naive_geometry import in_shape
 from reference.outlines import Ring, area, polygon, rings, zig_zag
-from rtshcua.decision.bands import REPEATS, Bands
-from rtshcua.decision.outline import edges
-from rtshcua.decision.slabs import MOST, Slabs
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.outline import MOST, REPEATS, Bands, Slabs, edges
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.zone import MAX_COORDINATE
 

@@ -8,15 +8,12 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, GOTO, HOVER, INSPECT, POSITION_X, apply, argument, const, scaled, signal
 from reference.naive_code import daytime
-from rtshcua.decision.daytime import Daytime
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
-from rtshcua.decision.reads import slots_read
-from rtshcua.decision.scope import scope_of
-from rtshcua.decision.tree import parse
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.values import MISSING, Value, interval, maybe, members, point
+from rtshcua.decision.times import Daytime
+from rtshcua.decision.tree import parse, scope_of, slots_read
+from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, members, point
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Op
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
 

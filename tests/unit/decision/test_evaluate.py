@@ -12,10 +12,8 @@ from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import Condition, build
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
-from rtshcua.decision.scope import scope_of
-from rtshcua.decision.tree import parse
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.values import Sets, point
+from rtshcua.decision.tree import parse, scope_of
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Sets, point
 from rtshcua.model.flat.situation import Now, State
 
 MONITORS, PHASE = 2, 1

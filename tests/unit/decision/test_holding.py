@@ -6,8 +6,8 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, loaded, ready
 from reference.flat_case import BATTERY, HEIGHT, NOW, POSITION_X, POSITION_Y, M
-from rtshcua.decision.holding import WAY_HOME, holding
-from rtshcua.decision.truth import FALSE, UNKNOWN
+from rtshcua.decision.values import FALSE, UNKNOWN
+from rtshcua.decision.watch import WAY_HOME, holding
 
 DEGRADE = flat.RULES[-1].text
 AIRSPACE = "airspace inside city outside school"

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from reference.documents import ASKED, MIN, approval, low, recall, replacement, shorter
 from reference.flat_case import GOTO, S
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT, START, VEHICLE
-from rtshcua.decision.in_force import MOST_AHEAD, InForce
+from rtshcua.decision.session import MOST_AHEAD, InForce
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import cose, names

@@ -8,11 +8,9 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, loaded, ready, with_rules
 from reference.flat_case import BATTERY, FIX, HEIGHT, HOME, HOVER, LAND, LINK, NOW, POSITION_X, POSITION_Y, WIND, M, S
-from rtshcua.decision.holding import WAY_HOME
 from rtshcua.decision.links import DEGRADE, START, choose_contingency, choose_fallback, fallbacks, link_admissible
-from rtshcua.decision.truth import FALSE, UNKNOWN
-from rtshcua.decision.values import MISSING, Sets, interval, maybe, point
-from rtshcua.decision.watch import watch
+from rtshcua.decision.values import FALSE, MISSING, UNKNOWN, Sets, interval, maybe, point
+from rtshcua.decision.watch import WAY_HOME, watch
 from rtshcua.model.flat.policy import RuleKind
 
 INSPECTION = ready(STEP, POLICY)

@@ -15,9 +15,7 @@ from rtshcua.decision.links import choose_contingency, choose_fallback, link_adm
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.reads import monitored, slots_read
-from rtshcua.decision.scope import Scope, scope_of
-from rtshcua.decision.tree import InPhase, Monitored, parse
+from rtshcua.decision.tree import InPhase, Monitored, Scope, monitored, parse, scope_of, slots_read
 from rtshcua.decision.values import Sets
 from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal

@@ -12,13 +12,11 @@ from reference import worlds
 from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract
 from reference.flat_case import BATTERY, FIX, GOTO, HEIGHT, INSPECT, NOW, POSITION_X, WIND, M, clause, rule
 from rtshcua.decision.case import situation
-from rtshcua.decision.change import Change, Changes, nearest_in
 from rtshcua.decision.decide import Decision, decide
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.nearest import nearest
+from rtshcua.decision.nearest import Change, Changes, nearest, nearest_in
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.scope import scope_of
-from rtshcua.decision.tree import parse
+from rtshcua.decision.tree import parse, scope_of
 from rtshcua.decision.values import MISSING, point
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import PLACE, MotionKind, Parameter

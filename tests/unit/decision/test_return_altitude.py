@@ -4,10 +4,10 @@ import msgspec
 import pytest
 
 from reference import flat_case as flat
-from rtshcua.decision.places import WellKnown
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner, flown_at
+from rtshcua.decision.zones import WellKnown
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from reference import worlds
 from reference.naive_geometry import well_formed
 from reference.outlines import Ring, rings, zig_zag
-from rtshcua.decision.checks.rings import rings as problems
+from rtshcua.decision.checks.zones import rings as problems
 
 SQUARE: Ring = ((0, 0), (10, 0), (10, 10), (0, 10))
 HOLE: Ring = ((2, 2), (2, 8), (8, 8), (8, 2))

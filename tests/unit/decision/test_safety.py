@@ -23,11 +23,11 @@ from reference.flat_case import (
     M,
     clause,
 )
+from rtshcua.decision.contracts import Energy
 from rtshcua.decision.decide import decide
-from rtshcua.decision.energy import Energy
-from rtshcua.decision.places import WellKnown
 from rtshcua.decision.values import MISSING, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
+from rtshcua.decision.zones import WellKnown
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan

@@ -9,8 +9,7 @@ from msgspec.structs import replace
 from reference import documents, world
 from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, HOME, HOVER, LAND, NOW, S
-from rtshcua.decision.in_force import InForce
-from rtshcua.decision.session import LinkDecision, Session
+from rtshcua.decision.session import InForce, LinkDecision, Session
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome, Reason

@@ -5,8 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.decision.evaluate import known
-from rtshcua.decision.truth import AND, EVERYWHERE, FALSE, NOT, OR, TRUE, UNKNOWN, members
-from rtshcua.decision.values import ABSENT, MAYBE, PRESENT
+from rtshcua.decision.values import ABSENT, AND, EVERYWHERE, FALSE, MAYBE, NOT, OR, PRESENT, TRUE, UNKNOWN, singles
 
 T, F, U = TRUE, FALSE, UNKNOWN
 KLEENE_AND = {(T, T): T, (T, F): F, (T, U): U, (F, F): F, (F, U): F, (U, U): U}
@@ -29,9 +28,9 @@ def test_not() -> None:
 
 @given(st.integers(1, 7), st.integers(1, 7))
 def test_sets_hold_what_their_members_give_and_no_more(a: int, b: int) -> None:
-    assert set(members(AND[a][b])) == {AND[x][y] for x in members(a) for y in members(b)}
-    assert set(members(OR[a][b])) == {OR[x][y] for x in members(a) for y in members(b)}
-    assert set(members(NOT[a])) == {NOT[x] for x in members(a)}
+    assert set(singles(AND[a][b])) == {AND[x][y] for x in singles(a) for y in singles(b)}
+    assert set(singles(OR[a][b])) == {OR[x][y] for x in singles(a) for y in singles(b)}
+    assert set(singles(NOT[a])) == {NOT[x] for x in singles(a)}
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,13 @@ from reference import flat_case as flat
 from reference.asking import STEP, ask, loaded, ready
 from reference.flat_case import MIN, H, M, S
 from reference.naive_code import between
-from rtshcua.decision.holding import holding
-from rtshcua.decision.lasting import longest
+from rtshcua.decision.contracts import longest
 from rtshcua.decision.links import choose_fallback
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepared import PreparedPolicy
 from rtshcua.decision.times import Dates, Times
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.watch import watch
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.watch import holding, watch
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from reference import outlines, worlds
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
-from rtshcua.decision.places import Place, Sweep
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.zones import PreparedZone
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.zones import Place, PreparedZone, Sweep
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
 
 T, F = TRUE, FALSE

@@ -24,7 +24,7 @@ from reference.flat_case import (
     signal,
 )
 from reference.world import START, TICK, Run, assert_audited, loaded
-from rtshcua.decision.reads import slots_read
+from rtshcua.decision.tree import slots_read
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP
 from rtshcua.model.flat.mission import OnInadmissible

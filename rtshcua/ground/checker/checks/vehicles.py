@@ -1,6 +1,6 @@
 """E0106, E0201, E0204, E0310, E0319, E0414, E0502, E1003: what a vehicle declares of itself."""
 
-from rtshcua.decision.checks.vehicle import MAX_POSITION_ERROR, MAX_REACTION
+from rtshcua.decision.checks.policy import MAX_POSITION_ERROR, MAX_REACTION
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Context

@@ -1,8 +1,8 @@
 """The airspace at a time that nothing is known of."""
 
-from rtshcua.decision.places import Place
 from rtshcua.decision.prepared import PreparedAirspace
-from rtshcua.decision.truth import AND, NOT, TRUE, Truth
+from rtshcua.decision.values import AND, NOT, TRUE, Truth
+from rtshcua.decision.zones import Place
 
 
 def may_keep(place: Place, airspace: PreparedAirspace) -> Truth:

@@ -7,14 +7,11 @@ left for on board.
 from typing import NamedTuple
 
 from rtshcua.decision.authority import authority
-from rtshcua.decision.case import Case
-from rtshcua.decision.change import Changes
+from rtshcua.decision.case import PASS, Case
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.offer import Offer, offer
-from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.rules import PreparedRule
-from rtshcua.decision.truth import TRUE
-from rtshcua.decision.verdict import PASS
+from rtshcua.decision.nearest import Changes, Offer, offer
+from rtshcua.decision.prepared import PreparedInvocation, PreparedRule
+from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references

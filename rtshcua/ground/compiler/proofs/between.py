@@ -11,8 +11,7 @@ from typing import Final
 
 from rtshcua.decision import tree
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import TRUE
-from rtshcua.decision.values import interval
+from rtshcua.decision.values import TRUE, interval
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.solve import Goal
 from rtshcua.ground.analysis.words import words

@@ -8,8 +8,7 @@ A vehicle that has not climbed cannot fly, survey or hold: no autopilot does tha
 from collections.abc import Sequence
 
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import TRUE
-from rtshcua.decision.values import point
+from rtshcua.decision.values import TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.places import Place, from_home, from_where, planned

@@ -10,8 +10,7 @@ those for which its skill is valid and in which some permit of it may hold. The 
 from collections.abc import Iterable, Iterator, Mapping
 
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.truth import FALSE, TRUE
-from rtshcua.decision.values import point
+from rtshcua.decision.values import FALSE, TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.situation import Ground

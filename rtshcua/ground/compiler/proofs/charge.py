@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import TRUE
-from rtshcua.decision.values import point
+from rtshcua.decision.values import TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.places import Place, planned

@@ -7,7 +7,7 @@ from flying, the other never does. Rules that merely overlap are left alone: whi
 more.
 """
 
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.solve import No, Yes
 from rtshcua.ground.analysis.words import words

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import Goal, No, Undecided, Yes, satisfiable

@@ -7,7 +7,7 @@ say, so they are reported too.
 from collections.abc import Iterator
 
 from rtshcua.decision import tree
-from rtshcua.decision.truth import TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import No, Undecided, Yes, satisfiable

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.reads import slots_read
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.tree import slots_read
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.rates import RATES, arrives, interval, signal_of

@@ -1,6 +1,6 @@
 """E0715: a delegation's condition can hold together with at least one of the permits that it passes on."""
 
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.solve import No
 from rtshcua.ground.compiler.proofs.situation import Ground

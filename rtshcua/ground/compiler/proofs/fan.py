@@ -9,11 +9,9 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
-from rtshcua.decision.bands import Box
-from rtshcua.decision.outline import rings
-from rtshcua.decision.places import Sweep
-from rtshcua.decision.truth import FALSE, TRUE, Truth
-from rtshcua.decision.zones import PreparedZone
+from rtshcua.decision.outline import Box, rings
+from rtshcua.decision.values import FALSE, TRUE, Truth
+from rtshcua.decision.zones import PreparedZone, Sweep
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone
 

@@ -7,9 +7,8 @@ a forbid that every state makes true forbids.
 from collections.abc import Iterator
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.rules import PreparedRule
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.prepared import PreparedInvocation, PreparedRule
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.analysis.witness import Witness

@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.reads import slots_read
-from rtshcua.decision.truth import TRUE
-from rtshcua.decision.values import MISSING, point
+from rtshcua.decision.tree import slots_read
+from rtshcua.decision.values import MISSING, TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.situation import Ground

@@ -5,9 +5,9 @@ from itertools import pairwise
 from math import isqrt
 from typing import TypeAlias
 
-from rtshcua.decision.bands import Box
+from rtshcua.decision.outline import Box
 from rtshcua.decision.prepared import PreparedAirspace
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.ground.compiler.proofs.fan import Point
 from rtshcua.model.flat.policy import Policy

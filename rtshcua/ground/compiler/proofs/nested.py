@@ -7,7 +7,7 @@ A confirm rule asks for nothing further where another awaits the same role where
 
 from collections.abc import Iterable
 
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import No
 from rtshcua.ground.compiler.proofs.conflicting import covers, same

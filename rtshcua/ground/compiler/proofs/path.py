@@ -6,13 +6,12 @@ only are left for on board, where the time is known.
 
 from collections.abc import Sequence
 
-from rtshcua.decision.energy import Energy
+from rtshcua.decision.contracts import Energy, longest
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.lasting import longest
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.reads import monitored, slots_read, where
 from rtshcua.decision.safety import ranging
-from rtshcua.decision.truth import EVERYWHERE, FALSE, TRUE
+from rtshcua.decision.tree import monitored, slots_read, where
+from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.volume import Volume
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

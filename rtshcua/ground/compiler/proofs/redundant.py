@@ -8,7 +8,7 @@ reported.
 
 from collections.abc import Set as AbstractSet
 
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Condition, Environment
-from rtshcua.decision.truth import Truth
+from rtshcua.decision.values import Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import Answer, Goal, Undecided, Yes

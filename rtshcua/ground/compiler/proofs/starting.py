@@ -4,8 +4,8 @@ The vehicle stands at home before the first step, and comes down there after the
 that is must not make this easier: the whole disc within which home may lie has to be in the airspace.
 """
 
-from rtshcua.decision.places import Place as Places
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.values import TRUE
+from rtshcua.decision.zones import Place as Places
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs.anytime import may_keep
 from rtshcua.ground.compiler.proofs.fan import Fan, Landmarks, disc, hull

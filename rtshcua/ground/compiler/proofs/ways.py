@@ -8,12 +8,11 @@ airspace is not flown, and the vehicle lands where it is: better than nothing, b
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from rtshcua.decision.link import PreparedLink
-from rtshcua.decision.parameters import first_cell
-from rtshcua.decision.places import Place as Places
-from rtshcua.decision.places import Sweep
-from rtshcua.decision.prepared import PreparedAirspace, PreparedInvocation
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.contracts import first_cell
+from rtshcua.decision.prepared import PreparedAirspace, PreparedInvocation, PreparedLink
+from rtshcua.decision.values import TRUE
+from rtshcua.decision.zones import Place as Places
+from rtshcua.decision.zones import Sweep
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs.anytime import may_keep
 from rtshcua.ground.compiler.proofs.fan import Fan, Landmarks, Point, disc

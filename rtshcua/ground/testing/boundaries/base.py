@@ -12,7 +12,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.authority import CLASSES
 from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import Goal

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from rtshcua.decision.outline import rings
-from rtshcua.decision.truth import FALSE, TRUE, Truth
+from rtshcua.decision.values import FALSE, TRUE, Truth
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, MAX_COORDINATE, Projection, Zone, project, unproject
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.change import Changes, nearest_in
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import Environment, Tables, build, total
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.nearest import Changes, nearest_in
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.ground.testing.boundaries.parts import Part, truth
 from rtshcua.ground.testing.boundaries.scene import Made, Scene, Value, Variable
 from rtshcua.ground.why.nominal import lasting

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from rtshcua.decision import tree
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.ground.testing.boundaries.limits import Limit, tried
 from rtshcua.ground.testing.boundaries.parts import Part, atoms, truth
 from rtshcua.ground.testing.boundaries.places import zones_of

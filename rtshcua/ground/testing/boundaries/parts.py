@@ -4,12 +4,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.airspace import keeps
+from rtshcua.decision.case import Decisive
 from rtshcua.decision.evaluate import Condition, build
 from rtshcua.decision.prepared import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.safety import ranging
-from rtshcua.decision.truth import EVERYWHERE, Truth
-from rtshcua.decision.verdict import Decisive
+from rtshcua.decision.values import EVERYWHERE, Truth
 from rtshcua.ground.testing.boundaries.scene import Scene
 from rtshcua.ground.testing.coverage.universe import AIRSPACE, ENERGY, ENERGY_TEXT, clauses_of
 from rtshcua.model.flat.policy import Rule
@@ -112,5 +111,5 @@ def truth(part: Part, scene: Scene) -> Truth:
     if part.condition is not None:
         return EVERYWHERE[part.condition(ranging(at, volume, known.height, invocation.lasts_us))]
     if part.airspace is not None:
-        return EVERYWHERE[keeps(volume.place, part.airspace, at, invocation.lasts_us)]
+        return EVERYWHERE[part.airspace.keeps(volume.place, at, invocation.lasts_us)]
     return EVERYWHERE[invocation.energy.suffices(at.slots[known.battery], volume)]

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import build
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.values import MISSING, Value, point
+from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.analysis.witness import Witness

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rtshcua.decision import tree
 from rtshcua.decision.outline import rings
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import Truth
+from rtshcua.decision.values import Truth
 from rtshcua.ground.testing.boundaries.edges import Place, edge, ring_edges
 from rtshcua.ground.testing.boundaries.limits import Limit, tried
 from rtshcua.ground.testing.boundaries.parts import Part, atoms, truth

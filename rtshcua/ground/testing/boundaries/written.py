@@ -3,7 +3,7 @@
 from datetime import UTC, datetime, timedelta
 
 from rtshcua.decision.case import SINGLE
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.testing.boundaries.scene import Value
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy

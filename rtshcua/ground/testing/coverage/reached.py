@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from rtshcua.decision.decide import Decision
 from rtshcua.decision.links import DEGRADE
 from rtshcua.decision.prepared import PreparedInvocation
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.values import TRUE
 from rtshcua.ground.testing.coverage.universe import AIRSPACE, ENERGY, OUTCOMES, TRUTHS, Goal, Universe
 from rtshcua.ground.why.trace import Check, Trace
 from rtshcua.model.flat.code import Clause

@@ -13,9 +13,9 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.energy import Energy
+from rtshcua.decision.contracts import Energy
 from rtshcua.decision.prepared import PreparedPolicy
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import No
 from rtshcua.ground.compiler.files import MAX_TEXT

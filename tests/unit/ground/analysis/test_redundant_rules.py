@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import prepare
 from rtshcua.decision.prepared import PreparedPolicy
-from rtshcua.decision.truth import TRUE, UNKNOWN
-from rtshcua.decision.values import MISSING, Value, point
+from rtshcua.decision.values import MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect

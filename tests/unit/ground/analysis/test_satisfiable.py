@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, Tables, build
-from rtshcua.decision.places import WellKnown
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.values import MISSING, Value, interval, maybe, members, point
-from rtshcua.decision.zones import PreparedZone
+from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, members, point
+from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.ground.analysis.plane import Plane
 from rtshcua.ground.analysis.solve import No, Undecided, Yes, implies, satisfiable
 from rtshcua.ground.analysis.space import Space

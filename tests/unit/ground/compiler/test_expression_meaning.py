@@ -15,15 +15,13 @@ import pytest
 from reference.naive_expression import Names, World, truth
 from reference.random_expressions import ENUMERATIONS, PHASES, STEP, ZONES, Maker
 from rtshcua.decision.evaluate import NO_PHASE, Environment, Tables, build
-from rtshcua.decision.places import WellKnown
-from rtshcua.decision.prepared import Latest, Limit, PreparedMonitor
-from rtshcua.decision.scope import Scope as CodeScope
-from rtshcua.decision.scope import scope_of
+from rtshcua.decision.prepared import Limit, PreparedMonitor
 from rtshcua.decision.temporal import initial, observe
+from rtshcua.decision.tree import Scope as CodeScope
 from rtshcua.decision.tree import parse as parse_code
-from rtshcua.decision.truth import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.values import MISSING, Value, point
-from rtshcua.decision.zones import PreparedZone
+from rtshcua.decision.tree import scope_of
+from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
+from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Context
@@ -151,7 +149,7 @@ def lowered(node: Condition) -> Lowered | None:
     cells = {cell: CHOICE if name == "look" else QUANTITY for name, cell in cells_of(symbols.skills["probe"]).items()}
     condition = built(clause.code, code_scope._replace(cells=(cells,)))
     limits = (Limit(10**9, MAX_VALUE),) * slots.count
-    policy = SimpleNamespace(policy=flat, monitors=prepared, limits=limits, latest=Latest())
+    policy = SimpleNamespace(policy=flat, monitors=prepared, limits=limits, seen=None)
     return Lowered(policy, condition, clause.code)
 
 

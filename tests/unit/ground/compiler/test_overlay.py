@@ -9,7 +9,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rtshcua.decision.checks.rings import rings as problems
+from rtshcua.decision.checks.zones import rings as problems
 from rtshcua.ground.checker.polygons import contained, contains, crossing, doubled_area, tangled
 from rtshcua.ground.compiler.arrangement import Windings, faces
 from rtshcua.ground.compiler.convex import is_convex

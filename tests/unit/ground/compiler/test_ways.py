@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely import MultiPoint, Point, Polygon, box, convex_hull, unary_union
 
 from reference.sources import found, mission, policy, program, skill
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.ground.compiler.proofs.fan import Fan, Landmarks, disc, hull
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone

@@ -10,7 +10,7 @@ import pytest
 
 from reference.sources import CHECKOUT, LIBRARY, found, mission, policy, program, skill
 from rtshcua.decision.checks.zones import zones as problems
-from rtshcua.decision.truth import TRUE
+from rtshcua.decision.values import TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.checker.report import Report

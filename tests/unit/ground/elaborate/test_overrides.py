@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.decision.checks.tighten import tightens
+from rtshcua.decision.checks.contracts import tightens
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import render

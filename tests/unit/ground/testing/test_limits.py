@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.truth import FALSE, TRUE
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.testing.boundaries.finding import limits

@@ -21,8 +21,7 @@ from reference import flat_case as flat
 from rtshcua.decision.authority import authority
 from rtshcua.decision.case import PASSED, Case, situation
 from rtshcua.decision.decide import decide
-from rtshcua.decision.prepare import prepare, prepare_invocation
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind

@@ -27,7 +27,6 @@ from rtshcua.adapters.files.verification import Asked, verify_carefully, verify_
 from rtshcua.decision.decide import decide
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit
@@ -84,9 +83,7 @@ def lines(records: int) -> Iterator[bytes]:
             yield recorder.effect(at, "said", ref, token=1, detail="PreArm: " + "wind " * 20)
         else:
             context = replace(asked, released_us=at.monotonic_us - 1_000)
-            recorded = RecordedAnswer.of(
-                answer.outcome, answer.reason, answer.step, at.monotonic_us, clause=answer.clause
-            )
+            recorded = replace(answer, valid_until_us=at.monotonic_us)
             yield recorder.decision(at, ref, invocation_id, state, context, recorded, durability)
     yield recorder.close(now(records), ending="completed", tlog=None)
 

@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.showing.bundle import claimed, replaced
-from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission

@@ -10,8 +10,7 @@ it defers; an unknown `permit` may not, so it does not count.
 4.3). A refusal, or an approval that did not come within the rule's time after the release, denies.
 """
 
-from rtshcua.decision.case import PASS, PASSED, Case, Found, Verdict
-from rtshcua.decision.prepared import PreparedRule
+from rtshcua.decision.case import PASSED, Case, Found, Verdict, concluded
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.outcome import Outcome, Reason
@@ -73,19 +72,11 @@ def authority(case: Case) -> Found:
             break
         permitted = permitted or truth & TRUE != 0
     else:
-        verdicts.append(_without_permit(candidates.permits))
+        rules = candidates.permits  # none speaks of this skill, role and source at all, or no condition is met
+        verdicts.append(Verdict(Outcome.DENY, Reason.OUT_OF_SCOPE, rules[0].rule) if rules else _NOT_PERMITTED)
         if not permitted:
             return tuple(verdicts)
-    if doubt is not None:
-        verdicts.append(doubt)
-    if not unforbidden:
-        return tuple(verdicts)
-    return (*verdicts, PASS) if verdicts else PASSED
-
-
-def _without_permit(permits: tuple[PreparedRule, ...]) -> Verdict:
-    """No permit speaks of this skill, role and source at all; or one does, and its condition is not met."""
-    return Verdict(Outcome.DENY, Reason.OUT_OF_SCOPE, permits[0].rule) if permits else _NOT_PERMITTED
+    return concluded(verdicts, doubt, unforbidden) if verdicts or doubt is not None else PASSED
 
 
 def confirmation(case: Case) -> Found:
@@ -117,8 +108,4 @@ def confirmation(case: Case) -> Found:
         if awaited and doubt is None:
             doubt = Verdict(Outcome.DEFER, Reason.AWAITING_APPROVAL, rule.rule)
         passes = passes and not certain
-    if doubt is not None:
-        verdicts.append(doubt)
-    if not passes:
-        return tuple(verdicts)
-    return (*verdicts, PASS) if verdicts else PASSED
+    return concluded(verdicts, doubt, passes) if verdicts or doubt is not None else PASSED

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy, Seen
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, Seen
 from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOWN, Sets, Span, Truth, Value
-from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.policy import Airspace, Rule
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
@@ -35,21 +34,17 @@ class Case:
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     """A set of situations, as conditions read it; `phase` is that of the invocation, -1 where there is none."""
     seen = policy.seen
-    if seen is None or seen.sets is not sets:
-        return _environment(sets, policy, arguments, phase)
-    for at in seen.environments:
+    known = None if seen is None or seen.sets is not sets else seen.environments
+    for at in known or ():
         if at.arguments is arguments and at.phase == phase:
             return at
-    at = _environment(sets, policy, arguments, phase)
-    seen.environments.append(at)
-    return at
-
-
-def _environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
     values, _, utc, error, monitors = sets
     if len(monitors) != len(policy.monitors):
         monitors = ()
-    return Environment([*values, MISSING], arguments, utc, error, None, monitors, phase)
+    at = Environment([*values, MISSING], arguments, utc, error, None, monitors, phase)
+    if known is not None:
+        known.append(at)
+    return at
 
 
 def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
@@ -98,10 +93,6 @@ def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:
     return points and len(sets.utc_us) == 1 and all(low == high for low, high in spans)
 
 
-#: what can decide; None where it is a field of the contract itself, or of the request
-Decisive: TypeAlias = Clause | Rule | Airspace | None
-
-
 class Verdict(NamedTuple):
     """An outcome with its reason and the clause that decided."""
 
@@ -115,3 +106,12 @@ Found: TypeAlias = tuple[Verdict, ...]
 
 PASS = Verdict(Outcome.ALLOW, Reason.ADMITTED, None)
 PASSED: Found = (PASS,)
+
+
+def concluded(verdicts: list[Verdict], doubt: Verdict | None, passes: bool) -> Found:
+    """The verdicts of a step, `doubt` after those that are certain of what they judge; it may also pass."""
+    if doubt is not None:
+        verdicts.append(doubt)
+    if passes:
+        verdicts.append(PASS)
+    return PASSED if passes and len(verdicts) == 1 else tuple(verdicts)

@@ -7,16 +7,15 @@ loop serves the checker, which asks what is possible, and the runtime, which ask
 from collections.abc import Callable
 from typing import NamedTuple
 
-import msgspec
-
 from rtshcua.decision.authority import authority, confirmation, integrity
-from rtshcua.decision.case import PASS, PASSED, Case, Decisive, Found, Verdict, is_situation, situation
+from rtshcua.decision.case import PASS, PASSED, Case, Found, Verdict, is_situation, situation
 from rtshcua.decision.links import START, fallbacks
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import safety
 from rtshcua.decision.safety import state as state_step
 from rtshcua.decision.timing import freshness, phase, timing, valid_until
 from rtshcua.decision.values import Sets
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
@@ -34,24 +33,6 @@ STEPS: tuple[tuple[int, Callable[[Case], Found]], ...] = (
 )
 ADMITTED = (8, PASS)
 _ALLOW, _FALLBACK = Outcome.ALLOW, Outcome.FALLBACK  # an enumeration's attributes are slow to find
-
-
-class Decision(msgspec.Struct, frozen=True, gc=False):
-    """What is decided and why.
-
-    `step` is the number in design 4.1. `clause` decided, None where it was a field of the contract or the request.
-    `target` is what flies on FALLBACK, `link` its index in the chain (`links.DEGRADE` for a degrade rule's); None when
-    no link may fly, and for the other outcomes: a denied request must not steer the vehicle through its fallback.
-    `valid_until_us` (monotonic) bounds the permit of an ALLOW; for the others it is the moment of the decision.
-    """
-
-    outcome: Outcome
-    reason: Reason
-    step: int
-    clause: Decisive
-    link: int | None
-    target: Link | None
-    valid_until_us: int
 
 
 class Possible(NamedTuple):

@@ -9,13 +9,12 @@ from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
 from rtshcua.decision.case import environment, situation
-from rtshcua.decision.contracts import longest
-from rtshcua.decision.decide import Decision
 from rtshcua.decision.evaluate import Environment, Tables, build, total
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.tree import Node
 from rtshcua.decision.values import FALSE, TRUE, Value, point
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Contract
 from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE
@@ -71,9 +70,9 @@ class Changes:
             case tree.Either(left, right):
                 return self._any(left, right, goal) if goal else self._all(left, right, goal)
             case tree.AtMost(terms, bound):
-                return self._bound(terms, bound if goal else bound + 1, upper=goal)
+                return self._within(terms, None, bound) if goal else self._within(terms, bound + 1, None)
             case tree.Equal(terms, value) if goal:
-                return self._exactly(terms, value)
+                return self._within(terms, value, value)
             case tree.Member(argument, at, members):
                 chosen = self._tables.sets[members]
                 return (Change(argument, at, 0, 0, chosen),) if goal else None
@@ -106,33 +105,20 @@ class Changes:
         found = [changes for changes in (self.find(left, goal), self.find(right, goal)) if changes is not None]
         return min(found, key=len, default=None)
 
-    def _bound(self, terms: tuple[tree.Term, ...], bound: int, upper: bool) -> tuple[Change, ...] | None:
-        """The sum is at most, or at least, `bound`."""
-        split = self._split(terms)
-        if split is None:
-            return None
-        (argument, at, factor), low, high = split
-        left = bound - (high if upper else low)
-        if upper == (factor > 0):
-            return (Change(argument, at, -MAX_VALUE, left // factor, None),)
-        return (Change(argument, at, -(left // -factor), MAX_VALUE, None),)
-
-    def _exactly(self, terms: tuple[tree.Term, ...], value: int) -> tuple[Change, ...] | None:
-        split = self._split(terms)
-        if split is None:
-            return None
-        (argument, at, factor), low, high = split
-        wanted, rest = divmod(value - low, factor)
-        return None if rest or low != high else (Change(argument, at, wanted, wanted, None),)
-
-    def _split(self, terms: tuple[tree.Term, ...]) -> tuple[tree.Term, int, int] | None:
-        """The term to change (an argument rather than a signal), and the bounds of the sum of the others."""
+    def _within(self, terms: tuple[tree.Term, ...], least: int | None, most: int | None) -> tuple[Change, ...] | None:
+        """The sum is in `least`..`most` whatever the other terms are, when one is changed: an argument rather than a
+        signal."""
         movable = sorted((term for term in terms if term.factor), key=lambda term: term.argument == self._signals_only)
-        if not movable:
+        low, high, gap = total(tuple(term for term in terms if term not in movable[:1]), self._at)
+        if gap or not movable:
             return None
-        others = tuple(term for term in terms if term != movable[0])
-        low, high, gap = total(others, self._at)
-        return None if gap else (movable[0], low, high)
+        argument, at, factor = movable[0]
+        ends = None if least is None else least - low, None if most is None else most - high
+        if factor < 0:
+            factor, ends = -factor, (None if ends[1] is None else -ends[1], None if ends[0] is None else -ends[0])
+        first = -MAX_VALUE if ends[0] is None else -(-ends[0] // factor)
+        last = MAX_VALUE if ends[1] is None else ends[1] // factor
+        return None if None not in ends and first > last else (Change(argument, at, first, last, None),)
 
 
 def _merged(changes: Sequence[Change]) -> tuple[Change, ...] | None:
@@ -246,8 +232,7 @@ def nearest(
             return _charged(invocation, policy, at)
         case Reason.INVARIANT:
             known = policy.tables.known
-            through = longest(invocation.invocation.contract, policy.policy.vehicle)
-            at = ranging(at, invocation.planner.volume(at.slots, known), known.height, through)
+            at = ranging(at, invocation.planner.volume(at.slots, known), known.height, invocation.lasts_us)
     return _fewest(_conditions(decision, invocation, policy), invocation, policy, at)
 
 

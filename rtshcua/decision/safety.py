@@ -8,13 +8,15 @@ from now to the end of the contract's longest duration, everything else as it is
 says now.
 """
 
-from rtshcua.decision.case import PASS, PASSED, Case, Decisive, Found, Verdict
+from rtshcua.decision.case import PASSED, Case, Found, Verdict, concluded
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, TRUE, UNKNOWN, Truth
 from rtshcua.decision.volume import Volume
+from rtshcua.model.decision import Decisive
 from rtshcua.model.outcome import Outcome, Reason
 
 _STATE_UNKNOWN, _SAFETY_UNKNOWN = Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN
+_TOO_FAST = (Verdict(Outcome.FALLBACK, Reason.ENVELOPE, None),)
 
 
 class Tally:
@@ -47,11 +49,7 @@ class Tally:
         """The verdicts, given whether some condition surely fails."""
         if failed:
             return tuple(self._verdicts)
-        if self._doubt is not None:
-            self._verdicts.append(self._doubt)
-        if not self._passes:
-            return tuple(self._verdicts)
-        return (*self._verdicts, PASS) if self._verdicts else PASSED
+        return concluded(self._verdicts, self._doubt, self._passes) if self._verdicts or self._doubt else PASSED
 
 
 def state(case: Case) -> Found:
@@ -68,34 +66,29 @@ def state(case: Case) -> Found:
 def safety(case: Case) -> Found:
     """Falls back on the first condition that is false, else defers on the first that is unknown."""
     tally = Tally(_SAFETY_UNKNOWN, case.exact)
-    return tally.found(failed=_fails(case, tally))
-
-
-def _fails(case: Case, tally: Tally) -> bool:
-    """Whether some condition surely fails."""
     invocation, policy, at = case.invocation, case.policy, case.at
     known = policy.tables.known
     if invocation.invocation.plan.speed > policy.policy.vehicle.speed:
-        return tally.fails(FALSE, Reason.ENVELOPE, None)
+        return _TOO_FAST
     volume = invocation.planner.volume(at.slots, known)
     if policy.airspace is not None:
         truth = policy.airspace.keeps(volume.place, at, invocation.lasts_us)
         if truth != TRUE and tally.fails(truth, Reason.AIRSPACE, policy.airspace.airspace):
-            return True
+            return tally.found(failed=True)
     if invocation.maintain:
         over = ranging(at, volume, known.height, invocation.lasts_us)
         for clause, condition in invocation.maintain:
             truth = condition(over)
             if truth != TRUE and tally.fails(truth, Reason.INVARIANT, clause):
-                return True
+                return tally.found(failed=True)
     truth = invocation.energy.suffices(at.slots[known.battery], volume)
     if truth != TRUE and tally.fails(truth, Reason.ENERGY, None):
-        return True
+        return tally.found(failed=True)
     for rule in invocation.candidates.degrades:
         truth = NOT[rule.condition(at)]
         if truth != TRUE and tally.fails(truth, Reason.DEGRADED, rule.rule):
-            return True
-    return False
+            return tally.found(failed=True)
+    return tally.found(failed=False)
 
 
 def ranging(at: Environment, volume: Volume, height: int, through: int) -> Environment:

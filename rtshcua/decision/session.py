@@ -9,14 +9,12 @@ were not released.
 
 from typing import Final, NamedTuple
 
-import msgspec
-
-from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.decide import decide
+from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
-from rtshcua.decision.prepare import prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.model.flat.contract import Link
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
@@ -179,16 +177,6 @@ _ADMITTED, _BINDING_MISMATCH, _STATE_VIOLATED = Reason.ADMITTED, Reason.BINDING_
 _UNKNOWN_STEP, _NOT_CURRENT = Status.UNKNOWN_STEP, Status.NOT_CURRENT
 
 
-class LinkDecision(msgspec.Struct, frozen=True, gc=False):
-    """What is decided about a link, field by field as in `Decision`; `link` is the link itself where it may fly."""
-
-    outcome: Outcome
-    reason: Reason
-    step: int
-    link: Link | None
-    valid_until_us: int
-
-
 class Session:
     """Decides on the steps and links of what is in force, in the order in which they are asked for.
 
@@ -240,30 +228,26 @@ class Session:
             self._consumed.add(step)
         return decision
 
-    def decide_link(self, ref: Ref, binding: bytes, state: State, now: Now) -> LinkDecision:
+    def decide_link(self, ref: Ref, binding: bytes, state: State, now: Now) -> Decision:
         """Decide on a link that may be asked for (`refusal`), under the binding presented: its step's, or for the
         contingency the policy's digest. Steps 2 to 5 are skipped, and nothing is remembered.
         """
         kind, step, number = ref
         if kind == CONTINGENCY_LINK:
-            bound = self._in_force.bundle.policy_digest
+            bound, chain, phase = self._in_force.bundle.policy_digest, self._policy.contingency, NO_PHASE
         else:
             invocation = self._in_force.invocations[step]
-            bound = invocation.invocation.binding
+            bound, chain, phase = invocation.invocation.binding, invocation.chain, invocation.phase
         if binding != bound:
-            return LinkDecision(_DENY, _BINDING_MISMATCH, _INTEGRITY, None, now.monotonic_us)
-        if kind == CONTINGENCY_LINK:
-            prepared = self._policy.contingency[number]
-            link = prepared.link if link_admissible(prepared, state, self._policy, now) else None
-        elif number == DEGRADE:
+            return Decision(_DENY, _BINDING_MISMATCH, _INTEGRITY, None, None, None, now.monotonic_us)
+        if number == DEGRADE:
             choice = choose_fallback(invocation, state, self._policy, now)
             link = None if choice is None or choice.index != DEGRADE else choice.link
         else:
-            prepared = invocation.chain[number]
-            link = prepared.link if link_admissible(prepared, state, self._policy, now, invocation.phase) else None
+            link = chain[number].link if link_admissible(chain[number], state, self._policy, now, phase) else None
         if link is None:
-            return LinkDecision(_FALLBACK, _STATE_VIOLATED, _STATE, None, now.monotonic_us)
-        return LinkDecision(_ALLOW, _ADMITTED, _PASSED, link, now.monotonic_us + LINK_VALID_US)
+            return Decision(_FALLBACK, _STATE_VIOLATED, _STATE, None, None, None, now.monotonic_us)
+        return Decision(_ALLOW, _ADMITTED, _PASSED, None, None, link, now.monotonic_us + LINK_VALID_US)
 
     def take(self, document: bytes, now: Now, released: int = 0) -> Receipt:
         """Take in a signed document, if it is to be trusted; see `InForce.take`.

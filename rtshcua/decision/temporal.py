@@ -23,18 +23,18 @@ Kleene's three truth values; the windows are closed on both sides. To know wheth
 it is enough to know the last us that belongs to it, one number for each truth that can decide.
 """
 
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.prepared import PreparedMonitor, PreparedPolicy
+from rtshcua.decision.prepare import PreparedMonitor, PreparedPolicy
 from rtshcua.decision.values import AND, FALSE, NOT, TRUE, UNKNOWN, Truth
 from rtshcua.model.flat.limits import MAX_GAP
 from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.flat.situation import Now, State
 
 _NEVER: Final = -(1 << 62)  # us: before any window
+_FOR_LAST, _WITHIN_LAST, _RISING = (int(kind) for kind in tuple(MonitorKind)[:3])  # an enumeration's are slow to find
 
 
 class Remembered(NamedTuple):
@@ -72,7 +72,7 @@ def observe(memory: Memory, policy: PreparedPolicy, state: State, now: Now) -> t
     conditions: list[Remembered] = []
     for monitor, before in zip(policy.monitors, memory.conditions, strict=True):
         after = _observed(before, monitor.condition(at), memory.at_us, at_us)
-        truths.append(_SAYS[monitor.kind](monitor, before, after, at_us))
+        truths.append(_says(monitor, before, after, at_us))
         conditions.append(after)
     return Memory(at_us, tuple(conditions)), tuple(truths)
 
@@ -96,35 +96,13 @@ def _observed(before: Remembered, truth: Truth, last_us: int | None, at_us: int)
     return Remembered(UNKNOWN, true_us, false_us, at_us)
 
 
-def _for_last(monitor: PreparedMonitor, _: Remembered, after: Remembered, at_us: int) -> Truth:
-    """H[0, w] c: FALSE if some moment of t - w .. t was FALSE, else UNKNOWN if one was, else TRUE."""
-    start_us = at_us - monitor.window_us
-    if after.false_us >= start_us:
-        return FALSE
-    return UNKNOWN if after.unknown_us >= start_us else TRUE
-
-
-def _within_last(monitor: PreparedMonitor, _: Remembered, after: Remembered, at_us: int) -> Truth:
-    """O[0, w] c: TRUE if some moment of t - w .. t was TRUE, else UNKNOWN if one was, else FALSE."""
-    start_us = at_us - monitor.window_us
-    if after.true_us >= start_us:
-        return TRUE
-    return UNKNOWN if after.unknown_us >= start_us else FALSE
-
-
-def _rising(_: PreparedMonitor, before: Remembered, after: Remembered, __: int) -> Truth:
-    """Not c at the observation before, and c now: FALSE where either rules it out, UNKNOWN where one is missing."""
-    return AND[NOT[before.last]][after.last]
-
-
-def _falling(_: PreparedMonitor, before: Remembered, after: Remembered, __: int) -> Truth:
-    """c at the observation before, and not c now."""
+def _says(monitor: PreparedMonitor, before: Remembered, after: Remembered, at_us: int) -> Truth:
+    """What a monitor says at an observation, given what was remembered before it and is now."""
+    kind, start_us = monitor.kind, at_us - monitor.window_us
+    if kind == _FOR_LAST:  # H[0, w] c: FALSE if some moment of t - w .. t was FALSE, else UNKNOWN if one was, else TRUE
+        return FALSE if after.false_us >= start_us else UNKNOWN if after.unknown_us >= start_us else TRUE
+    if kind == _WITHIN_LAST:  # O[0, w] c: TRUE if some moment was TRUE, else UNKNOWN if one was, else FALSE
+        return TRUE if after.true_us >= start_us else UNKNOWN if after.unknown_us >= start_us else FALSE
+    if kind == _RISING:  # not c at the observation before, and c now: FALSE where either rules it out
+        return AND[NOT[before.last]][after.last]
     return AND[before.last][NOT[after.last]]
-
-
-_SAYS: dict[int, Callable[[PreparedMonitor, Remembered, Remembered, int], Truth]] = {
-    MonitorKind.FOR_LAST: _for_last,
-    MonitorKind.WITHIN_LAST: _within_last,
-    MonitorKind.RISING: _rising,
-    MonitorKind.FALLING: _falling,
-}

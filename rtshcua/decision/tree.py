@@ -33,7 +33,7 @@ class Scope(NamedTuple):
     monitors: int
     phases: int | None
 
-    def index(self, what: str, index: int, count: int) -> str | None:
+    def entry(self, what: str, index: int, count: int) -> str | None:
         """One of so many zones, tables and the like."""
         return None if 0 <= index < count else f"there is no {what} {index}"
 
@@ -224,21 +224,16 @@ def parse(code: tuple[int, ...], scope: Scope) -> Node | str:
 
 def _step(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) -> str | None:
     """Do one instruction on the stack; what is wrong with it, or None."""
-    if op in _PUSH_NUMBER:
-        return _push_number(stack, op, a, b, scope)
-    if op in _ARITHMETIC:
-        return _arithmetic(stack, op, a, b)
-    if op in _COMPARE:
-        return _compare(stack, op, a, b)
-    if op in _CONNECT:
-        return _connect(stack, op, a, b)
+    match op:
+        case Op.CONST | Op.SIGNAL | Op.ARGUMENT:
+            return _push_number(stack, op, a, b, scope)
+        case Op.ADD | Op.SUB | Op.SCALE:
+            return _arithmetic(stack, op, a, b)
+        case Op.LT | Op.LE | Op.GT | Op.GE | Op.EQ | Op.NE:
+            return _compare(stack, op, a, b)
+        case Op.AND | Op.OR | Op.NOT:
+            return _connect(stack, op, a, b)
     return _push_atom(stack, op, a, b, scope)
-
-
-_PUSH_NUMBER = frozenset({Op.CONST, Op.SIGNAL, Op.ARGUMENT})
-_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.SCALE})
-_COMPARE = frozenset({Op.LT, Op.LE, Op.GT, Op.GE, Op.EQ, Op.NE})
-_CONNECT = frozenset({Op.AND, Op.OR, Op.NOT})
 
 
 def _push_number(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) -> str | None:
@@ -316,19 +311,19 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
     node: Node
     match op:
         case Op.SIGNAL_IN:
-            problem, node = scope.enumeration(a) or scope.index("set", b, len(scope.members)), Member(False, a, b)
+            problem, node = scope.enumeration(a) or scope.entry("set", b, len(scope.members)), Member(False, a, b)
         case Op.ARGUMENT_IN:
             problem = scope.argument(a, (CHOICE, ZONE), "choice and no zone")
-            problem, node = problem or scope.index("set", b, len(scope.members)), Member(True, a, b)
+            problem, node = problem or scope.entry("set", b, len(scope.members)), Member(True, a, b)
         case Op.KNOWN:
-            problem, node = scope.index("slot", a, len(scope.kinds)) or _unused(b), Known(a)
+            problem, node = scope.entry("slot", a, len(scope.kinds)) or _unused(b), Known(a)
         case Op.POSITION_IN:
-            problem, node = scope.index("zone", a, scope.zones) or _unused(b), Inside(a)
+            problem, node = scope.entry("zone", a, scope.zones) or _unused(b), Inside(a)
         case Op.POSITION_IN_ARGUMENT:
-            problem = scope.argument(a, (ZONE,), "zone") or scope.index("table", b, scope.tables)
+            problem = scope.argument(a, (ZONE,), "zone") or scope.entry("table", b, scope.tables)
             node = InsideArgument(a, b)
         case Op.ARGUMENT_POINT_IN:
-            problem = scope.argument(a, (PLACE,), "place") or scope.index("zone", b, scope.zones)
+            problem = scope.argument(a, (PLACE,), "place") or scope.entry("zone", b, scope.zones)
             node = PointInside(a, b)
         case Op.TIME_IN:
             within = 0 <= a < DAY and 0 <= b <= DAY

@@ -86,7 +86,7 @@ class Planner:
         farthest = max(distance(max(abs(west), abs(east)), max(abs(south), abs(north))), self._distance)
         nearest = farthest
         if west != east or south != north:
-            nearest = max(distance(_clamp(0, west, east), _clamp(0, south, north)), self._distance)
+            nearest = max(distance(min(max(0, west), east), min(max(0, south), north)), self._distance)
         span = (nearest, farthest)
         self._leg = (key, leg, span)
         return leg, span
@@ -97,10 +97,6 @@ def flown_at(motion: Motion, altitude: int, vehicle: Vehicle) -> int | None:
     if motion.kind == MotionKind.HOME:
         return vehicle.return_altitude
     return None if motion.altitude == -1 else altitude
-
-
-def _clamp(value: int, low: int, high: int) -> int:
-    return min(max(value, low), high)
 
 
 def distance(x: int, y: int) -> int:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.contracts import SECOND
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume, distance
@@ -136,13 +136,6 @@ def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
         truth = NOT[rule.condition(at)]
         if truth != TRUE:
             yield Unkept(rule.rule.text, truth)
-    yield from _unkept_ahead(invocation, state, policy, at)
-
-
-def _unkept_ahead(
-    invocation: PreparedInvocation, state: State, policy: PreparedPolicy, at: Environment
-) -> Iterator[Unkept]:
-    """What does not hold wherever the vehicle may be before it could stand still."""
     volume, lasts_us = ahead(at.slots, state.ages, policy)
     if invocation.maintain:
         over = ranging(at, volume, policy.tables.known.height, lasts_us)

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import quote
 
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.durability import SYNC_US, SYNCED, WRITTEN
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, EpochKey
 from rtshcua.evidence.heads import Head
@@ -23,7 +22,9 @@ from rtshcua.evidence.records import (
     RecordedState,
     Recover,
     Seal,
+    in_words,
 )
+from rtshcua.model.decision import Decision as Decided
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.wire.keys import Duty, key_id
 from rtshcua.wire.request import NOTHING, Ref
@@ -134,19 +135,20 @@ class Recorder:
         invocation: bytes,
         state: State,
         context: Context,
-        answer: RecordedAnswer,
+        decided: Decided,
         durability: int = SYNCED,
     ) -> bytes:
         """The line of one decision, its inputs included. `invocation` is its id, empty for the contingency."""
         head = self._head
         kind, step, link = ref
+        outcome, reason, rule_step, clause, clause_at, target, target_link, valid_until_us = in_words(decided)
         return head.add(
             Decision(  # by position, in the order of definition: a third faster than by name
                 head.prev,
                 now.monotonic_us,
                 context.binding.hex(),
-                answer.clause,
-                answer.clause_at,
+                clause,
+                clause_at,
                 RecordedContext(
                     _approvals(context) if context.approvals else (),
                     context.consumed,
@@ -161,18 +163,18 @@ class Recorder:
                 kind,
                 link,
                 self._mode,
-                answer.outcome,
-                answer.reason,
-                answer.rule_step,
+                outcome,
+                reason,
+                rule_step,
                 head.seq,
                 RecordedState(ages=state.ages, monitors=state.monitors, values=state.values),
                 step,
-                answer.target,
-                answer.target_link,
+                target,
+                target_link,
                 "decision",
                 now.utc_error_us,
                 now.utc_us,
-                answer.valid_until_us,
+                valid_until_us,
             )
         )
 

@@ -11,10 +11,12 @@ Every record has `_prev` (SHA-256 of 0x00 and the line before, newline included:
 specified in docs/log-format.md.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 
+from rtshcua.model.decision import Decision as Decided
+from rtshcua.model.outcome import Outcome
 from rtshcua.wire import names
 from rtshcua.wire.request import Ref
 
@@ -90,6 +92,30 @@ class RecordedContext(msgspec.Struct, frozen=True, forbid_unknown_fields=True, g
     released_us: Integer
     remaining_us: Integer
     vehicle: str
+
+
+#: the fields of a decision record that say what was decided
+DECIDED: Final = (
+    "outcome", "reason", "rule_step", "clause", "clause_at", "target", "target_link", "valid_until_us"
+)  # fmt: skip
+_OUTCOMES: Final = tuple(outcome.name.lower() for outcome in Outcome)  # by number
+
+
+def in_words(
+    decided: Decided,
+) -> tuple[str, str, int, str | None, tuple[int, int, int] | None, str | None, int, int]:
+    """What was decided, in the words of a record (`DECIDED`). Of a link that may fly it names no target."""
+    clause, target = decided.clause, decided.target if decided.outcome == Outcome.FALLBACK else None
+    return (
+        _OUTCOMES[decided.outcome],
+        decided.reason._value_,  # `value` is a property in Python, and slow
+        decided.step,
+        None if clause is None else clause.text,
+        None if clause is None else (clause.source, clause.start, clause.end),
+        None if target is None else target.text,
+        -1 if decided.link is None else decided.link,
+        decided.valid_until_us,
+    )
 
 
 class Decision(Record, frozen=True):

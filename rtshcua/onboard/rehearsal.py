@@ -12,9 +12,10 @@ want of them, or break off at.
 from collections.abc import Container
 from typing import Final, NamedTuple
 
-from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.decide import decide
 from rtshcua.decision.nearest import Nearest, nearest
 from rtshcua.decision.tree import slots_read
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle

@@ -18,7 +18,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.evidence.chain import Recorder
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy

@@ -10,8 +10,8 @@ from typing import Any
 
 from model.small import GRACE, LIMITS, UNIT
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
@@ -55,8 +55,8 @@ class Ear(Recorder):
         return b""
 
     def decision(self, now: object, ref: Ref, *inputs: Any) -> bytes:  # type: ignore[override]
-        answer = next(each for each in inputs if isinstance(each, RecordedAnswer))
-        self.heard.append(("decision", ref, {"outcome": answer.outcome}))
+        answer = next(each for each in inputs if isinstance(each, Decision))
+        self.heard.append(("decision", ref, {"outcome": answer.outcome.name.lower()}))
         return b""
 
 

@@ -6,9 +6,9 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from rtshcua.decision.case import situation
-from rtshcua.decision.decide import Decision, decide, possible
-from rtshcua.decision.prepare import prepare, prepare_invocation
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.decide import decide, possible
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy, Rule

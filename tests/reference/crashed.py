@@ -5,10 +5,10 @@ from pathlib import Path
 from random import Random
 
 from rtshcua.adapters.files.recovery import Signer
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
@@ -60,7 +60,7 @@ def writes(chance: Random, *, seals: int = 40) -> Iterator[tuple[bytes, int]]:
 
 def _decision(recorder: Recorder, now: Now, durability: int) -> bytes:
     context = Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),))
-    answer = RecordedAnswer.of(Outcome.ALLOW, Reason.ADMITTED, 8, 6_000_000)
+    answer = Decision(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, None, 6_000_000)
     return recorder.decision(now, Ref(0, 0, -1), bytes(60), _STATE, context, answer, durability)
 
 

@@ -13,8 +13,9 @@ from random import Random
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty
@@ -92,9 +93,8 @@ def lines(
         turn += 1
         step = turn % steps
         _, outcome, reason, rule_step, clause = answers[turn % 997]
-        answer = RecordedAnswer.of(outcome, reason, rule_step, at_us + 500_000)
-        if clause is not None:
-            answer = replace(answer, clause=clause, clause_at=(0, 120, 160))
+        decisive = None if clause is None else Clause(clause, 0, 120, 160, ())
+        answer = Decision(outcome, reason, rule_step, decisive, None, None, at_us + 500_000)
         ref = Ref(0, step, -1)
         yield recorder.decision(now, ref, invocation, STATE, context, answer)
         if outcome is Outcome.ALLOW and turn & 1:

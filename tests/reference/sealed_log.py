@@ -5,11 +5,13 @@ from hashlib import sha256
 from typing import NamedTuple
 
 from reference.seeds import epoch_seeds
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.proofs.disclosure import disclosure_root
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.request import Ref
 from virtual import case
@@ -91,5 +93,5 @@ def _ordinary(recorder: Recorder, number: int) -> bytes:
     if number % 2:
         return recorder.effect(now(number), "dispatched", Ref(0, 0, -1), token=number, detail=f'goto {number} "ß"')
     context = Context(bytes(32), VEHICLE, 7, 0, 5_000_000, 1, 12_000, ())
-    answer = RecordedAnswer("deny", "admitted", 8, "battery > 35 %", (0, 1, 9), None, -1, 6_000_000)
+    answer = Decision(Outcome.DENY, Reason.ADMITTED, 8, Clause("battery > 35 %", 0, 1, 9, ()), None, None, 6_000_000)
     return recorder.decision(now(number), Ref(0, number & 7, -1), bytes(16), _STATE, context, answer, 2)

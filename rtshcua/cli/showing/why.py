@@ -6,12 +6,12 @@ from typing import NamedTuple
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
-from rtshcua.decision.case import Decisive
 from rtshcua.decision.nearest import DAYTIME, Nearest
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.why.reads import Read, reads
 from rtshcua.ground.why.trace import Check, Trace, Traced
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION

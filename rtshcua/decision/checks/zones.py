@@ -12,23 +12,9 @@ from collections.abc import Generator, Iterator, Sequence
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.outline import Corner, Leg
 from rtshcua.decision.outline import rings as outline
+from rtshcua.model.flat import zone as flat
 from rtshcua.model.flat.limits import DAY, MAX_TABLES, MAX_TOTAL_VERTICES, MAX_VALUE, MAX_ZONES
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.zone import (
-    AREA,
-    CIRCLE,
-    HALF_TURN,
-    HIGHEST,
-    LOWEST,
-    MAX_COORDINATE,
-    MAX_RINGS,
-    MAX_VERTICES,
-    POLYGON,
-    SHIFT,
-    Projection,
-    Zone,
-    unproject,
-)
 
 MEET = "edges cross or touch"
 FEW_CORNERS = 3
@@ -151,7 +137,7 @@ def _meet(a: Leg, b: Leg) -> bool:
 
 
 #: 1e-7 degree is about 11 mm at the equator
-MAX_FACTOR = 32 << SHIFT
+MAX_FACTOR = 32 << flat.SHIFT
 
 
 def zones(policy: Policy) -> Iterator[str]:
@@ -170,60 +156,60 @@ def zones(policy: Policy) -> Iterator[str]:
             yield from at(f"table {number}", index("zone", entry, len(policy.zones)))
 
 
-def _projection(projection: Projection) -> Iterator[str]:
+def _projection(projection: flat.Projection) -> Iterator[str]:
     yield from _on_earth(projection.latitude, projection.longitude)
     yield from within("east", projection.east, 1, MAX_FACTOR)
     yield from within("north", projection.north, 1, MAX_FACTOR)
 
 
-def place(projection: Projection, x: int, y: int) -> Iterator[str]:
+def place(projection: flat.Projection, x: int, y: int) -> Iterator[str]:
     """What is wrong with a local place that may be flown to: it must have a latitude and a longitude."""
     yield from at(f"place {x}, {y}", _near(projection, x))
-    yield from at(f"place {x}, {y}", _on_earth(*unproject(projection, x, y)))
+    yield from at(f"place {x}, {y}", _on_earth(*flat.unproject(projection, x, y)))
 
 
-def _near(projection: Projection, x: int) -> Iterator[str]:
-    if abs(x) << SHIFT >= HALF_TURN * projection.east:
+def _near(projection: flat.Projection, x: int) -> Iterator[str]:
+    if abs(x) << flat.SHIFT >= flat.HALF_TURN * projection.east:
         yield "it is half around the earth"
 
 
 def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
     yield from within("latitude", latitude, -900_000_000, 900_000_000)  # 1e-7 degree
-    yield from within("longitude", longitude, -HALF_TURN, HALF_TURN)
+    yield from within("longitude", longitude, -flat.HALF_TURN, flat.HALF_TURN)
 
 
-def _vertices(zone: Zone) -> int:
+def _vertices(zone: flat.Zone) -> int:
     """How many vertices there are at least, before anything else is known of a zone."""
-    counts = 1 + min(max(zone.data[0], 0), MAX_RINGS) if zone.shape == AREA and zone.data else 0
+    counts = 1 + min(max(zone.data[0], 0), flat.MAX_RINGS) if zone.shape == flat.AREA and zone.data else 0
     return max(len(zone.data) - counts, 0) // 2
 
 
-def _zone(zone: Zone) -> Iterator[str]:
-    yield from within("floor", zone.floor, LOWEST, HIGHEST)
-    yield from within("ceiling", zone.ceiling, zone.floor, HIGHEST)
-    if zone.shape == CIRCLE:
+def _zone(zone: flat.Zone) -> Iterator[str]:
+    yield from within("floor", zone.floor, flat.LOWEST, flat.HIGHEST)
+    yield from within("ceiling", zone.ceiling, zone.floor, flat.HIGHEST)
+    if zone.shape == flat.CIRCLE:
         if len(zone.data) != 3:
             yield "a circle has a centre and a squared radius"
-        yield from within("squared radius", zone.data[2], 1, MAX_COORDINATE * MAX_COORDINATE)
+        yield from within("squared radius", zone.data[2], 1, flat.MAX_COORDINATE * flat.MAX_COORDINATE)
         coordinates = zone.data[:2]
-    elif zone.shape in (POLYGON, AREA):
+    elif zone.shape in (flat.POLYGON, flat.AREA):
         start = yield from _counts(zone)
         coordinates = zone.data[start:]
     else:
         yield f"there is no shape {zone.shape}"
     for coordinate in coordinates:
-        yield from within("coordinate", coordinate, -MAX_COORDINATE, MAX_COORDINATE)
-    if zone.shape != CIRCLE:
+        yield from within("coordinate", coordinate, -flat.MAX_COORDINATE, flat.MAX_COORDINATE)
+    if zone.shape != flat.CIRCLE:
         yield from rings(tuple(outline(zone)))
     yield from _times(zone)
 
 
-def _counts(zone: Zone) -> Generator[str, None, int]:
+def _counts(zone: flat.Zone) -> Generator[str, None, int]:
     """What is wrong with the numbers of rings and corners; where the coordinates begin."""
     data, start = zone.data, 0
-    if zone.shape == AREA:
+    if zone.shape == flat.AREA:
         count = data[0] if data else 0
-        yield from within("number of rings", count, 1, MAX_RINGS)
+        yield from within("number of rings", count, 1, flat.MAX_RINGS)
         start = 1 + count
         for corners in data[1:start]:
             yield from within("number of corners", corners, 3, MAX_TOTAL_VERTICES)
@@ -232,11 +218,11 @@ def _counts(zone: Zone) -> Generator[str, None, int]:
     else:
         if len(data) % 2:
             yield "a coordinate is missing"
-        yield from within("number of vertices", len(data) // 2, 3, MAX_VERTICES)
+        yield from within("number of vertices", len(data) // 2, 3, flat.MAX_VERTICES)
     return start
 
 
-def _times(zone: Zone) -> Iterator[str]:
+def _times(zone: flat.Zone) -> Iterator[str]:
     if len(zone.daily) not in (0, 2) or len(zone.dates) not in (0, 2):
         yield "a time has a start and an end"
     if zone.daily and not (0 <= zone.daily[0] < DAY and 0 <= zone.daily[1] <= DAY):

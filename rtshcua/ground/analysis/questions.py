@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Hashable, Sequence
 
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.ground.analysis.plane import Plane
 from rtshcua.ground.analysis.solve import Answer, Goal, satisfiable
 from rtshcua.ground.analysis.space import Space, space_of

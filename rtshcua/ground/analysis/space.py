@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Tables
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.values import MISSING, Span, Value, interval, maybe, members
 from rtshcua.ground.analysis.plane import Plane
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract

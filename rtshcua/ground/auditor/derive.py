@@ -3,28 +3,28 @@
 from rtshcua.decision.case import SINGLE
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.session import Session
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DECIDED, Decision, in_words
 from rtshcua.ground.auditor.observed import Observed
 from rtshcua.ground.auditor.trust import Basis
+from rtshcua.model.decision import Decision as Decided
 from rtshcua.model.durability import WORDS, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP, Ref
 from rtshcua.wire.response import Status
 
-#: what a record answers, in words
-_WHAT = {
-    "outcome": "outcome",
-    "reason": "reason",
-    "rule_step": "deciding step",
-    "clause": "deciding clause",
-    "clause_at": "place of the deciding clause",
-    "target": "fallback target",
-    "target_link": "number of the fallback target",
-    "valid_until_us": "end of validity",
-}
+#: what the fields `DECIDED` of a record are called
+_WHAT = (
+    "outcome",
+    "reason",
+    "deciding step",
+    "deciding clause",
+    "place of the deciding clause",
+    "fallback target",
+    "number of the fallback target",
+    "end of validity",
+)
 
 
 class Deriver:
@@ -37,11 +37,11 @@ class Deriver:
 
     def check(self, record: Decision) -> Flaw | None:
         """What is wrong with a decision, or None when it derives again."""
-        answer = self._derived(record)
-        if isinstance(answer, Flaw):
-            return answer
-        for field, what in _WHAT.items():
-            found, expected = getattr(record, field), getattr(answer, field)
+        decided = self._derived(record)
+        if isinstance(decided, Flaw):
+            return decided
+        for field, what, expected in zip(DECIDED, _WHAT, in_words(decided), strict=True):
+            found = getattr(record, field)
             if found != expected:
                 text = f"derived again from the inputs that it records, this decision has another {what}"
                 return Flaw(f"decision/{field.replace('_', '-')}", text, str(found), str(expected))
@@ -60,14 +60,17 @@ class Deriver:
         text = "its record was not as durable as the contract and the risk ask, or more"
         return Flaw("decision/durability", text, _class(record.durability), _class(asked))
 
-    def _derived(self, record: Decision) -> RecordedAnswer | Flaw:
+    def _derived(self, record: Decision) -> Decided | Flaw:
         state = State(record.state.values, record.state.ages, record.state.monitors)
         now = Now(record.at_us, record.utc_us, record.utc_error_us)
         ref = record.ref
         flaw = self._inputs(record, state, now) or self._turn(record, ref)
         if flaw is not None:
             return flaw
-        return self._step(record, state, now) if record.kind == STEP else self._link(record, ref, state, now)
+        if record.kind == STEP:
+            return self._step(record, state, now)
+        binding = _octets(record.binding) or b""  # what is no binding at all is not the right one
+        return self._session.decide_link(ref, binding, state, now)
 
     def _inputs(self, record: Decision, state: State, now: Now) -> Flaw | None:
         """What is wrong with the situation that a decision was made in."""
@@ -108,7 +111,7 @@ class Deriver:
         current = f"step {self._session.current} or the next"
         return Flaw("decision/not-current", text, f"step {ref.step}", current)
 
-    def _step(self, record: Decision, state: State, now: Now) -> RecordedAnswer | Flaw:
+    def _step(self, record: Decision, state: State, now: Now) -> Decided | Flaw:
         given = record.context
         approvals = self._basis.in_force.approvals(self._basis.invocations[record.step].invocation, now)
         if given.approvals != tuple((each.rule, each.role, each.granted, each.monotonic_us) for each in approvals):
@@ -127,21 +130,7 @@ class Deriver:
             given.remaining_us,
             approvals,
         )
-        decision = self._session.decide_step(record.step, state, context, now)
-        return RecordedAnswer.of(
-            decision.outcome,
-            decision.reason,
-            decision.step,
-            decision.valid_until_us,
-            clause=decision.clause,
-            target=decision.target,
-            target_link=-1 if decision.link is None else max(decision.link, -1),
-        )
-
-    def _link(self, record: Decision, ref: Ref, state: State, now: Now) -> RecordedAnswer:
-        binding = _octets(record.binding) or b""  # what is no binding at all is not the right one
-        decision = self._session.decide_link(ref, binding, state, now)
-        return RecordedAnswer.of(decision.outcome, decision.reason, decision.step, decision.valid_until_us)
+        return self._session.decide_step(record.step, state, context, now)
 
 
 def _class(durability: int) -> str:

@@ -9,7 +9,7 @@ from typing import Final
 
 from rtshcua.decision.case import SINGLE, environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.evidence.finding import Flaw
 from rtshcua.model.flat.policy import MonitorKind

@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from rtshcua.decision.case import Decisive
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.compiler.files import shortened
 from rtshcua.ground.testing.case import Tested
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.tests import Expectation
 

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
-from rtshcua.decision.decide import Decision
 from rtshcua.diagnostics.render import render_one
 from rtshcua.diagnostics.report.junit import Outcome, Suite
 from rtshcua.diagnostics.span import Source, Span
@@ -12,6 +11,7 @@ from rtshcua.ground.testing.coverage.coverage import per_mille
 from rtshcua.ground.testing.coverage.tally import Covered
 from rtshcua.ground.testing.coverage.universe import Item
 from rtshcua.ground.testing.run import Ran
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.policy import Policy
 
 

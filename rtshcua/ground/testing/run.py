@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from rtshcua.decision.decide import Decision
 from rtshcua.decision.nearest import Nearest
 from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
@@ -11,6 +10,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.ground.testing.case import Case
 from rtshcua.ground.why.reads import reads
 from rtshcua.ground.why.trace import Trace, trace
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.policy import Rule
 from rtshcua.model.ir.tests import Expectation
 from rtshcua.model.outcome import Outcome, Reason

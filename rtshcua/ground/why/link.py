@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
-from rtshcua.decision.prepared import PreparedInvocation, PreparedLink, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedPolicy
 from rtshcua.decision.values import EVERYWHERE
 from rtshcua.evidence.records import Decision
 from rtshcua.ground.why.recorded import now_of, state_of

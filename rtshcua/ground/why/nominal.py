@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.nearest import Changes, nearest_in
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from rtshcua.decision.case import Decisive
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Airspace, Policy, Rule

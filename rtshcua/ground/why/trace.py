@@ -6,15 +6,16 @@ It calls the very steps that `decide` calls, and the conditions that they call; 
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from rtshcua.decision.case import PASS, Case, Decisive, situation
+from rtshcua.decision.case import PASS, Case, situation
 from rtshcua.decision.contracts import longest
-from rtshcua.decision.decide import STEPS, Decision, decide
+from rtshcua.decision.decide import STEPS, decide
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.links import link_admissible
 from rtshcua.decision.nearest import Nearest, nearest
-from rtshcua.decision.prepared import Guards, PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import Guards, PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.values import EVERYWHERE, Truth
+from rtshcua.model.decision import Decision, Decisive
 from rtshcua.model.flat.situation import Context, Now, State
 
 _AUTHORITY, _CONFIRMATION, _STATE, _SAFETY = 2, 3, 6, 7  # indexes into `STEPS`

@@ -6,11 +6,11 @@ the permits. Bytes go in and bytes come out, so that an isolated process or a tr
 
 from typing import Final
 
-from rtshcua.decision.decide import Decision
 from rtshcua.decision.links import DEGRADE
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.session import InForce, Session
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
@@ -166,10 +166,10 @@ class SoftwareBoundary:
     def _link(self, asked: Request, ref: Ref) -> Answer:
         decision = self._session.decide_link(ref, asked.binding, asked.state, asked.now)
         until_us, permit = decision.valid_until_us, b""
-        if decision.link is not None:
+        if decision.target is not None:
             if ref.link == DEGRADE:
                 prepared = self._in_force.invocations[ref.step]
-                ref = Ref(ref.kind, ref.step, self._degrade(prepared, decision.link))
+                ref = Ref(ref.kind, ref.step, self._degrade(prepared, decision.target))
             permit = self._issuer.link(ref, until_us)
         return Answer(decision.outcome, decision.reason, decision.step, NO_CLAUSE, NO_TARGET, until_us, 0, permit)
 

@@ -10,8 +10,7 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now

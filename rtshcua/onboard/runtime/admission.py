@@ -5,12 +5,10 @@ from collections.abc import Iterable
 from functools import partial
 
 from rtshcua.decision.durability import confirmed, durability_of
-from rtshcua.evidence.answer import RecordedAnswer
+from rtshcua.model.decision import Decision, Decisive
 from rtshcua.model.durability import WRITTEN
-from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.mission import Invocation, Mission
-from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
@@ -143,17 +141,11 @@ class Admission:
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, "" if clause is None else clause.text))
         why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
         yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
-        recorded = RecordedAnswer.of(
-            answer.outcome,
-            answer.reason,
-            answer.rule_step,
-            answer.valid_until_us,
-            clause=clause,
-            target=self._target(contract, answer.target),
-            target_link=max(answer.target, -1),
-        )
+        target = self._target(contract, answer.target)
+        link, until_us = None if target is None else max(answer.target, DEGRADE), answer.valid_until_us
+        decided = Decision(answer.outcome, answer.reason, answer.rule_step, clause, link, target, until_us)
         identity = b"" if of is None else of.invocation_id
-        line = partial(self._journal.recorder.decision, now, ref, identity, state, context, recorded, durability)
+        line = partial(self._journal.recorder.decision, now, ref, identity, state, context, decided, durability)
         yield from self._journal.record(line, now, durability, awaited=True)
 
     def _subject(self, ref: Ref, of: Invocation | None) -> str:
@@ -163,7 +155,7 @@ class Admission:
             return of.text
         return "the target of a degrade rule" if ref.link == DEGRADE else of.contract.fallback[ref.link].text
 
-    def _clause(self, contract: Contract | None, number: int) -> Clause | Rule | Airspace | None:
+    def _clause(self, contract: Contract | None, number: int) -> Decisive:
         """The clause that decided, found by its number."""
         if number == NO_CLAUSE:
             return None

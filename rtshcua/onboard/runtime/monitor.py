@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.tree import where
 from rtshcua.decision.values import UNKNOWN

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.session import may_ask_again
 from rtshcua.decision.values import FALSE, Truth
 from rtshcua.decision.watch import holding, watch

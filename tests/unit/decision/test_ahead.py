@@ -12,8 +12,7 @@ from reference import flat_case as flat
 from reference.asking import STEP, loaded, ready
 from reference.flat_case import HEIGHT, NOW, POSITION_X, POSITION_Y, M, S
 from rtshcua.decision.case import situation
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.decision.values import FALSE, MISSING, UNKNOWN
 from rtshcua.decision.watch import UNKNOWN_AHEAD, WAY_HOME, ahead, holding, watch
 from rtshcua.diagnostics.refusal import Refusal

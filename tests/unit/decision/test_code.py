@@ -9,8 +9,7 @@ from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, GOTO, HOVER, INSPECT, POSITION_X, apply, argument, const, scaled, signal
 from reference.naive_code import daytime
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.decision.times import Daytime
 from rtshcua.decision.tree import parse, scope_of, slots_read
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, members, point

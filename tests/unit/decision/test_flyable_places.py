@@ -5,8 +5,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import INSPECT, M
-from rtshcua.decision.prepare import prepare, prepare_invocation, prepare_mission
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare, prepare_invocation, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
 from rtshcua.model.flat.policy import Policy

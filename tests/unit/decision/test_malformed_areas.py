@@ -6,8 +6,7 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.flat_case import H
 from reference.outlines import area, polygon, zig_zag
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import DAY, MAX_TOTAL_VERTICES, MAX_VALUE
 from rtshcua.model.flat.zone import AREA, LOWEST, MAX_COORDINATE, MAX_RINGS, Zone

@@ -9,16 +9,16 @@ from reference import flat_case as flat
 from reference.asking import STEP, loaded, ready
 from reference.flat_case import BATTERY, HEIGHT, HOVER, INSPECT, NOW, WIND, M, S, apply, argument, clause, const
 from rtshcua.decision.case import is_situation, situation
-from rtshcua.decision.decide import Decision, decide, possible
+from rtshcua.decision.decide import decide, possible
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.links import choose_contingency, choose_fallback, link_admissible
 from rtshcua.decision.nearest import nearest
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.tree import InPhase, Monitored, Scope, monitored, parse, scope_of, slots_read
 from rtshcua.decision.values import Sets
 from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP, MAX_MONITORS, MAX_PHASE_NAMES, MAX_WINDOW
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, RuleKind

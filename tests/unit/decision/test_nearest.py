@@ -12,12 +12,13 @@ from reference import worlds
 from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract
 from reference.flat_case import BATTERY, FIX, GOTO, HEIGHT, INSPECT, NOW, POSITION_X, WIND, M, clause, rule
 from rtshcua.decision.case import situation
-from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.nearest import Change, Changes, nearest, nearest_in
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.tree import parse, scope_of
 from rtshcua.decision.values import MISSING, point
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import PLACE, MotionKind, Parameter
 from rtshcua.model.flat.limits import DAY

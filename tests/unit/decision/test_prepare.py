@@ -14,8 +14,7 @@ from reference.asking import POLICY, STEP
 from reference.flat_case import GOTO, HOVER, INSPECT, M
 from rtshcua.decision.decide import decide
 from rtshcua.decision.links import choose_contingency, choose_fallback
-from rtshcua.decision.prepare import prepare, prepare_invocation, prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation, prepare_mission
 from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter

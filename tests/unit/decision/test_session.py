@@ -9,7 +9,8 @@ from msgspec.structs import replace
 from reference import documents, world
 from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, HOME, HOVER, LAND, NOW, S
-from rtshcua.decision.session import InForce, LinkDecision, Session
+from rtshcua.decision.session import InForce, Session
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome, Reason
@@ -43,9 +44,7 @@ class Asked:
         given = flat.context(invocation, **(told | context))
         return self.session.decide_step(step, at(step, values), given, NOW).outcome
 
-    def link(
-        self, ref: Ref, values: dict[int, int | None] | None = None, *, binding: bytes | None = None
-    ) -> LinkDecision:
+    def link(self, ref: Ref, values: dict[int, int | None] | None = None, *, binding: bytes | None = None) -> Decision:
         assert self.session.refusal(ref) is None
         if binding is None:
             contingency = ref.kind == CONTINGENCY_LINK
@@ -195,11 +194,11 @@ def test_a_link_flies_where_it_may(ref: Ref, values: dict[int, int | None], skil
         of.step(step)
     decision = of.link(ref, values)
     if skill is None:
-        assert decision == LinkDecision(FALLBACK, Reason.STATE_VIOLATED, 6, None, AT_US)
+        assert decision == Decision(FALLBACK, Reason.STATE_VIOLATED, 6, None, None, None, AT_US)
     else:
-        assert decision.link is not None
-        assert decision.link.skill == skill
-        assert decision == LinkDecision(ALLOW, Reason.ADMITTED, 8, decision.link, AT_US + LINK_VALID_US)
+        assert decision.target is not None
+        assert decision.target.skill == skill
+        assert decision == Decision(ALLOW, Reason.ADMITTED, 8, None, None, decision.target, AT_US + LINK_VALID_US)
 
 
 def test_where_neither_a_rule_nor_the_chain_has_a_link_there_is_no_target() -> None:
@@ -219,7 +218,7 @@ def test_a_link_under_another_binding_is_denied(ref: Ref, values: dict[int, int 
     of = Asked()
     of.step(0)
     decision = of.link(ref, values, binding=bytes(32))
-    assert decision == LinkDecision(DENY, Reason.BINDING_MISMATCH, 1, None, AT_US)
+    assert decision == Decision(DENY, Reason.BINDING_MISMATCH, 1, None, None, None, AT_US)
 
 
 def test_the_binding_of_a_link_is_that_of_its_own_chain() -> None:

@@ -12,7 +12,7 @@ from reference.naive_code import between
 from rtshcua.decision.contracts import longest
 from rtshcua.decision.links import choose_fallback
 from rtshcua.decision.nearest import nearest
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.times import Dates, Times
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.decision.watch import holding, watch

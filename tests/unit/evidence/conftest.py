@@ -4,8 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
@@ -48,7 +50,7 @@ def decide(recorder: Recorder, now: Callable[[int], Now]) -> Callable[..., bytes
             "invocation": bytes(16),
             "state": State((35_000, None, -3), (1_200, 0, 50)),
             "context": Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),)),
-            "answer": RecordedAnswer.of(Outcome.ALLOW, Reason.ADMITTED, 8, 6_000_000),
+            "decided": Decision(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, None, 6_000_000),
         }
         return recorder.decision(now(ms), **(given | fields))  # type: ignore[arg-type]
 
@@ -60,14 +62,13 @@ def log(
     recorder: Recorder, begin: Callable[[], bytes], decide: Callable[..., bytes], now: Callable[[int], Now]
 ) -> list[bytes]:
     """Genesis, two decisions, two effects, a seal, an empty epoch's seal, an effect, close."""
-    refused = RecordedAnswer(
-        "fallback", "state/violated", 6, 'battery > 35 % "ß"', (0, 10, 24), "hover for 20 s", 0, 6_000_000
-    )
+    clause, link = Clause('battery > 35 % "ß"', 0, 10, 24, ()), Link(0, (), 0, "hover for 20 s", 0, 0, 0)
+    refused = Decision(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, clause, 0, link, 6_000_000)
     return [
         begin(),
         decide(10),
         recorder.effect(now(11), "dispatched", Ref(0, 0, -1), token=1),
-        decide(12, ref=Ref(0, 1, -1), answer=refused),
+        decide(12, ref=Ref(0, 1, -1), decided=refused),
         recorder.effect(now(13), "failed", Ref(0, 0, -1), token=1, detail="PreArm: \ud800 \x1b[31m\n"),
         recorder.seal(now(14)),
         recorder.seal(now(15)),

@@ -1,6 +1,6 @@
 """The airspace at a time that nothing is known of."""
 
-from rtshcua.decision.prepared import PreparedAirspace
+from rtshcua.decision.prepare import PreparedAirspace
 from rtshcua.decision.values import AND, NOT, TRUE, Truth
 from rtshcua.decision.zones import Place
 

@@ -10,7 +10,7 @@ from rtshcua.decision.authority import authority
 from rtshcua.decision.case import PASS, Case
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.nearest import Changes, Offer, offer
-from rtshcua.decision.prepared import PreparedInvocation, PreparedRule
+from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
 from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

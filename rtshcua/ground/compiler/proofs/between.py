@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Final
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, interval
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.solve import Goal

@@ -7,7 +7,7 @@ A vehicle that has not climbed cannot fly, survey or hold: no autopilot does tha
 
 from collections.abc import Sequence
 
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

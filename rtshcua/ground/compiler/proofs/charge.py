@@ -8,7 +8,7 @@ from the farthest planned place, the reserve), and that no clause about the batt
 from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

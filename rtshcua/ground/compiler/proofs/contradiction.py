@@ -10,7 +10,7 @@ from functools import partial
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

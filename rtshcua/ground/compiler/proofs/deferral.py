@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs import chaining, charge, last_link, path, starting
 from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after, may_be_skipped

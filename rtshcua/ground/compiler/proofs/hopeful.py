@@ -7,7 +7,7 @@ a forbid that every state makes true forbids.
 from collections.abc import Iterator
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepared import PreparedInvocation, PreparedRule
+from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space

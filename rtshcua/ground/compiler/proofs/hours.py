@@ -6,7 +6,7 @@ most. Without a time of issue nothing is said: authority itself asks whether the
 
 from collections.abc import Sequence
 
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import point
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.words import clock

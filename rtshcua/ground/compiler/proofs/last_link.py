@@ -9,7 +9,7 @@ nothing, and has no time limit as a link, is E0612.
 from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import MISSING, TRUE, point
 from rtshcua.diagnostics import codes

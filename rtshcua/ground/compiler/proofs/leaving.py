@@ -6,7 +6,7 @@ from math import isqrt
 from typing import TypeAlias
 
 from rtshcua.decision.outline import Box
-from rtshcua.decision.prepared import PreparedAirspace
+from rtshcua.decision.prepare import PreparedAirspace
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.ground.compiler.proofs.fan import Point

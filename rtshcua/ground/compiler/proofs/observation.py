@@ -11,7 +11,7 @@ the fallback. A step's own block may shorten the time or add clauses, so each su
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.tree import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

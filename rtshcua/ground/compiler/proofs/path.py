@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from rtshcua.decision.contracts import Energy, longest
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.tree import monitored, slots_read, where
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE

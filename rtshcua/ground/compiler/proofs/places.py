@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Volume
 from rtshcua.diagnostics.diagnostic import Diagnostic

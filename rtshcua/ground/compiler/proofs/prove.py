@@ -2,8 +2,7 @@
 
 from functools import lru_cache
 
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 from rtshcua.decision.case import Case
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepare import prepare_invocation
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.tree import Node
 from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.refusal import Refusal

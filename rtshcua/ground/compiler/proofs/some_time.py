@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

@@ -6,7 +6,7 @@ its approval, then for its deadline, and last as long as its contract allows.
 
 from collections.abc import Sequence
 
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs.situation import Ground

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from rtshcua.decision.contracts import first_cell
-from rtshcua.decision.prepared import PreparedAirspace, PreparedInvocation, PreparedLink
+from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation, PreparedLink
 from rtshcua.decision.values import TRUE
 from rtshcua.decision.zones import Place as Places
 from rtshcua.decision.zones import Sweep

@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from rtshcua.decision.decide import Decision
 from rtshcua.ground.handbook.words.conditions import told_condition
 from rtshcua.ground.handbook.words.places import utc
 from rtshcua.ground.handbook.words.skills import told_argument
 from rtshcua.ground.handbook.words.values import quantity, told_value
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, listed, name, named
+from rtshcua.model.decision import Decision
 from rtshcua.model.ir.expression import Quantity, Reference
 from rtshcua.model.ir.tests import (
     Answer,

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.authority import CLASSES
-from rtshcua.decision.prepare import prepare_invocation
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.case import Decisive
 from rtshcua.decision.evaluate import Condition, build
-from rtshcua.decision.prepared import PreparedAirspace, PreparedInvocation
+from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.values import EVERYWHERE, Truth
 from rtshcua.ground.testing.boundaries.scene import Scene
 from rtshcua.ground.testing.coverage.universe import AIRSPACE, ENERGY, ENERGY_TEXT, clauses_of
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import Rule
 
 #: the clauses that hold for a planned volume, not for the present place alone

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rtshcua.decision import tree
 from rtshcua.decision.outline import rings
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import Truth
 from rtshcua.ground.testing.boundaries.edges import Place, edge, ring_edges
 from rtshcua.ground.testing.boundaries.limits import Limit, tried

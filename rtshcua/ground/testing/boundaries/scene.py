@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.contracts import first_cell, misfit
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner, flown_at
 from rtshcua.model.flat.contract import PLACE, MotionKind

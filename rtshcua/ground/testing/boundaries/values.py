@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.ground.testing.boundaries.limits import Limit
 from rtshcua.ground.testing.boundaries.parts import Part, atoms
 from rtshcua.ground.testing.boundaries.scene import Value, Variable

@@ -7,12 +7,12 @@ that flies is the one that it asks for.
 
 from collections.abc import Iterator
 
-from rtshcua.decision.decide import Decision
 from rtshcua.decision.links import DEGRADE
-from rtshcua.decision.prepared import PreparedInvocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE
 from rtshcua.ground.testing.coverage.universe import AIRSPACE, ENERGY, OUTCOMES, TRUTHS, Goal, Universe
 from rtshcua.ground.why.trace import Check, Trace
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.policy import Airspace, Rule, RuleKind
 from rtshcua.model.outcome import Outcome, Reason

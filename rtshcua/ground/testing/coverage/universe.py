@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.contracts import Energy
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import No

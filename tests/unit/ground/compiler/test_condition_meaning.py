@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import load

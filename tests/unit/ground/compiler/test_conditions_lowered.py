@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.decision.prepare import prepare
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect

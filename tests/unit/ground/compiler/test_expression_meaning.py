@@ -15,7 +15,7 @@ import pytest
 from reference.naive_expression import Names, World, truth
 from reference.random_expressions import ENUMERATIONS, PHASES, STEP, ZONES, Maker
 from rtshcua.decision.evaluate import NO_PHASE, Environment, Tables, build
-from rtshcua.decision.prepared import Limit, PreparedMonitor
+from rtshcua.decision.prepare import Limit, PreparedMonitor
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.tree import Scope as CodeScope
 from rtshcua.decision.tree import parse as parse_code

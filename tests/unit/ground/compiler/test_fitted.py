@@ -6,8 +6,7 @@ import pytest
 
 from rtshcua.decision.decide import decide
 from rtshcua.decision.links import link_admissible
-from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare, prepare_mission
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.decision.decide import Decision, decide
+from rtshcua.decision.decide import decide
 from rtshcua.decision.links import link_admissible
-from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.prepared import PreparedPolicy
+from rtshcua.decision.prepare import PreparedPolicy, prepare, prepare_mission
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.mission import Mission

@@ -3,8 +3,7 @@
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.decision.prepared import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.testing.coverage.coverage import coverage, enough, per_mille, share
 from rtshcua.ground.testing.coverage.reached import reached

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import pytest
 
 from reference import flat_case as flat
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Decision, Effect
+from rtshcua.evidence.records import Decision, Effect, in_words
+from rtshcua.model.decision import Decision as Decided
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.request import NOTHING, Ref
@@ -17,15 +17,20 @@ from rtshcua.wire.request import NOTHING, Ref
 @pytest.mark.parametrize("outcome", Outcome)
 def test_an_answer_without_clause_and_target(outcome: Outcome) -> None:
     words = outcome.name.lower()
-    answer = RecordedAnswer.of(outcome, Reason.ADMITTED, 8, 9)
-    assert answer == RecordedAnswer(words, "admitted", 8, None, None, None, -1, 9)
+    decided = Decided(outcome, Reason.ADMITTED, 8, None, None, None, 9)
+    assert in_words(decided) == (words, "admitted", 8, None, None, None, -1, 9)
 
 
 def test_an_answer_names_its_clause_and_its_target() -> None:
     clause, target = flat.RULES[0], flat.POLICY.contingency[1]
     place = (clause.source, clause.start, clause.end)
-    answer = RecordedAnswer.of(Outcome.FALLBACK, Reason.NO_SLACK, 5, 9, clause=clause, target=target, target_link=1)
-    assert answer == RecordedAnswer("fallback", Reason.NO_SLACK.value, 5, clause.text, place, target.text, 1, 9)
+    decided = Decided(Outcome.FALLBACK, Reason.NO_SLACK, 5, clause, 1, target, 9)
+    assert in_words(decided) == ("fallback", Reason.NO_SLACK.value, 5, clause.text, place, target.text, 1, 9)
+
+
+def test_a_link_that_may_fly_is_no_target_of_its_own_record() -> None:
+    decided = Decided(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, flat.POLICY.contingency[1], 9)
+    assert in_words(decided) == ("allow", "admitted", 8, None, None, None, -1, 9)
 
 
 def test_a_record_says_what_it_is_about(

@@ -19,9 +19,9 @@ from time import perf_counter_ns
 
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.store.writing import sync_data
-from rtshcua.evidence.answer import RecordedAnswer
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST, WORDS, WRITTEN
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
@@ -49,7 +49,7 @@ def now(number: int) -> Now:
 
 def decision(recorder: Recorder, at: Now, number: int, durability: int) -> bytes:
     """One decision of about 700 bytes."""
-    answer = RecordedAnswer.of(Outcome.ALLOW, Reason.ADMITTED, 8, 7_000_000)
+    answer = Decision(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, None, 7_000_000)
     return recorder.decision(at, Ref(0, number & 7, -1), bytes(16), STATE, CONTEXT, answer, durability)
 
 

@@ -129,12 +129,20 @@ def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def spread(paths: set[Path], waiting: Path) -> dict[Path, tuple[float, Path]]:
-    """Where each file comes: those that wait much, for processes and for real time, among those that compute."""
+    """Where each file comes: those that wait much, for processes and for real time, among those that compute.
+
+    The last third is for those that compute: a file whose tests wait one for the other would be waited for in the end.
+    """
     groups = (
         sorted(path for path in paths if path.is_relative_to(waiting)),
         sorted(path for path in paths if not path.is_relative_to(waiting)),
     )
-    return {path: (at / len(group), path) for group in groups for at, path in enumerate(group)}
+    ends = (2 / 3, 1)
+    return {
+        path: (end * at / len(group), path)
+        for end, group in zip(ends, groups, strict=True)
+        for at, path in enumerate(group)
+    }
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

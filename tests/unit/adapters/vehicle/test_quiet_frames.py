@@ -26,3 +26,4 @@ def test_a_flight_is_the_same_when_every_frame_is_shown(
     spared = flown(flavour, fault)
     monkeypatch.setattr(Manoeuvre, "due_us", property(lambda _: 0, lambda _, value: None), raising=False)
     assert flown(flavour, fault) == spared
+    assert b'"ending":"completed"' in spared[0][-1]

@@ -13,8 +13,8 @@ from reference.forgery import flight, other_flight
 from reference.log_mutants import REJECTED
 from reference.log_vectors import recovered, sealed
 from reference.verifiers import independent, quick_accepts
-from rtshcua.evidence import note
 from rtshcua.evidence.verify import verify
+from rtshcua.wire import keys
 
 LOGS = (tuple(sealed()), tuple(recovered()[0]), flight(), other_flight())
 SAMPLE, SHARDS, SHARD = 400, 40, 25_000
@@ -25,7 +25,7 @@ LIMIT_KB = 200 << 10  # by which all of a shard may make the process larger
 @pytest.fixture(autouse=True)
 def signatures_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether a key made a signature is asked again and again for the same: remembered, so that others get a turn."""
-    for module, name in ((note, "valid"), (independent_verifier, "holds")):
+    for module, name in ((keys, "verified"), (independent_verifier, "holds")):
         monkeypatch.setattr(module, name, lru_cache(maxsize=4096)(getattr(module, name)))
 
 

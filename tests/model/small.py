@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import BATTERY, FIX, GOTO, HOME, HOVER, LAND, NOMINAL, TAKEOFF, WIND, M, S
-from rtshcua.decision.checks.policy import MAX_SPEED
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
+from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind
 from rtshcua.onboard.runtime.limits import Limits

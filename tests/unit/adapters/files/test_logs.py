@@ -5,6 +5,7 @@ import io
 import pytest
 
 from rtshcua.adapters.files import logs
+from rtshcua.evidence import reading
 from rtshcua.evidence import verify as verifier
 
 
@@ -13,7 +14,7 @@ def test_lines_come_with_their_ends() -> None:
 
 
 def test_a_line_without_end_is_never_read_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (logs, verifier):
+    for module in (logs, reading):
         monkeypatch.setattr(module, "LONGEST", 10)
     pieces = list(logs.lines(io.BytesIO(b"x" * 25)))
     assert [len(piece) for piece in pieces] == [11, 11, 3]

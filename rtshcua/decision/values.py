@@ -80,7 +80,7 @@ def maybe(value: Value) -> Value:
 
 class Sets(NamedTuple):
     """A set of situations: one `Value` a state slot, the moments at which they may be met (see `Now`), and the truths
-    that each temporal monitor may have (`decision.truth`; of another length than the policy's: any truths).
+    that each temporal monitor may have (`Truth`; of another length than the policy's: any truths).
 
     A point of it is one choice from each, with every age fresh; a value that may be missing stands for stale ones too.
     """

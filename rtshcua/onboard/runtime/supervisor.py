@@ -1,4 +1,4 @@
-"""What must hold all the while a skill runs (`decision.watch`), and while a step is waited for (`decision.holding`)."""
+"""What must hold all the while a skill runs, and while a step is waited for (`decision.watch`)."""
 
 from collections.abc import Iterable
 

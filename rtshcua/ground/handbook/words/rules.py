@@ -75,7 +75,7 @@ def skills_of(skills: Sequence[Name]) -> str:
 
 
 def _replaced(rule: Rule) -> str:
-    """The skills that a `degrade` is about: never what it flies itself (`decision/rules.py`)."""
+    """The skills that a `degrade` is about: never what it flies itself (`decision/prepare.py`)."""
     target = "" if rule.target is None else rule.target.skill.text
     left = [skill for skill in rule.skills if skill.text != target]
     if not rule.skills:

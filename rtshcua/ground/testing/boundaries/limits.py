@@ -1,7 +1,7 @@
 """Where a condition turns, along one number: two integers next to each other, at one of which it is true.
 
 The comparison is read off the condition's own tree, what else it sums up being as it is, and the value where it turns
-is asked of `decision.change`, which finds the nearest values that pass for whoever was refused. Each limit is tried
+is asked of `decision.nearest`, which finds the nearest values that pass for whoever was refused. Each limit is tried
 before it is believed.
 """
 

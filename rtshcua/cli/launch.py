@@ -21,6 +21,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.asked import SOURCE
 from rtshcua.cli.faults import code_of, untrusted
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
@@ -140,6 +141,9 @@ def launch(order: Launch) -> ExitCode:
 
 def _read(path: Path) -> bytes:
     data = read_regular(path, MAX_BUNDLE)
+    if path.suffix == SOURCE:
+        advice = f"`rtshcua compile {path} -o {path.stem}.bundle` makes one of it"
+        raise Refused(ExitCode.INPUT, "wrong-kind", f"`{path}` is a source, and no bundle", advice)
     if len(data) > MAX_BUNDLE:
         raise Refused(ExitCode.INPUT, "too-large", f"`{path}` is larger than a bundle may be")
     kind = kind_of_document(data)

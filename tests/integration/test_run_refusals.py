@@ -90,6 +90,14 @@ def test_a_truncated_bundle_is_malformed(ground: Any, capfd: Any) -> None:
         assert refused(capfd, "cut.bundle")[0] == 3
 
 
+def test_a_source_is_not_flown_but_compiled(ground: Any, capfd: Any) -> None:
+    Path("m.rts").write_text("mission m {}\n")
+    code, err = refused(capfd, "m.rts")
+    assert code == 3
+    assert "`m.rts` is a source, and no bundle" in err
+    assert "`rtshcua compile m.rts -o m.bundle`" in err
+
+
 def test_a_missing_bundle(ground: Any, capfd: Any) -> None:
     code, err = refused(capfd, "none.bundle")
     assert (code, err) == (3, "error: no such file or directory: `none.bundle`\n")

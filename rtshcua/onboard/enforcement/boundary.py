@@ -13,7 +13,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
-from rtshcua.model.flat.policy import Airspace, Policy, Rule
+from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import Commands
@@ -69,7 +69,8 @@ class SoftwareBoundary:
         self._enforced = enforced
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
-        self._numbers = _numbers(policy.policy, in_force.invocations)
+        self._shared: _Numbers = {clause: at for at, clause in enumerate(response.shared_clauses(policy.policy))}
+        self._own = self._own_numbers()
         self._now_us = 0  # of the last request: time does not go back
         self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
 
@@ -108,7 +109,7 @@ class SoftwareBoundary:
         self._commands.recalled = self._in_force.recalled
         if receipt.kind == REPLACEMENT and receipt.accepted:
             self._commands.replace(self._in_force.bundle.mission)
-            self._numbers = _numbers(self._policy.policy, self._in_force.invocations)
+            self._own = self._own_numbers()
         return encode_receipt(receipt)
 
     def _keeps_time(self, now: Now) -> bool:
@@ -141,7 +142,7 @@ class SoftwareBoundary:
             decision.outcome,
             decision.reason,
             decision.step,
-            NO_CLAUSE if decision.clause is None else self._numbers[step][decision.clause],
+            NO_CLAUSE if decision.clause is None else self._number(step, decision.clause),
             self._target(prepared, decision),
             decision.valid_until_us,
             consumed,
@@ -177,12 +178,18 @@ class SoftwareBoundary:
         """`-1 - rule` for the target of a degrade rule."""
         for degrade in prepared.candidates.degrades:
             if degrade.rule.target == target:
-                return -1 - self._numbers[prepared.invocation.step][degrade.rule]
+                return -1 - self._shared[degrade.rule]
         raise LookupError("no degrade rule has this target")
 
+    def _number(self, step: int, clause: Clause | Rule | Airspace) -> int:
+        """The number of a clause in a response; a rule has its index in the policy."""
+        number = self._own[step].get(clause)
+        return self._shared[clause] if number is None else number
 
-def _numbers(policy: Policy, invocations: tuple[PreparedInvocation, ...]) -> tuple[_Numbers, ...]:
-    """By step, the numbers of the clauses in a response; a rule has its index in the policy."""
-    shared: _Numbers = {clause: at for at, clause in enumerate(response.shared_clauses(policy))}
-    own = (response.own_clauses(prepared.invocation.contract) for prepared in invocations)
-    return tuple(shared | {clause: at for at, clause in enumerate(clauses, len(shared))} for clauses in own)
+    def _own_numbers(self) -> tuple[_Numbers, ...]:
+        """By step, the numbers of its contract's clauses, behind those of what all steps share."""
+        contracts = (prepared.invocation.contract for prepared in self._in_force.invocations)
+        return tuple(
+            {clause: at for at, clause in enumerate(response.own_clauses(contract), len(self._shared))}
+            for contract in contracts
+        )

@@ -49,18 +49,19 @@ class Commands:
         self.recalled = False
         self._policy = policy
         self._made: dict[tuple[int, int, int], _Made] = {}
+        self._targets: dict[int, _Made] = {}
         self.replace(mission)
 
     def replace(self, mission: Mission) -> None:
         """From now on these are the steps. All commands are made now, for when a link must fly there is no time."""
         contingency, rules = enumerate(self._policy.contingency), enumerate(self._policy.rules)
         self._made = {(CONTINGENCY_LINK, -1, number): self._of_link(link) for number, link in contingency}
-        targets = {-1 - rule: self._of_link(each.target) for rule, each in rules if each.target is not None}
+        # one of each rule, not of each step: there may be thousands of both
+        self._targets = {-1 - rule: self._of_link(each.target) for rule, each in rules if each.target is not None}
         for step, invocation in enumerate(mission.invocations):
             self._made[STEP, step, -1] = self._of_step(invocation)
-            links = {number: self._of_link(link) for number, link in enumerate(invocation.contract.fallback)}
-            for number, made in (links | targets).items():
-                self._made[FALLBACK_LINK, step, number] = made
+            for number, link in enumerate(invocation.contract.fallback):
+                self._made[FALLBACK_LINK, step, number] = self._of_link(link)
 
     def command(self, kind: int, step: int, link: int, token: int) -> Command:
         """The command, under the token of its permit. A `link` of `-1 - rule` is the target of that degrade rule.
@@ -69,6 +70,8 @@ class Commands:
         """
         if kind == STEP:
             return Command(token, *self._made[STEP, step, -1])
+        if kind == FALLBACK_LINK and link < 0 and (STEP, step, -1) in self._made:
+            return Command(token, *self._targets[link])
         return Command(token, *self._made[kind, step if kind == FALLBACK_LINK else -1, link])
 
     def _of_step(self, invocation: Invocation) -> _Made:

@@ -33,7 +33,7 @@ from rtshcua.onboard.ports import Command, Ending, Event, Succeeded
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual import case
 from virtual.flight import Flight
-from virtual.shipped import shipped
+from virtual.shipped import shipped, simulated
 
 LIMIT_MS = 5.0
 PUBLISHED_MS = {"short": 55.7, "extended": 135.0}
@@ -109,7 +109,7 @@ def one(
     bundle: bytes, link: socket.socket, address: tuple[str, int], folder: Path, expected: frozenset[int]
 ) -> tuple[list[float], list[int], frozenset[int]]:
     """The latencies of one flight, in ms, its processor times in ns, and which frames released steps."""
-    config = case.simulated("px4", hover_us=240 * case.MIN)
+    config = simulated("px4", hover_us=240 * case.MIN)
     first = Flight(bundle, config)
     vehicle = Timed(first.loaded.bundle.policy, config, first.clock, first.loaded.executor.frames)
     vehicle.took_ns, vehicle.took_cpu_ns, vehicle.link, vehicle.address = [], [], link, address

@@ -41,9 +41,8 @@ from rtshcua.cli.live.watching import Watching
 from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.runtime.view import Stage
-from virtual import case
 from virtual.flight import Flight
-from virtual.shipped import shipped
+from virtual.shipped import shipped, simulated
 
 PROCESSES, IN_PROCESS, QUICK = 3, 100, 40
 RATE = 200
@@ -121,7 +120,7 @@ class Going:
 
 def under_way() -> Flight:
     """A flight whose second step flies."""
-    flight = Flight(shipped("short"), case.simulated("px4"))
+    flight = Flight(shipped("short"), simulated("px4"))
     while True:
         assert flight.loop.turn() is None
         view = flight.runtime.view(flight.clock.now())

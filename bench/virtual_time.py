@@ -14,9 +14,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.onboard.ports import Ending
-from virtual import case
 from virtual.flight import Flight
-from virtual.shipped import NAMES, shipped
+from virtual.shipped import NAMES, shipped, simulated
 
 LIMIT = 100
 FRAMES = 50
@@ -36,7 +35,7 @@ _MANY = dict.fromkeys(
 
 def one(name: str, flavour: str, more: Mapping[int, int] = _MORE) -> tuple[float, float, float]:
     """Seconds of flight, seconds of processor time for it, frames a second of flight; `more` are streams, in us."""
-    flight = Flight(shipped(name), case.simulated(flavour))
+    flight = Flight(shipped(name), simulated(flavour))
     streams = flight.vehicle.simulation._autopilot.streams
     for number, interval_us in more.items():
         streams.set(number, interval_us)

@@ -270,9 +270,10 @@ class Driver:
             events.append(
                 ports.LinkBack(now_us) if was == SILENT else ports.LinkLost(now_us, SILENT, self._watch.heard_us or 0)
             )
-        if UNANSWERED in (was, down):
-            says = "it is heard, but answers nothing" if down == UNANSWERED else "it answers again"
-            events.append(ports.Noted(now_us, says))
+        if down == UNANSWERED:
+            events.append(ports.Noted(now_us, "it is heard, but answers nothing"))
+        elif was == UNANSWERED and down is None:
+            events.append(ports.Noted(now_us, "it answers again"))
 
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
         """Go on with the manoeuvre; where a frame of it waits for the mode, ask at once."""

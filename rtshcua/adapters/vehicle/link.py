@@ -149,14 +149,14 @@ class LinkWatch:
         self._unanswered_us, self.answers = None, True
 
     def look(self, now_us: int) -> bool:
-        """Let time pass; True when the link went down, or came up again, since the last look."""
+        """Let time pass; True when `down` is another than at the last look."""
         if self.heard_us is None:
             return False
         if self._seen_us is not None and self.down is None:
             self.up_us += min(now_us - self._seen_us, SILENT_US * self._slack)  # we may have been held up ourselves
         self._seen_us = now_us
         was, self.down = self.down, self._why(now_us)
-        return (was is None) != (self.down is None)
+        return was != self.down
 
     def _why(self, now_us: int) -> str | None:
         if self.heard_us is not None and now_us - self.heard_us > SILENT_US * self._slack:

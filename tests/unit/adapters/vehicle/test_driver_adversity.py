@@ -164,6 +164,25 @@ def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     assert one.until((Succeeded, Failed), 60) == Succeeded(one.now_us, token)
 
 
+@ONE_FLAVOUR
+def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -> None:
+    """As a radio fails at the end of its range: first it does not hear us, then we do not hear it."""
+    one = aloft()
+    one.begin(MotionKind.HOLD)
+    one.wait(1)
+    one.vehicle.lose = lambda frame: True
+    noted = one.until(Noted, 10)
+    while noted.text != "it is heard, but answers nothing":
+        noted = one.until(Noted, 10)
+    one.vehicle.simulation.inject(LinkSilence(one.vehicle.simulation.now_us, 5_000_000))
+    begun = one.now_us
+    lost = one.until(LinkLost, 3)
+    assert 900_000 <= lost.at_us - begun <= 1_400_000
+    one.vehicle.lose = lambda frame: False
+    said = one.until((LinkBack, Noted), 10)
+    assert isinstance(said, LinkBack), "not that it answers again, before it was heard"
+
+
 def test_a_command_that_is_never_answered_while_questions_are_has_failed(flyer: Make) -> None:
     one = flyer()
     one.until(Ready)

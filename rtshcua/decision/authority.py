@@ -76,7 +76,9 @@ def authority(case: Case) -> Found:
         verdicts.append(Verdict(Outcome.DENY, Reason.OUT_OF_SCOPE, rules[0].rule) if rules else _NOT_PERMITTED)
         if not permitted:
             return tuple(verdicts)
-    return concluded(verdicts, doubt, unforbidden) if verdicts or doubt is not None else PASSED
+    if unforbidden and not verdicts and doubt is None:
+        return PASSED
+    return concluded(verdicts, doubt, unforbidden)
 
 
 def confirmation(case: Case) -> Found:
@@ -108,4 +110,6 @@ def confirmation(case: Case) -> Found:
         if awaited and doubt is None:
             doubt = Verdict(Outcome.DEFER, Reason.AWAITING_APPROVAL, rule.rule)
         passes = passes and not certain
-    return concluded(verdicts, doubt, passes) if verdicts or doubt is not None else PASSED
+    if passes and not verdicts and doubt is None:
+        return PASSED
+    return concluded(verdicts, doubt, passes)

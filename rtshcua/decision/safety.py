@@ -49,7 +49,9 @@ class Tally:
         """The verdicts, given whether some condition surely fails."""
         if failed:
             return tuple(self._verdicts)
-        return concluded(self._verdicts, self._doubt, self._passes) if self._verdicts or self._doubt else PASSED
+        if self._passes and not self._verdicts and self._doubt is None:
+            return PASSED
+        return concluded(self._verdicts, self._doubt, self._passes)
 
 
 def state(case: Case) -> Found:

@@ -88,7 +88,9 @@ class MissionController:
             return self._supervise(now)
         if stage is _FALLING:
             return self._fall(now)
-        return self._decide(now) if stage is _DECIDING else self._wait(now, self._began_us)
+        if stage is _DECIDING:
+            return self._decide(now)
+        return stage is _WAITING and self._wait(now, self._began_us)  # to judge may have ended the run
 
     def _judges(self, now: Now) -> bool:
         """Whether the vehicle is heard again, and what is known of it may be judged."""

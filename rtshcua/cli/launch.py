@@ -21,7 +21,6 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.udp import UdpVehicle
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
-from rtshcua.cli.asked import SOURCE
 from rtshcua.cli.faults import code_of, untrusted
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
@@ -141,7 +140,7 @@ def launch(order: Launch) -> ExitCode:
 
 def _read(path: Path) -> bytes:
     data = read_regular(path, MAX_BUNDLE)
-    if path.suffix == SOURCE:
+    if path.suffix == ".rts":  # what names it elsewhere is of the ground
         advice = f"`rtshcua compile {path} -o {path.stem}.bundle` makes one of it"
         raise Refused(ExitCode.INPUT, "wrong-kind", f"`{path}` is a source, and no bundle", advice)
     if len(data) > MAX_BUNDLE:

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.onboard.ports import Ending
+from rtshcua.virtual.vehicle import TICK_US
 from virtual.flight import Flight
 from virtual.shipped import NAMES, shipped, simulated
 
@@ -35,7 +36,7 @@ _MANY = dict.fromkeys(
 
 def one(name: str, flavour: str, more: Mapping[int, int] = _MORE) -> tuple[float, float, float]:
     """Seconds of flight, seconds of processor time for it, frames a second of flight; `more` are streams, in us."""
-    flight = Flight(shipped(name), simulated(flavour))
+    flight = Flight(shipped(name), simulated(flavour, land_mm_s=None), tick_us=TICK_US)
     streams = flight.vehicle.simulation._autopilot.streams
     for number, interval_us in more.items():
         streams.set(number, interval_us)

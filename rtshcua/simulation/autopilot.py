@@ -161,6 +161,7 @@ class Autopilot:
         handling = replace(
             flavour.handling, cruise=config.cruise_mm_s / 1000, max_speed=config.max_speed_mm_s / 1000,
             return_up=config.return_mm / 1000,
+            land_speed=flavour.handling.land_speed if config.land_mm_s is None else config.land_mm_s / 1000,
         )  # fmt: skip
         self.vehicle = Vehicle(handling, flavour.modes.start)
         self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)

@@ -42,6 +42,8 @@ class SimulationConfig:
     max_speed_mm_s: int = 12_000
     return_mm: int = 30_000
     """The height above home that a return climbs to, as its owner has set it; ArduCopter comes with 15 m."""
+    land_mm_s: int | None = None
+    """How fast the last metres of a landing are, as its owner has set it; what the autopilot comes with if None."""
     wind: Wind = Wind()
     seed: int = 1
     noise: bool = True
@@ -72,5 +74,7 @@ class SimulationConfig:
             raise ValueError("speed is more than nothing")
         if not 2_000 <= self.return_mm <= 1_000_000:
             raise ValueError("a return climbs to a height from 2000 to 1000000 mm")
+        if self.land_mm_s is not None and not 100 <= self.land_mm_s <= 2_000:
+            raise ValueError("a landing is from 100 to 2000 mm/s")
         if not -850_000_000 <= self.home.latitude <= 850_000_000 or abs(self.home.longitude) > 1_800_000_000:
             raise ValueError("home is between 85 degrees south and north, and 180 degrees west and east")

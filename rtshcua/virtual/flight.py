@@ -22,7 +22,7 @@ from rtshcua.onboard.ports import Action, Ending, Event, EvidenceSink
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
-from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
+from rtshcua.virtual.vehicle import SECOND, START, TICK_US, VirtualClock, VirtualVehicle
 from rtshcua.wire import bundle as bundles
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import Duty, SigningKey
@@ -125,7 +125,8 @@ class VirtualFlight:
     The same arguments give the same flight, byte by byte. `simulated` is the simulated vehicle, or what makes one for
     the bundle's policy. `utc_us` is the time of day at the start, a minute after the bundle was issued if it is not
     given. `log_key` signs the log; it must be one of the root's if that is to be audited. `sink` makes another place
-    for the evidence than memory, and `vehicle` is one that was made already, with the clock that it lives by.
+    for the evidence than memory, and `vehicle` is one that was made already, with the clock that it lives by. What the
+    vehicle says is heard every `tick_us`: a longer tick makes a flight cheaper, and what happens on it as much later.
     Raises ValueError for a bundle that is refused, and what `open_root` raises.
     """
 
@@ -136,7 +137,7 @@ class VirtualFlight:
         self, bundle: bytes, simulated: SimulationConfig | Callable[[Policy], SimulationConfig] = fitting,
         *, root: bytes, log_key: SigningKey = NOBODY, mode: Mode = Mode.SOFTWARE, utc_us: int | None = None,
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
-        sink: Callable[[VirtualClock], ReadableSink] | None = None,
+        sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US,
     ) -> None:  # fmt: skip
         policy, mission = _claimed(bundle)
         utc_us = mission.issued_at_us + _LATER_US if utc_us is None else utc_us
@@ -155,7 +156,7 @@ class VirtualFlight:
             config = simulated if isinstance(simulated, SimulationConfig) else simulated(policy)
             ways = manoeuvres(packs_of(policy.sources))
             vehicle = VirtualVehicle(
-                policy, config, self.clock, loaded.executor.frames, fence=fence, manoeuvres=ways
+                policy, config, self.clock, loaded.executor.frames, fence=fence, manoeuvres=ways, tick_us=tick_us
             )  # fmt: skip
         self.vehicle = vehicle
         loaded.executor.frames = vehicle.frames

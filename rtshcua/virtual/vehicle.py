@@ -12,6 +12,7 @@ from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.world import Simulation
 
+#: as often as the simulation ticks itself
 TICK_US = 20_000
 SECOND = 1_000_000
 #: where the clock starts: a monotonic time that is not 0, and a UTC time
@@ -41,17 +42,18 @@ class VirtualVehicle:
 
     `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives
     the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
-    permitted. `verifier`, `fence` and `manoeuvres` are the driver's.
+    permitted. `verifier`, `fence` and `manoeuvres` are the driver's. Every `tick_us` it hears what was said since.
     """
 
     def __init__(
         self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None,
         frames: FrameSession | None = None, verifier: Verifier | None = None, *, fence: bool = True,
-        manoeuvres: Mapping[str, Stages] | None = None,
+        manoeuvres: Mapping[str, Stages] | None = None, tick_us: int = TICK_US,
     ) -> None:  # fmt: skip
         self.simulation = Simulation(config)
         self.frames = FrameSession() if frames is None else frames
         self._free = frames is None
+        self._tick_us = tick_us
         self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier, manoeuvres=manoeuvres)
         self.clock = clock or VirtualClock()
         self.received = self.sent = 0
@@ -69,7 +71,7 @@ class VirtualVehicle:
             self._send(frames, events)
             if self.clock.elapsed_us >= end_us or any(not isinstance(event, Readings) for event in events):
                 return events
-            self.clock.elapsed_us = min(end_us, self.clock.elapsed_us + TICK_US)
+            self.clock.elapsed_us = min(end_us, self.clock.elapsed_us + self._tick_us)
             self._take(self.simulation.advance(self.clock.elapsed_us), events)
 
     def begin(self, command: Command, now_us: int) -> None:

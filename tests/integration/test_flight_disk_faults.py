@@ -37,8 +37,9 @@ class Watched:
         bundle = case.seal(case.mission(case.short_steps()), policy)
         self.disk = FaultyDisk()
         self.flight = Flight(
-            bundle, case.simulated("px4"), sink=lambda clock: DiskSink(folder / "log.jsonl", self.disk, clock)
-        )
+            bundle, case.simulated("px4", land_mm_s=None),  # disks that are well again are so before it is down
+            sink=lambda clock: DiskSink(folder / "log.jsonl", self.disk, clock),
+        )  # fmt: skip
         self.sent: list[tuple[float, str]] = []
         begin = self.flight.vehicle.begin
 

@@ -13,6 +13,7 @@ from rtshcua.evidence.report import Verdict
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.runtime.view import Stage
 from rtshcua.simulation.faults import LinkReorder, LinkSilence, Way, WindStep
+from rtshcua.virtual.vehicle import TICK_US
 from virtual import case
 from virtual.flight import Flight, Flown
 from virtual.shipped import shipped, simulated
@@ -59,7 +60,8 @@ STAGES: dict[str, Callable[[Flight], bool]] = {
 
 def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
     """The standard mission; what falls back does so for the wind."""
-    flight = Flight(shipped("standard"), simulated(flavour, seed=round(seconds * 10)))
+    # heard this often, frames that come in another order are as many apart as they are on a real link
+    flight = Flight(shipped("standard"), simulated(flavour, seed=round(seconds * 10)), tick_us=TICK_US)
     since_us: list[int] = []
     blown: list[bool] = []
     under_way = WAITED if stage == "waiting" else UNDER_WAY

@@ -19,6 +19,7 @@ from reference.verifiers import ROOT_KEY, agree
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit, audit
 from rtshcua.simulation.faults import BatteryLevel, Fault
+from rtshcua.virtual.vehicle import TICK_US
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
 from virtual.flight import Flight
@@ -32,8 +33,9 @@ STRANGER = b"\x77" * 32
 
 def flown(bundle: bytes, *faults: Fault) -> tuple[bytes, ...]:
     """The lines of a flight's log."""
-    # tests/vectors/log were flown with a return at this height
-    return tuple(Flight(bundle, case.simulated("px4", return_mm=30 * case.M, faults=faults)).fly().lines)
+    # tests/vectors/log were flown with a return at this height, landing as it comes, and heard this often
+    config = case.simulated("px4", return_mm=30 * case.M, land_mm_s=None, faults=faults)
+    return tuple(Flight(bundle, config, tick_us=TICK_US).fly().lines)
 
 
 @cache

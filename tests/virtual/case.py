@@ -17,6 +17,10 @@ from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 
 S, MIN, M = flat.S, flat.MIN, flat.M
+#: as fast as it comes down anyway
+LAND_MM_S = 1_500
+#: as low as a leg may be
+LOW = 5 * M
 YEAR_US = 366 * 24 * 3_600 * S
 
 SOURCES = {
@@ -71,6 +75,14 @@ def short_steps() -> tuple[Invocation, ...]:
     )
 
 
+def low_steps(*, leg: bool = True) -> tuple[Invocation, ...]:
+    """The same at the least height, and soon over; without a leg, up and home."""
+    up, there, back = short_steps()
+    up = step(0, 0, flat.TAKEOFF, Plan(MotionKind.CLIMB, (), LOW, 0), LOW)
+    there = step(1, 1, flat.GOTO, Plan(MotionKind.FLY, (30 * M, 0), LOW, 0), 30 * M, 0, LOW)
+    return (up, there, back) if leg else (up, replace(back, step=1))
+
+
 def mission(steps: Sequence[Invocation] | None = None, issued_at_us: int = flat.ISSUED) -> Mission:
     """The reference mission, or one of these steps, issued at a UTC time."""
     chosen = flat.INVOCATIONS if steps is None else steps
@@ -107,6 +119,8 @@ def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
     return made, made.sign(KEYS[Duty.ROOT])
 
 
-def simulated(flavour: str, *, return_mm: int = 16 * M, **fields: object) -> SimulationConfig:
-    """A simulated vehicle that fits the policy; it returns little above where it flies, and so is down soon."""
-    return SimulationConfig(flavour=Kind(flavour), return_mm=return_mm, **fields)
+def simulated(
+    flavour: str, *, return_mm: int = 16 * M, land_mm_s: int | None = LAND_MM_S, **fields: object
+) -> SimulationConfig:
+    """A simulated vehicle that fits the policy; it returns little above where it flies and lands fast: down soon."""
+    return SimulationConfig(flavour=Kind(flavour), return_mm=return_mm, land_mm_s=land_mm_s, **fields)

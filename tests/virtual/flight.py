@@ -9,6 +9,8 @@ from rtshcua.virtual.flight import FlownFlight, VirtualFlight
 from rtshcua.wire.keys import Duty
 from virtual import case
 
+#: longer than a user's flight has, and so cheaper
+TICK_US = 50_000
 UTC_US = case.flat.ISSUED + 60 * case.S
 
 
@@ -26,6 +28,8 @@ class Flight(VirtualFlight):
 
     flown = Flown
 
-    def __init__(self, bundle: bytes, config: SimulationConfig, *, utc_us: int = UTC_US, **more: Any) -> None:
+    def __init__(
+        self, bundle: bytes, config: SimulationConfig, *, utc_us: int = UTC_US, tick_us: int = TICK_US, **more: Any
+    ) -> None:
         _, root = case.root()
-        super().__init__(bundle, config, root=root, log_key=case.KEYS[Duty.LOG], utc_us=utc_us, **more)
+        super().__init__(bundle, config, root=root, log_key=case.KEYS[Duty.LOG], utc_us=utc_us, tick_us=tick_us, **more)

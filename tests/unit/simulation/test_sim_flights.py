@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.surroundings import Wind
 
@@ -49,6 +50,19 @@ def test_out_and_home(
     assert (abs(t.north_mm) < 700, abs(t.east_mm) < 700, t.up_mm) == (True, True, 0)
     p.wait(1)
     assert p.last("HEARTBEAT").base_mode & 128 == 0
+
+
+def test_it_lands_as_fast_as_its_owner_says(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour, land_mm_s=1_200)
+    p.take_off(8)
+    p.mode(Mode.LAND)
+    p.until(lambda: p.truth.up_mm < 2_000)
+    assert -1_300 < p.truth.climb_mm_s < -1_100
+    p.until(lambda: not p.truth.armed)
+    assert not p.truth.crashed
+    for wrong in (99, 2_001):
+        with pytest.raises(ValueError, match="a landing is from 100 to 2000 mm/s"):
+            SimulationConfig(land_mm_s=wrong)
 
 
 def test_return_climbs_first(pilot: Callable[..., Any], flavour: str) -> None:

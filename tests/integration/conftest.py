@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from reference.verifiers import agree, careful
 from rtshcua.adapters.files.keystore import KeyStore
@@ -119,15 +120,25 @@ class Ground:
         self.command, self.speed = COMMAND, SPEED
         self.started: list[Run] = []
 
-    def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight") -> str:
-        """A bundle issued now, of these steps or else the short ones; its file's name."""
+    def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight", return_mm: int = case.LOW) -> str:
+        """A bundle issued now, of these steps or else the low ones; its file's name. 0: any height to return at."""
         keys = {duty: self.store.signing_key(duty) for duty in (Duty.POLICY, Duty.MISSION)}
-        mission = case.mission(case.short_steps() if steps is None else steps, time.time_ns() // 1_000)
-        (self.folder / f"{name}.bundle").write_bytes(case.seal(mission, keys=keys))
+        mission = case.mission(case.low_steps() if steps is None else steps, time.time_ns() // 1_000)
+        policy = case.policy()
+        policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=return_mm))
+        (self.folder / f"{name}.bundle").write_bytes(case.seal(mission, policy, keys))
         return f"{name}.bundle"
 
     def start(self, *words: str) -> Run:
         self.started.append(Run(self.folder, [*self.command, *words], self.environment))
+        return self.started[-1]
+
+    def vehicle(self, port: int, speed: int = SPEED, *words: str) -> Run:
+        """A simulated vehicle for a run that does not start its own; it is ready."""
+        command = [sys.executable, "-m", "rtshcua.simulation", "--port", str(port), "--speed", str(speed)]
+        returning = ["--return-at", str(case.LOW // case.M)]
+        self.started.append(Run(self.folder, [*command, *returning, *words], self.environment))
+        self.started[-1].until("ready")
         return self.started[-1]
 
     def run(self, bundle: str, *words: str, speed: int = SPEED) -> Run:

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from virtual import case
+
 IDENTITY = ("--vehicle", "quad-07")
 
 
@@ -99,7 +101,7 @@ def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
 
 
 def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
-    run = ground.run(ground.bundle())
+    run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
     os.kill(run.child("rtshcua.cli.live"), signal.SIGKILL)
     assert run.end().code == 74  # it flew, and nobody was told all of it
@@ -107,7 +109,7 @@ def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
 
 
 def test_a_view_that_is_stopped_stops_nothing(ground: Any) -> None:
-    run = ground.run(ground.bundle())
+    run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
     view = run.child("rtshcua.cli.live")
     os.kill(view, signal.SIGSTOP)
@@ -163,11 +165,9 @@ class Relay(threading.Thread):
 def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
     relay = Relay(port)
     relay.start()
-    vehicle = ground.start("sim", "--port", str(relay.port), "--speed", str(ground.speed), "--json")
-    vehicle.until("ready", flavour="px4", peer=relay.port)
-    run = ground.run(ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY).end()
+    ground.vehicle(relay.port, speed=3)  # slower: all the garbage is read, and what is permitted for 1.5 s must leave
+    bundle = ground.bundle(case.low_steps(leg=False))
+    run = ground.run(bundle, "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY, speed=3).end()
     assert run.code == 0, run.stderr
     closed(run, "completed")
     assert relay.added > 1_000
-    vehicle.signal(signal.SIGINT)
-    assert vehicle.end().code == 0

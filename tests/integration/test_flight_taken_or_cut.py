@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 #: so slow that a busy machine's hold-ups stay below what counts as silence
-SPEED = 5
+SPEED = 3
 FLAVOURS = ("px4", "ardupilot")
 
 

@@ -20,6 +20,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink import tlog
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
+from virtual.forked import Forked
 
 
 class Flown(NamedTuple):
@@ -83,7 +84,7 @@ def signed(grounds: Any, free_port: Any, tmp_path_factory: pytest.TempPathFactor
         ready = vehicle.until("ready")
         assert (ready["flavour"], ready["peer"]) == ("ardupilot", port)
         link = ["--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", *key, "--unsigned-radio"]
-        bundle = ground.bundle()
+        bundle = ground.bundle(return_mm=0)
         run = ground.run(bundle, *link, "--witness", f"udpout:127.0.0.1:{free_port()}").end()
         assert run.code == ExitCode.OK, run.stderr
         vehicle.signal(signal.SIGINT)
@@ -97,12 +98,19 @@ def flown(request: pytest.FixtureRequest) -> Flown:
     return found
 
 
-def audited(ground: Any, folder: Path) -> dict[str, Any]:
+def said(commands: Forked, ground: Any, *words: str) -> list[dict[str, Any]]:
+    """What a command that goes well says, on the ground's machine."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("RTSHCUA_DATA_DIR", "TZ"):
+            patch.setenv(name, ground.environment[name])
+        done = commands.run([*words, "--json"], ground.folder, 60)
+    assert done.code == ExitCode.OK, done
+    return [json.loads(line) for line in done.out.splitlines()]
+
+
+def audited(commands: Forked, ground: Any, folder: Path) -> dict[str, Any]:
     """What `verify-log --audit` says of a sound log."""
-    run = ground.start("verify-log", str(folder / "log.jsonl"), "--audit", "--json")
-    out = run.process.stdout.read()
-    assert run.process.wait(60) == ExitCode.OK
-    found: dict[str, Any] = json.loads(out)
+    (found,) = said(commands, ground, "verify-log", str(folder / "log.jsonl"), "--audit")
     return found
 
 
@@ -148,9 +156,9 @@ def test_dry_run_decides_the_mission_and_leaves_nothing_behind(watched: Flown) -
     """The bundle flew after it, in the only folder of a run that there is."""
     (rehearsal,) = watched.others
     assert rehearsal.code == ExitCode.OK, rehearsal.stderr
-    (said,) = rehearsal.events
-    assert (said["event"], said["ready"], said["exit_code"]) == ("rehearsal", True, 0)
-    assert {step["outcome"] for step in said["steps"]} == {"allow"}
+    (told,) = rehearsal.events
+    assert (told["event"], told["ready"], told["exit_code"]) == ("rehearsal", True, 0)
+    assert {step["outcome"] for step in told["steps"]} == {"allow"}
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
 
 
@@ -200,14 +208,16 @@ def test_signatures_are_not_in_the_raw_frames_and_what_they_promise_is_kept(sign
 # ------------------------------------------------------------------------------------------- witnesses
 
 
-def test_flight_that_two_witnesses_watch_is_anchored_to_its_end(watched: Flown, tmp_path: Path) -> None:
+def test_flight_that_two_witnesses_watch_is_anchored_to_its_end(
+    commands: Forked, watched: Flown, tmp_path: Path
+) -> None:
     count = len(watched.run.log())
     assert watched.run.effects().count("anchored") >= 4
-    assert audited(watched.ground, watched.run.folder)["anchored"] == count
+    assert audited(commands, watched.ground, watched.run.folder)["anchored"] == count
     # Without what stands beside the log it is anchored as far as its own records say, and says what is not.
     folder = kept(watched, tmp_path)
     (folder / "log.anchors").unlink()
-    assert 0 < audited(watched.ground, folder)["anchored"] < count
+    assert 0 < audited(commands, watched.ground, folder)["anchored"] < count
 
 
 def test_witness_notices_a_log_that_was_cut(watched: Flown, tmp_path: Path) -> None:
@@ -218,10 +228,10 @@ def test_witness_notices_a_log_that_was_cut(watched: Flown, tmp_path: Path) -> N
     assert watched.ground.start("witness", str(log), "--json").end().code == ExitCode.ANCHOR
 
 
-def test_flight_whose_witness_is_not_there_says_so(signed: Flown) -> None:
+def test_flight_whose_witness_is_not_there_says_so(commands: Forked, signed: Flown) -> None:
     assert any("did not cosign the end of the log" in str(event) for event in signed.run.events)
     assert "anchored" not in signed.run.effects()
-    assert audited(signed.ground, signed.run.folder)["anchored"] == 0
+    assert audited(commands, signed.ground, signed.run.folder)["anchored"] == 0
 
 
 # ---------------------------------------------------------------------------------------------- proofs
@@ -229,7 +239,7 @@ def test_flight_whose_witness_is_not_there_says_so(signed: Flown) -> None:
 PROOFS = ("whole", "part", "receipt", "since")
 
 
-def test_records_of_a_flight_are_proven_without_its_log(watched: Flown, tmp_path: Path) -> None:
+def test_records_of_a_flight_are_proven_without_its_log(commands: Forked, watched: Flown, tmp_path: Path) -> None:
     folder = kept(watched, tmp_path)
     assert (folder / "log.secret").stat().st_mode & 0o777 == 0o600
     records = watched.run.log()
@@ -237,11 +247,9 @@ def test_records_of_a_flight_are_proven_without_its_log(watched: Flown, tmp_path
     words = ([str(number)], [str(number), "--redact", "state,context"], [str(number), "--cose"], ["--since", "0"])
     made = [str(tmp_path / name) for name in PROOFS]
     for name, inputs in zip(made, words, strict=True):
-        assert watched.ground.start("prove", str(folder), *inputs, "-o", name, "--json").end().code == ExitCode.OK
+        said(commands, watched.ground, "prove", str(folder), *inputs, "-o", name)
     shutil.rmtree(folder)
-    verified = watched.ground.start("verify-proof", *made, "--json").end()
-    assert verified.code == ExitCode.OK, verified.events
-    whole, part, receipt, since = verified.events
+    whole, part, receipt, since = said(commands, watched.ground, "verify-proof", *made)
     assert whole["record"] == receipt["record"] == records[number]
     shown = {key: value for key, value in records[number].items() if key not in part["withheld"]}
     assert (part["record"], part["withheld"]) == (shown, ["_prev", "context", "state"])

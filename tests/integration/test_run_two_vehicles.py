@@ -16,6 +16,7 @@ def both(port: int) -> Iterator[list[str]]:
     with ExitStack() as stack:
         for system, flavour in ((1, "px4"), (2, "ardupilot")):
             words = ["--port", str(port), "--speed", "10", "--system", str(system), "--flavour", flavour]
+            words += ["--return-at", str(case.LOW // case.M)]
             stack.enter_context(Simulator(words))
         yield ["--connect", f"udpin:127.0.0.1:{port}"]
 

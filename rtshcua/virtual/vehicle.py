@@ -65,12 +65,14 @@ class VirtualVehicle:
         """Let time pass, at most `timeout_us`; comes back early for anything but readings."""
         events, self._pending = self._pending, []
         end_us = self.clock.elapsed_us + timeout_us
+        looked_at = 0
         while True:
             happened, frames = self.driver.tick(self.clock.monotonic_us)
             events += happened
             self._send(frames, events)
-            if self.clock.elapsed_us >= end_us or any(not isinstance(event, Readings) for event in events):
+            if self.clock.elapsed_us >= end_us or any(not isinstance(event, Readings) for event in events[looked_at:]):
                 return events
+            looked_at = len(events)
             self.clock.elapsed_us = min(end_us, self.clock.elapsed_us + self._tick_us)
             self._take(self.simulation.advance(self.clock.elapsed_us), events)
 

@@ -8,6 +8,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from math import dist
 from typing import Any
 
 from recorded.trace import CLIENT, SECOND, Heard, Question
@@ -203,11 +204,14 @@ def _stretches(
     """Where the sides differ by more than `limit`, and by what comes within `late_us` too."""
     worst: tuple[float, Heard, Any] | None = None
     start_us = 0
+    times, places = [h.at_us for h in own], [read(h.message) for h in own]
     for h in recorded:
-        at = min(max(bisect_left(own, h.at_us, key=_at), 0), len(own) - 1)
-        near = _between(own, h.at_us - late_us, h.at_us + late_us) if late_us else [own[at]]
-        real = read(h.message)
-        off, mine = min((_off(real, read(other.message)), read(other.message)) for other in near)
+        at = min(bisect_left(times, h.at_us), len(own) - 1)
+        real, mine = read(h.message), places[at]
+        off = _off(real, mine)
+        if late_us and (off > limit or times[at] >= h.at_us + late_us):
+            near = places[bisect_left(times, h.at_us - late_us) : bisect_left(times, h.at_us + late_us)]
+            off, mine = min((_off(real, other), other) for other in near)
         if off > limit:
             start_us = start_us if worst else h.at_us
             worst = max(worst or (0.0, h, mine), (off, h, mine), key=lambda w: w[0])
@@ -219,7 +223,7 @@ def _stretches(
 
 
 def _off(a: tuple[float, ...], b: tuple[float, ...]) -> float:
-    return sum((x - y) ** 2 for x, y in zip(a, b, strict=True)) ** 0.5
+    return dist(a, b)
 
 
 def _stretch(axis: str, start_us: int, end_us: int, worst: Any, read: Callable[[Any], Any]) -> Difference:

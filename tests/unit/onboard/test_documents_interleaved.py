@@ -119,6 +119,7 @@ def fly(acts: list[tuple[int, str, int]]) -> Run:
 STORIES = st.lists(st.tuples(MOMENT, ACTS, st.integers(0, 4)), max_size=8)
 
 
+@settings(max_examples=settings().max_examples * 2 // 5)
 @given(STORIES)
 def test_any_story_ends_and_is_proved(acts: list[tuple[int, str, int]]) -> None:
     fly(acts)

@@ -5,7 +5,7 @@ a fallback; anything after the end or after standing down. Always: an end, once 
 """
 
 from collections.abc import Callable
-from itertools import product
+from itertools import islice, product
 
 import pytest
 from msgspec.structs import replace
@@ -136,7 +136,8 @@ def assert_orderly(run: Run) -> None:
 
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_every_sequence_ends_and_nothing_is_sent_that_should_not_be(situation: str) -> None:
-    for sequence in product(EVENTS, repeat=DEPTH - 1):
+    """Each event first and each second in every situation, every pair in one; the other pairs are for soak."""
+    for sequence in islice(product(EVENTS, repeat=DEPTH - 1), [*SITUATIONS].index(situation), None, len(SITUATIONS)):
         explore(situation, sequence)
 
 

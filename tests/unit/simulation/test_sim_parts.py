@@ -5,7 +5,7 @@ from math import degrees, hypot, tan
 from random import Random
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -29,6 +29,7 @@ def test_the_distance_to_stop_is_the_inverse_of_the_speed_to_stop_from(
     assert abs(approach.distance(approach.speed(distance)) - distance) < 1e-6
 
 
+@settings(max_examples=settings().max_examples * 2 // 5)
 @given(
     st.sampled_from(list(Kind)),
     *[st.floats(-300, 300)] * 2,

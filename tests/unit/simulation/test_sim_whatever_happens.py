@@ -94,12 +94,12 @@ def fly(seed: int) -> None:
         battery = truth.battery
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_some_lives(seed: int) -> None:
     fly(seed)
 
 
 @pytest.mark.soak
 def test_many_lives() -> None:
-    for seed in range(8, 600):
+    for seed in range(4, 600):
         fly(seed)

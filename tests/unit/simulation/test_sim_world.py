@@ -197,7 +197,7 @@ def frame_of(number: int, kind: Any, payload: bytes) -> bytes:
     return sealed
 
 
-@settings(max_examples=settings().max_examples * 2 // 5)
+@settings(max_examples=settings().max_examples // 5)
 @given(
     st.sampled_from(list(Kind)),
     st.lists(

@@ -16,7 +16,7 @@ LINES = whole()
 DATA = b"".join(LINES)
 STARTS = (0, *accumulate(map(len, LINES)))
 SHARDS = 32
-STRIDE = 613  # of the sample: coprime to all that is regular in the log
+STRIDE = 1_013  # of the sample: coprime to all that is regular in the log
 
 
 @cache
@@ -88,7 +88,7 @@ def test_a_sample_of_its_cuts() -> None:
 
 
 def test_a_sample_of_its_records() -> None:
-    assert rearranged(range(0, RECORDS, 7)) == []
+    assert rearranged(range(0, RECORDS, 11)) == []
 
 
 @pytest.mark.soak

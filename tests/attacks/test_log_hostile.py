@@ -40,7 +40,7 @@ def test_no_number_is_too_large_to_refuse(number: int) -> None:
 
 
 def test_memory_does_not_grow_with_the_log() -> None:
-    """Six thousand effects take no more than a thousand do."""
+    """Three thousand effects take no more than a thousand do."""
 
     def long(count: int) -> Iterator[bytes]:
         genesis = read(LINES[0])
@@ -66,7 +66,7 @@ def test_memory_does_not_grow_with_the_log() -> None:
         assert auditor.audit().report.counts["effect"] == count
         return used
 
-    assert peak(6_000) < peak(1_000) + 20_000
+    assert peak(3_000) < peak(1_000) + 20_000
 
 
 def test_a_hostile_text_does_not_reach_the_terminal() -> None:

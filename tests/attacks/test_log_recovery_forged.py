@@ -69,8 +69,10 @@ def test_an_epoch_is_not_made_longer_by_it() -> None:
     """Recoveries are signed: the records between two are as many as between two seals."""
     recover = read(LINES[AT]) | {"at_us": MONOTONIC_US, "utc_us": read(LINES[0])["utc_us"] + 20_000}
     many = [genesis(), *(effect(10) for _ in range(2_048)), recover]
-    assert careful(b"".join(log(*many))).report.failure is None
-    agree(b"".join(log(*many)), careful(b"".join(log(*many))))
+    data = b"".join(log(*many))
+    audit = careful(data)
+    assert audit.report.failure is None
+    agree(data, audit)
     assert expect(log(*many[:-1], effect(10), recover)) == ("seal/missing", 2_049)
 
 

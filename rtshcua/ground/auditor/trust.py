@@ -1,5 +1,6 @@
 """What a log rests on: the trust root under the pinned key, the bundle under that root, and the log key's duty."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
@@ -38,20 +39,44 @@ def establish(genesis: Genesis, pinned: bytes, *, bundle: bytes | None = None) -
     `pinned` is the root's public key (32 bytes) or its `kid` (16 bytes). Everything is judged as of the genesis' UTC:
     what has expired since was good when it flew. `bundle` is what the log should be of, where the caller knows.
     """
+    trusted = _trusted(genesis, pinned)
+    if isinstance(trusted, Flaw):
+        return trusted
+    root, opened = trusted
+    if bundle not in (None, octets(genesis.bundle)):
+        return Flaw("genesis/other-bundle", "the log is of another bundle than the one that lies beside it")
+    prepared = _prepared(genesis, pinned)
+    if isinstance(prepared, Flaw):
+        return prepared
+    policy, invocations = prepared
+    return Basis(root, policy, InForce(opened, policy, invocations, root, genesis.vehicle))
+
+
+# A log that is asked several things (by the quick verifier and then the careful one, for one proof and the next) says
+# the same at its beginning each time: opening its bundle takes longer than reading a short log.
+_kept = lru_cache(maxsize=8)
+
+
+@_kept
+def _trusted(genesis: Genesis, pinned: bytes) -> tuple[TrustRoot, Bundle] | Flaw:
+    """The root and the bundle in a genesis, if they are to be trusted."""
     root, data = rooted(genesis, pinned), octets(genesis.bundle)
     if isinstance(root, Flaw):
         return root
     assert data is not None
     try:
-        opened = open_bundle(data, root=root, vehicle=genesis.vehicle, now_us=genesis.utc_us)
+        return root, open_bundle(data, root=root, vehicle=genesis.vehicle, now_us=genesis.utc_us)
     except Untrusted as error:
         return Flaw(f"trust/bundle-{error.slug}", f"the bundle is not to be trusted: {error}")
-    if bundle not in (None, data):
-        return Flaw("genesis/other-bundle", "the log is of another bundle than the one that lies beside it")
-    return _prepared(genesis, root, opened)
 
 
-def _prepared(genesis: Genesis, root: TrustRoot, bundle: Bundle) -> Basis | Flaw:
+@_kept
+def _prepared(genesis: Genesis, pinned: bytes) -> tuple[PreparedPolicy, tuple[PreparedInvocation, ...]] | Flaw:
+    """Policy and mission of such a bundle, compiled."""
+    trusted = _trusted(genesis, pinned)
+    if isinstance(trusted, Flaw):
+        return trusted
+    _, bundle = trusted
     if genesis.mission != bundle.mission.name:
         return Flaw(
             "genesis/mission", "the log names another mission than its bundle", genesis.mission, bundle.mission.name
@@ -62,4 +87,4 @@ def _prepared(genesis: Genesis, root: TrustRoot, bundle: Bundle) -> Basis | Flaw
     invocations = prepare_mission(bundle.mission, policy)
     if isinstance(invocations, Refusal):
         return Flaw("trust/bundle-malformed", f"the bundle's mission makes no sense: {invocations.text}")
-    return Basis(root, policy, InForce(bundle, policy, invocations, root, genesis.vehicle))
+    return policy, invocations

@@ -40,7 +40,7 @@ POINTS = ((473_978_000, 85_456_000), (473_979_000, 85_457_000))
 
 
 @pytest.mark.parametrize("kind", AUTOPILOTS)
-@settings(max_examples=settings().max_examples * 4)
+@settings(max_examples=settings().max_examples * 2)
 @given(data=some.data())
 def test_the_same_frames_carry_out_the_same_commands(kind: str, data: some.DataObject) -> None:
     frame = data.draw(some.sampled_from(commands(kind)))

@@ -93,7 +93,6 @@ def covered(of: Case, octets: bytes, at_us: int, autopilot: int) -> bool:
 
 
 @pytest.mark.parametrize("kind", AUTOPILOTS)
-@settings(max_examples=settings().max_examples * 2)
 @given(data=some.data())
 def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
     of, autopilot = flown(kind), AUTOPILOTS[kind]

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from math import cos, radians
+from math import cos, inf, radians
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -56,7 +56,8 @@ class Recorded:
     The recording holds only what the vehicle sent, and to another client. So nothing of it answers what the driver
     asks: `parameters` and the last mode are told to it instead, and its fence is left alone. TIMESYNC is answered after
     `round_trip_us`, by the time since boot that the recorded stamps show. `commands` are begun at their second, as if
-    the recorded client's had been ours; with `acknowledges`, whatever is commanded is acknowledged.
+    the recorded client's had been ours; with `acknowledges`, whatever is commanded is acknowledged. What came after
+    `until_s` is left out.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Recorded:
     parameters: dict[str, float]
     commands: Sequence[tuple[float, Command]] = ()
     acknowledges: bool = False
+    until_s: float = inf
     events: list[tuple[float, Event]] = field(default_factory=list)
     states: list[dict[str, int | None]] = field(default_factory=list)
     sent: list[tuple[float, Received]] = field(default_factory=list)
@@ -85,6 +87,8 @@ class Recorded:
         self.states.append(self._state())
         waiting = list(self.commands)
         for entry in self._entries():
+            if entry.at_us > START_US + self.until_s * SECOND:
+                break
             while self._now_us < entry.at_us:
                 next_us = min(entry.at_us, self._now_us + TICK_US)
                 self._pass(next_us, waiting)

@@ -37,14 +37,14 @@ class Recorded(NamedTuple):
 
 @cache
 def recorded(fault: str, flavour: str, mode: Mode = Mode.SOFTWARE) -> Recorded:
-    """A mission with one of `FAULTS`. A vehicle that is never heard again flies for 4 minutes at most."""
+    """A mission with one of `FAULTS`. A vehicle that is never heard again flies for 2 minutes at most."""
     return once(f"{fault}-{flavour}-{mode}", lambda: _flown(fault, flavour, mode))
 
 
 def _flown(fault: str, flavour: str, mode: Mode) -> Recorded:
     policy = case.policy()
     if fault == "silence":
-        policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=4 * MIN))
+        policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=2 * MIN))
     steps = None if fault in WHOLE else case.short_steps()
     flight = Flight(case.seal(case.mission(steps), policy), case.simulated(flavour, faults=FAULTS[fault]), mode=mode)
     entries = kept(flight)

@@ -422,7 +422,7 @@ def damage(of: Random, struct: Any) -> Any:
         return struct
 
 
-@settings(max_examples=settings().max_examples * 8)
+@settings(max_examples=settings().max_examples * 4)
 @given(worlds.CHANCES)
 def test_no_damage_makes_it_fail(of: Random) -> None:
     whole = of.choice([worlds.policy(of), flat.POLICY])

@@ -105,7 +105,7 @@ def test_a_link_that_was_slow_from_the_beginning_counts_the_way_up_as_well(flavo
     """Nothing tells how a round trip is divided: all of it may have been the way down."""
     one = Watched(flavour)
     one.delay(700_000)
-    one.wait(40)
+    one.wait(25)
     for _ in range(20):
         one.wait(0.2)
         state = one.monitor.state(one.now_us)
@@ -113,7 +113,7 @@ def test_a_link_that_was_slow_from_the_beginning_counts_the_way_up_as_well(flavo
         assert all(1_390_000 <= age_us < 1_400_000 + 1_200_000 for age_us in ages), ages
     assert {"position", "height"} <= one.known()
     one.delay(1_100_000)
-    one.wait(100)
+    one.wait(30)
     assert one.known() == set()
 
 

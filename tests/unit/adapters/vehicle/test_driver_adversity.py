@@ -49,9 +49,10 @@ def test_pilot_takes_over_while_it_flies(aloft: Make, flavour: str) -> None:
     taken = one.until(TakenOver, 5)
     assert taken.how == {"px4": "Position", "ardupilot": "POSHOLD"}[flavour]
     assert taken.at_us - begun < 500_000  # the heartbeat was asked for at 5 Hz
-    assert not any(isinstance(event, (TakenOver, Failed, Succeeded)) for event in one.wait(30))
+    assert not any(isinstance(event, (TakenOver, Failed, Succeeded)) for event in one.wait(10))
 
 
+@OTHER_FLAVOUR
 def test_pilot_takes_over_after_the_last_command_succeeded(aloft: Make) -> None:
     one = aloft()
     one.wait(5)
@@ -59,7 +60,9 @@ def test_pilot_takes_over_after_the_last_command_succeeded(aloft: Make) -> None:
     one.until(TakenOver, 5)
 
 
-@pytest.mark.parametrize("kind", [MotionKind.FLY, MotionKind.HOLD, MotionKind.HOME])
+@pytest.mark.parametrize(
+    ("kind", "flavour"), each_once([MotionKind.FLY, MotionKind.HOLD, MotionKind.HOME], ["px4", "ardupilot"])
+)
 def test_its_own_failsafe_takes_over(aloft: Make, kind: MotionKind) -> None:
     one = aloft()
     one.begin(kind, *([(300_000, 0)] if kind == MotionKind.FLY else []), altitude=20_000)
@@ -68,6 +71,7 @@ def test_its_own_failsafe_takes_over(aloft: Make, kind: MotionKind) -> None:
     assert one.until(TakenOver, 10).how in ("Land", "LAND", "landing", "another target"), "whatever shows first"
 
 
+@ONE_FLAVOUR
 def test_nothing_more_is_sent_after_release(aloft: Make) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000)
@@ -151,6 +155,7 @@ def test_flies_on_a_poor_and_slow_link(flyer: Make) -> None:
     assert isinstance(one.fly(MotionKind.HOME), Succeeded)
 
 
+@OTHER_FLAVOUR
 def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     """It hears nothing of ours, though we hear it: nothing is known of the command but that it did not arrive."""
     one = flyer()
@@ -183,6 +188,7 @@ def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -
     assert isinstance(said, LinkBack), "not that it answers again, before it was heard"
 
 
+@OTHER_FLAVOUR
 def test_a_command_that_is_never_answered_while_questions_are_has_failed(flyer: Make) -> None:
     one = flyer()
     one.until(Ready)
@@ -205,6 +211,7 @@ def test_a_hurried_vehicle_is_given_more_time(flyer: Make) -> None:
     assert 3.5 < waits[1] / waits[0] < 4.5
 
 
+@ONE_FLAVOUR
 def test_stopping_short_is_a_failure(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """It stands, and goes on saying that it flies to our target."""
     one = aloft()
@@ -249,6 +256,7 @@ def test_garbage_and_foreign_systems_change_nothing(flyer: Make) -> None:
     assert [e.airborne for e in one.events if isinstance(e, AirState)].count(True) == 1
 
 
+@OTHER_FLAVOUR
 def test_an_acknowledgement_for_somebody_else_is_not_ours(flyer: Make) -> None:
     autopilot = Codec(1, 1)
     refusal = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 4, 0, 0, 255, 190)
@@ -258,6 +266,7 @@ def test_an_acknowledgement_for_somebody_else_is_not_ours(flyer: Make) -> None:
     assert isinstance(one.fly(MotionKind.CLIMB, altitude=20_000), Succeeded)
 
 
+@ONE_FLAVOUR
 def test_silence_is_noticed_and_so_is_its_end(aloft: Make) -> None:
     one = aloft()
     one.vehicle.simulation.inject(LinkSilence(one.vehicle.simulation.now_us, 14_000_000))
@@ -269,6 +278,7 @@ def test_silence_is_noticed_and_so_is_its_end(aloft: Make) -> None:
     one.until(LinkBack, 3)
 
 
+@OTHER_FLAVOUR
 def test_streams_that_stop_are_asked_for_again(flyer: Make) -> None:
     one = flyer()
     one.until(Ready)
@@ -279,6 +289,7 @@ def test_streams_that_stop_are_asked_for_again(flyer: Make) -> None:
     assert any(slot == 1 for event in one.events if isinstance(event, Readings) for slot, _ in event.values)
 
 
+@ONE_FLAVOUR
 def test_a_vehicle_far_from_the_policys_home_is_not_ready(flyer: Make) -> None:
     one = flyer(home=Home(473_977_400, 85_475_900, 488_000))
     assert not any(isinstance(event, Ready) for event in one.wait(10))

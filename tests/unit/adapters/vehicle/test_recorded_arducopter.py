@@ -133,5 +133,5 @@ def test_a_critical_state_is_told_though_the_mode_stays(watched: Recorded) -> No
 
 
 def test_a_return_altitude_that_differs_keeps_it_from_being_ready() -> None:
-    other = Recorded("arducopter", 1_000_000, at_home(*HOME), {"RTL_ALT": 1_500.0})
+    other = Recorded("arducopter", 1_000_000, at_home(*HOME), {"RTL_ALT": 1_500.0}, until_s=ARMED)
     assert not [at for at, _ in other.of(Ready) if at < ARMED]

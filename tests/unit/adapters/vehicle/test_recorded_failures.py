@@ -24,8 +24,8 @@ def hover(token: int = 2) -> Any:
     return command(token, MotionKind.HOLD)
 
 
-def flown(name: str, *commands: tuple[float, Any]) -> Recorded:
-    return Recorded(name, 0, shipped_policy(), {"RTL_RETURN_ALT": 30.0}, commands, acknowledges=True)
+def flown(name: str, *commands: tuple[float, Any], until_s: float) -> Recorded:
+    return Recorded(name, 0, shipped_policy(), {"RTL_RETURN_ALT": 30.0}, commands, acknowledges=True, until_s=until_s)
 
 
 def legs_sent(of: Recorded) -> list[float]:
@@ -40,7 +40,7 @@ def legs_sent(of: Recorded) -> list[float]:
 
 def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
     """It flew on at 4.5 to 5.6 m/s for the 10 s of the hover, about 46 m, and the hover counted as flown."""
-    seen = flown("px4-hover-does-not-stop", (21.27, leg()), (25.71, hover()))
+    seen = flown("px4-hover-does-not-stop", (21.27, leg()), (25.71, hover()), until_s=31)
     (at, failed), *_ = seen.of(Failed)
     assert (failed.token, failed.reason) == (2, "did-not-stop")
     assert 28 < at < 30
@@ -48,7 +48,7 @@ def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
 
 def test_a_landing_between_two_heartbeats_is_seen_and_the_next_leg_never_leaves() -> None:
     """No HEARTBEAT shows the pilot's Land: the landed state does from 17.38 s on, the target before it."""
-    seen = flown("px4-takeover-race", (12.0, hover()), (18.15, leg(3)))
+    seen = flown("px4-takeover-race", (12.0, hover()), (18.15, leg(3)), until_s=40)
     (at, taken), *_ = seen.of(TakenOver)
     assert 17.25 < at < 17.5
     assert taken.how in ("landing", "another target")
@@ -60,7 +60,7 @@ def test_a_landing_between_two_heartbeats_is_seen_and_the_next_leg_never_leaves(
 )
 def test_a_pause_and_a_go_to_without_a_change_of_mode_are_seen(name: str, begun: float, taken_at: float) -> None:
     """The pause was told as `stopped-short` after 12 s; the other way was flown for 41 s, unnoticed."""
-    seen = flown(name, (begun, leg()))
+    seen = flown(name, (begun, leg()), until_s=60)
     (at, taken), *_ = seen.of(TakenOver)
     assert taken_at - 0.1 < at < taken_at + 0.3
     assert taken.how == "another target"
@@ -72,13 +72,13 @@ def test_a_guided_target_is_not_overwritten() -> None:
 
     That autopilot was not asked for its target, so the recording cannot show whose it flew to.
     """
-    seen = flown("arducopter-pilot-goto", (18.6, leg()))
+    seen = flown("arducopter-pilot-goto", (18.6, leg()), until_s=61)
     assert len([at for at in legs_sent(seen) if at < 60]) <= 2
 
 
 def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:
     """On the first frames after 5 s of silence every other signal was stale: what is judged there lands the vehicle."""
-    seen = flown("arducopter-dropout", (14.5, leg()))
+    seen = flown("arducopter-dropout", (14.5, leg()), until_s=60)
     (lost, why), *_ = seen.of(LinkLost)
     (back, _), *_ = seen.of(LinkBack)
     assert why.why == "silent"

@@ -23,6 +23,7 @@ from rtshcua.simulation.faults import Fault, LinkDelay, PilotGoto, PilotMode, Pi
 from rtshcua.simulation.modes import Mode
 from virtual.copying import copied
 from virtual.policy import POLICY
+from virtual.sampling import each_once
 
 Make = Callable[..., Any]
 ASKS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
@@ -90,7 +91,7 @@ def test_a_takeover_in_a_leg_is_seen_and_not_fought(aloft: Make, flavour: str, n
     assert sent.at_us == []
 
 
-@pytest.mark.parametrize("name", ["go-to", "land", "position"])
+@pytest.mark.parametrize(("name", "flavour"), each_once(["go-to", "land", "position"], ["px4", "ardupilot"]))
 def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(aloft: Make, name: str) -> None:
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000, speed=5_000), Succeeded)
@@ -138,8 +139,9 @@ def test_our_own_targets_are_nobody_elses(aloft: Make) -> None:
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=8_000)
     one.wait(6)
     assert isinstance(one.fly(MotionKind.HOLD, hold_us=5 * S), Succeeded)
-    assert isinstance(one.fly(MotionKind.FLY, (0, 0), altitude=30_000, speed=8_000), Succeeded)
-    assert isinstance(one.fly(MotionKind.HOME), Succeeded)
+    assert isinstance(one.fly(MotionKind.FLY, (0, 0), altitude=24_000, speed=8_000), Succeeded)
+    one.begin(MotionKind.HOME)
+    one.wait(8)
     assert not any(isinstance(event, TakenOver) for event in one.events)
 
 
@@ -236,7 +238,7 @@ def try_all(aloft: Make, flavour: str, name: str, *, whole: bool) -> None:
         holds(copied(flights[delay_us]), flavour, name, acts_us, phase_us, delay_us)
 
 
-@pytest.mark.parametrize("name", ["land", "go-to"])
+@pytest.mark.parametrize(("name", "flavour"), each_once(["land", "go-to"], ["px4", "ardupilot"]))
 def test_no_frame_leaves_later_than_w(aloft: Make, flavour: str, name: str) -> None:
     try_all(aloft, flavour, name, whole=False)
 

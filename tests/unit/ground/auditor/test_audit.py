@@ -33,7 +33,7 @@ def fly(*faults: Fault, of: Mission | None = None) -> list[bytes]:
     ("behaviour", "kind"), each_once(OnInadmissible, ["wind", "no fix for a while", "low battery"])
 )
 def test_whatever_the_mission_does_when_a_step_is_not_admitted(behaviour: OnInadmissible, kind: str) -> None:
-    mission = case.mission()
+    mission = case.mission(case.short_steps())
     steps = tuple(replace(step, on_inadmissible=behaviour) for step in mission.invocations)
     sound(fly(*FAULTS[kind], of=replace(mission, invocations=steps)))
 

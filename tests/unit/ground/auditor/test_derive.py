@@ -6,11 +6,12 @@ import pytest
 from msgspec.structs import replace
 
 from reference.forgery import edit, expect, other_flight, prove, read, signed
-from rtshcua.simulation.faults import BatteryLevel, WindStep
+from reference.kinds_of_flight import recorded
+from rtshcua.simulation.faults import BatteryLevel
 from virtual import case
 from virtual.flight import Flight
 
-M, S = case.M, case.S
+M = case.M
 
 
 @cache
@@ -24,11 +25,9 @@ def denied_in_the_air() -> tuple[bytes, ...]:
     return tuple(Flight(case.seal(replace(mission, invocations=steps)), case.simulated("px4")).fly().lines)
 
 
-@cache
 def fallen_back() -> tuple[bytes, ...]:
     """The wind rises above the limit: the chain of the step flies."""
-    config = case.simulated("px4", faults=(WindStep(20 * S, 14 * M),))
-    return tuple(Flight(case.seal(case.mission(case.short_steps())), config).fly().lines)
+    return recorded("wind", "px4").lines
 
 
 def decisions(lines: tuple[bytes, ...], kind: int) -> list[int]:

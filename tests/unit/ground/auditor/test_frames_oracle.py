@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from reference.forgery import ROOT_KEY
-from reference.kept_frames import Entries, kept
+from reference.kept_frames import Entries
+from reference.kinds_of_flight import recorded
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect, Genesis
 from rtshcua.ground.auditor.frames import OURS, Frames
@@ -22,9 +23,7 @@ from rtshcua.onboard.enforcement.allow_list import carries_out
 from rtshcua.onboard.enforcement.allow_list import read_frame as read_shape
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Command
-from rtshcua.simulation.faults import WindStep
 from virtual import case
-from virtual.flight import Flight
 
 AUTOPILOTS = {"px4": PX4, "ardupilot": ARDUPILOT}
 
@@ -50,10 +49,8 @@ class Case(NamedTuple):
 
 @cache
 def flown(kind: str) -> Case:
-    config = case.simulated(kind, faults=(WindStep(40 * case.S, 14 * case.M),))
-    flight = Flight(case.seal(case.mission()), config)
-    entries = kept(flight)
-    records = [read(line) for line in flight.fly().lines]
+    lines, entries = recorded("wind", kind)
+    records = [read(line) for line in lines]
     genesis = records[0]
     assert isinstance(genesis, Genesis)
     basis = establish(genesis, ROOT_KEY)

@@ -23,7 +23,6 @@ from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
 from rtshcua.wire.response import Status, encode_refusal
 
-
 #: it is waited for as long as it can fly: less than that of others, so that this is soon over
 SHORT = replace(POLICY.vehicle, endurance_us=4 * MIN)
 OF = loaded(replace(POLICY, vehicle=SHORT))

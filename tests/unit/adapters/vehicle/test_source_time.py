@@ -315,7 +315,6 @@ links = st.builds(
 )
 
 
-@settings(max_examples=settings().max_examples * 2)
 @given(
     links,
     st.integers(0, 1 << 30),
@@ -356,7 +355,7 @@ def kinds() -> list[Any]:
     return [kind for kind in map(kind_of, every) if kind is not None]
 
 
-@settings(max_examples=settings().max_examples * 4)
+@settings(max_examples=settings().max_examples * 2)
 @given(st.data())
 def test_hostile_frames_neither_raise_nor_make_anything_younger_than_it_came(data: st.DataObject) -> None:
     ear = Ear()

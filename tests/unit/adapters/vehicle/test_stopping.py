@@ -56,9 +56,7 @@ def test_a_climb_is_stopped(flyer: Make) -> None:
     stops(one)
 
 
-@pytest.mark.parametrize(
-    ("kind", "flavour"), each_once([MotionKind.HOME, MotionKind.LAND], ["px4", "ardupilot"])
-)
+@pytest.mark.parametrize(("kind", "flavour"), each_once([MotionKind.HOME, MotionKind.LAND], ["px4", "ardupilot"]))
 def test_a_return_and_a_landing_are_stopped(aloft: Make, kind: MotionKind) -> None:
     one = aloft(40_000)
     one.fly(MotionKind.FLY, (60_000, 0), altitude=40_000, speed=8_000)

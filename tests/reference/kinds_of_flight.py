@@ -7,6 +7,8 @@ from msgspec.structs import replace
 
 from reference.flat_case import MIN, M, S
 from reference.kept_frames import Entries, kept
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.simulation.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
 from virtual import case
@@ -41,11 +43,25 @@ def recorded(fault: str, flavour: str, mode: Mode = Mode.SOFTWARE) -> Recorded:
     return once(f"{fault}-{flavour}-{mode}", lambda: _flown(fault, flavour, mode))
 
 
+@cache
+def fallen_back(flavour: str) -> Recorded:
+    """The wind rises above the limit on the leg: the chain of the step flies."""
+    return once(f"fallen_back-{flavour}", lambda: _fly(flavour, (WindStep(20 * S, 14 * M),), case.short_steps()))
+
+
 def _flown(fault: str, flavour: str, mode: Mode) -> Recorded:
     policy = case.policy()
     if fault == "silence":
         policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=2 * MIN))
     steps = None if fault in WHOLE else case.short_steps()
-    flight = Flight(case.seal(case.mission(steps), policy), case.simulated(flavour, faults=FAULTS[fault]), mode=mode)
+    return _fly(flavour, FAULTS[fault], steps, policy, mode)
+
+
+def _fly(
+    flavour: str, faults: tuple[Fault, ...], steps: tuple[Invocation, ...] | None, policy: Policy | None = None,
+    mode: Mode = Mode.SOFTWARE,
+) -> Recorded:  # fmt: skip
+    bundle = case.seal(case.mission(steps), policy)
+    flight = Flight(bundle, case.simulated(flavour, faults=faults), mode=mode)
     entries = kept(flight)
     return Recorded(tuple(flight.fly().lines), entries)

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.forgery import edit, expect, other_flight, prove, read, signed
-from reference.kinds_of_flight import recorded
+from reference.kinds_of_flight import fallen_back
 from rtshcua.simulation.faults import BatteryLevel
 from virtual import case
 from virtual.flight import Flight
@@ -23,11 +23,6 @@ def denied_in_the_air() -> tuple[bytes, ...]:
     changed = replace(inspect, arguments=cells, plan=replace(inspect.plan, altitude=35 * M))
     steps = (*mission.invocations[:2], changed, *mission.invocations[3:])
     return tuple(Flight(case.seal(replace(mission, invocations=steps)), case.simulated("px4")).fly().lines)
-
-
-def fallen_back() -> tuple[bytes, ...]:
-    """The wind rises above the limit: the chain of the step flies."""
-    return recorded("wind", "px4").lines
 
 
 def decisions(lines: tuple[bytes, ...], kind: int) -> list[int]:
@@ -74,7 +69,7 @@ def test_a_forged_link_of_the_contingency(fields: dict[str, object], slug: str) 
     ],
 )
 def test_a_forged_link_of_a_chain(fields: dict[str, object], slug: str) -> None:
-    lines = fallen_back()
+    lines = fallen_back("px4").lines
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
     assert forged(lines, number, **fields) == (slug, number)
 
@@ -87,7 +82,7 @@ def test_a_degrade_rules_target_is_derived_again() -> None:
 
 def test_a_link_that_may_not_fly_is_not_allowed() -> None:
     """Without a fix the vehicle can neither hover nor fly home; the record says it could."""
-    lines = fallen_back()
+    lines = fallen_back("px4").lines
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
     state = read(lines[number])["state"]
     state["values"][case.flat.FIX] = None
@@ -96,7 +91,7 @@ def test_a_link_that_may_not_fly_is_not_allowed() -> None:
 
 def test_a_link_that_is_refused_is_recorded_as_such() -> None:
     """The same, told truly: the link is refused, and flies all the same by the step's standing permit."""
-    lines = fallen_back()
+    lines = fallen_back("px4").lines
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
     record = read(lines[number])
     record["state"]["values"][case.flat.FIX] = None

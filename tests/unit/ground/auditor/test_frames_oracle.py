@@ -10,7 +10,7 @@ from hypothesis import strategies as some
 
 from reference.forgery import ROOT_KEY
 from reference.kept_frames import Entries
-from reference.kinds_of_flight import recorded
+from reference.kinds_of_flight import fallen_back
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect, Genesis
 from rtshcua.ground.auditor.frames import OURS, Frames
@@ -49,7 +49,7 @@ class Case(NamedTuple):
 
 @cache
 def flown(kind: str) -> Case:
-    lines, entries = recorded("wind", kind)
+    lines, entries = fallen_back(kind)
     records = [read(line) for line in lines]
     genesis = records[0]
     assert isinstance(genesis, Genesis)

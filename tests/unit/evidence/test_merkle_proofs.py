@@ -73,7 +73,6 @@ def test_the_stored_tree_has_the_root_of_each_prefix(stored: StoredTree) -> None
         assert stored.root(size) == mth(LEAVES[:size]) == root_of(LEAVES[:size])
 
 
-@pytest.mark.no_cover
 def test_every_inclusion_proof_is_that_of_the_definition(stored: StoredTree) -> None:
     for size in range(1, MOST):
         root = mth(LEAVES[:size])

@@ -172,21 +172,38 @@ def commands() -> Iterator[Forked]:
         yield made
 
 
+class Worlds:
+    """A data folder for each test; one that a test left empty is the next one's too."""
+
+    def __init__(self, top: Path) -> None:
+        self._new = (top / str(number) for number in count())
+        self._folder: Path | None = None
+
+    def enter(self) -> None:
+        """From here on nobody sees the keys, the replay state or the terminal settings of whoever runs the tests."""
+        folder = self._folder
+        if folder is None or not folder.is_dir() or any(os.scandir(folder)):
+            folder = self._folder = next(self._new)
+            folder.mkdir(mode=0o700)
+        os.environ.update(PLAIN, RTSHCUA_DATA_DIR=str(folder))
+        for name in NOT_SET:
+            os.environ.pop(name, None)
+
+
+#: what the terminal of every test is like
+PLAIN = {"COLUMNS": "120", "NO_COLOR": "1", "TZ": "UTC"}
+NOT_SET = ("FORCE_COLOR", "GITHUB_ACTIONS", "RTSHCUA_DEBUG")
+
+
 @pytest.fixture(scope="session")
-def worlds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A new folder each time, numbered here: pytest looks for a free number through all that there are, every time."""
-    top = tmp_path_factory.mktemp("data")
-    return (top / str(number) for number in count())
+def worlds(tmp_path_factory: pytest.TempPathFactory) -> Worlds:
+    return Worlds(tmp_path_factory.mktemp("data"))
 
 
 @pytest.fixture(autouse=True)
-def own_world(worlds: Iterator[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test sees or touches the keys, the replay state or the terminal settings of whoever runs it."""
-    world = next(worlds)
-    world.mkdir(mode=0o700)
-    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(world))
-    monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv("TZ", "UTC")
-    for name in ("FORCE_COLOR", "GITHUB_ACTIONS", "RTSHCUA_DEBUG"):
-        monkeypatch.delenv(name, raising=False)
+def own_world(worlds: Worlds) -> None:
+    """No test sees or touches the keys, the replay state or the terminal settings of whoever runs it.
+
+    All tests have this, so it costs next to nothing: what a test changes of the environment, it puts back itself.
+    """
+    worlds.enter()

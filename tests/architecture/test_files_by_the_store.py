@@ -31,7 +31,11 @@ MODULES = {
     "tempfile": {"mkstemp", "mkdtemp", "mktemp", "NamedTemporaryFile", "SpooledTemporaryFile", "TemporaryFile"},
 }
 METHODS = {"read_bytes", "read_text", "write_bytes", "write_text", "rename", "hardlink_to", "symlink_to"}
-WORDS = re.compile("|".join(METHODS.union(*MODULES.values())))
+#: what a module has that does any of this, so that few need be parsed: a call of such a name, or an import of one
+WORDS = re.compile(
+    rf"\.(?:{'|'.join(METHODS.union(*MODULES.values()))})\s*\(|(?<![\w.])open\s*\("
+    rf"|\bfrom\s+(?:{'|'.join(MODULES)})\s+import\b"
+)
 
 
 def opened(source: str) -> Iterator[str]:

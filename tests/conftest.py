@@ -2,6 +2,7 @@
 
 import gc
 import os
+import stat
 import sys
 import sysconfig
 from collections.abc import Generator, Iterator
@@ -182,12 +183,20 @@ class Worlds:
     def enter(self) -> None:
         """From here on nobody sees the keys, the replay state or the terminal settings of whoever runs the tests."""
         folder = self._folder
-        if folder is None or not folder.is_dir() or any(os.scandir(folder)):
+        if folder is None or not as_made(folder):
             folder = self._folder = next(self._new)
             folder.mkdir(mode=0o700)
         os.environ.update(PLAIN, RTSHCUA_DATA_DIR=str(folder))
         for name in NOT_SET:
             os.environ.pop(name, None)
+
+
+def as_made(folder: Path) -> bool:
+    """Whether a folder is still there, still its owner's alone, and empty."""
+    try:
+        return os.lstat(folder).st_mode == stat.S_IFDIR | 0o700 and next(folder.iterdir(), None) is None
+    except OSError:
+        return False
 
 
 #: what the terminal of every test is like

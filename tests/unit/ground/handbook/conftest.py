@@ -15,6 +15,7 @@ from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.testing.run import run_case
 from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
+from virtual.once import once
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 EVERYTHING = Path(__file__).with_name("everything.rts")
@@ -47,7 +48,7 @@ def part_of(path: Path) -> Part:
 
 @cache
 def book_of(path: Path) -> Handbook:
-    return handbook([part_of(path)], made_at_us=AT, made_by="rtshcua")
+    return once(f"handbook_{path.stem}", lambda: handbook([part_of(path)], made_at_us=AT, made_by="rtshcua"))
 
 
 @pytest.fixture(name="everything_program", scope="session")

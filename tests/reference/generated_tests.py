@@ -1,6 +1,6 @@
 """Tests that are generated of a policy in a text, and what they notice when it changes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from rtshcua.diagnostics.codes import Severity
@@ -42,9 +42,19 @@ def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) 
     return generate(cases.Tested(ground.lowered, ground.prepared), plan, lambda draft: play(draft, {name: text}))
 
 
-def failures(of: Generated, others: Mapping[str, str]) -> list[str]:
-    """The cases that are not met, or that the language refuses."""
+def wrong(of: Generated, others: Mapping[str, str]) -> Iterator[str]:
+    """The cases that the language refuses, then those that are not met, as they are found."""
     assert of.text is not None
     played = play(of.text, others)
-    wrong = [each.code.id for each in played.diagnostics if each.severity is Severity.ERROR]
-    return wrong + [case.name for case in played.cases if not run_case(case).met]
+    yield from (each.code.id for each in played.diagnostics if each.severity is Severity.ERROR)
+    yield from (case.name for case in played.cases if not run_case(case).met)
+
+
+def failures(of: Generated, others: Mapping[str, str]) -> list[str]:
+    """The cases that are not met, or that the language refuses."""
+    return list(wrong(of, others))
+
+
+def noticed(of: Generated, others: Mapping[str, str]) -> bool:
+    """Whether any is; the first one is enough."""
+    return next(wrong(of, others), None) is not None

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from reference.generated_tests import failures, generated
+from reference.generated_tests import failures, generated, noticed
 from rtshcua.ground.testing.boundaries.generate import Generated, Unreached
 
 CHECKOUT = Path(__file__).resolve().parents[4]
@@ -60,7 +60,7 @@ def test_they_pass(arms: Generated) -> None:
 )
 def test_a_limit_in_any_arm_that_moves_by_one_unit_is_noticed(arms: Generated, written: str, moved: str) -> None:
     assert TEXT.count(written) == 1
-    assert failures(arms, {"arms.rts": TEXT.replace(written, moved)}) != []
+    assert noticed(arms, {"arms.rts": TEXT.replace(written, moved)})
 
 
 def named(of: Generated) -> set[tuple[str, str]]:
@@ -119,4 +119,4 @@ def test_hours_and_dates_of_an_airspace_are_reached() -> None:
     made = generated(text, "arms.rts", "arms.rts", ("hover",))
     assert named(made) <= {("energy", "the charge that is needed")}
     for written, moved in (("12:30", "12:31"), ("14:30", "14:31"), ("30 m)", "30001 mm)")):
-        assert failures(made, {"arms.rts": text.replace(written, moved)}) != []
+        assert noticed(made, {"arms.rts": text.replace(written, moved)})

@@ -209,7 +209,7 @@ class Driver:
         if component != AUTOPILOT or name not in self._heeded:
             return False
         before = self.seen.mode
-        self.seen.take(name, message, now_us, at_us)
+        self.seen.take(name, message, now_us, at_us, self.source.place)
         crashed = self._crash.look(self.seen, now_us)
         if crashed is not None:
             events.append(ports.Crashed(now_us, crashed))

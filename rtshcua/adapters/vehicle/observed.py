@@ -162,6 +162,7 @@ class ObservedVehicle:
     heartbeat_us: int | None = None
     beats: int = 0
     made_us: dict[str, int] = field(default_factory=dict)  # when the last of each message was made
+    places: dict[str, int] = field(default_factory=dict)  # and its place in the order of sending
     now_us: int = 0
     up_us: int = 0
     critical: bool = False
@@ -170,10 +171,13 @@ class ObservedVehicle:
     text_severity: int = _DEBUG
     prearm_text: str = ""
 
-    def take(self, name: str, message: Any, now_us: int, at_us: int | None) -> None:
-        """Take in one message of the autopilot's component that was made at `at_us` (None: nobody knows), but for one
-        that is older than the last of its name.
+    def take(self, name: str, message: Any, now_us: int, at_us: int | None, place: int) -> None:
+        """Take in one message of the autopilot's component that was made at `at_us` (None: nobody knows) and sent in
+        this `place`, but for one that is older than the last of its name.
         """
+        if place < self.places.get(name, place):
+            return
+        self.places[name] = place
         if at_us is not None:
             if at_us < self.made_us.get(name, at_us):
                 return

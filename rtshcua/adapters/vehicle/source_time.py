@@ -189,6 +189,9 @@ class SourceTime:
         self._sent_us: int | None = None  # the last frame was sent at this time or later
         self._came_us = 0
         self._newest = 0
+        self._count = 0
+        #: the last frame's place in the order of sending: its number, counted on where numbers begin again
+        self.place = 0
         self._order: list[int | None] = [None] * _NUMBERS  # the same for each number of the last round
         self._held_us = self._held_before_us = 0  # the largest delay of a frame that was overtaken, and the one before
         self._window_us = 0
@@ -303,9 +306,12 @@ class SourceTime:
                 self._sent_us = sent_us = at_us
             order[number] = sent_us
             self._newest = number
+            self._count += ahead or _NUMBERS
+            self.place = self._count
         else:  # overtaken: sent after what was numbered before it, and before what was numbered after it
             if fresh:
                 self._sent_us = at_us
+            self.place = self._count - (newest - number) % _NUMBERS
             sent_us = order[number]
             if at_us is not None and (sent_us is None or at_us > sent_us):
                 sent_us = at_us

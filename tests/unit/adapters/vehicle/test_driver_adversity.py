@@ -169,6 +169,32 @@ def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     assert one.until((Succeeded, Failed), 60) == Succeeded(one.now_us, token)
 
 
+def test_a_heartbeat_that_a_newer_one_overtook_is_no_takeover(aloft: Make) -> None:
+    """Both were sent between the same two stamps: only the numbers of their frames tell which was first."""
+    one = aloft()
+    one.begin(MotionKind.FLY, (100_000, 0), altitude=20_000, speed=5_000)
+    one.wait(3)
+    last: list[Any] = []
+    overtaken: list[bytes] = []
+
+    def overtake(datagram: bytes) -> list[bytes]:
+        for received in Codec(1, 1).parse(datagram):
+            if received.name == "HEARTBEAT":
+                older, last[:] = list(last), [received.message]
+                if older and older[0].custom_mode != received.message.custom_mode:
+                    codec = Codec(received.system, received.component)
+                    frames = [codec.pack(older[0]) for _ in range(received.sequence or 256)]
+                    overtaken.append(frames[-1])
+                    return [datagram, frames[-1]]
+        return [datagram]
+
+    one.vehicle.hurt = overtake
+    one.wait(1)
+    token = one.begin(MotionKind.HOME)
+    assert one.until((Succeeded, Failed, TakenOver), 120) == Succeeded(one.now_us, token)
+    assert overtaken
+
+
 @ONE_FLAVOUR
 def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -> None:
     """As a radio fails at the end of its range: first it does not hear us, then we do not hear it."""

@@ -232,9 +232,8 @@ def test_altitudes_are_converted_in_one_place() -> None:
     with pytest.raises(NoDatum):
         seen.amsl(20_000)
     seen.estimator.take(0x3F, 0)
-    seen.take(
-        "GLOBAL_POSITION_INT", mavlink.MAVLink_global_position_int_message(1, 0, 0, 503_000, 15_000, 0, 0, 0, 0), 0, 0
-    )
+    message = mavlink.MAVLink_global_position_int_message(1, 0, 0, 503_000, 15_000, 0, 0, 0, 0)
+    seen.take("GLOBAL_POSITION_INT", message, now_us=0, at_us=0, place=0)
     assert seen.home_amsl == 488_000
     assert seen.amsl(20_000) == 508_000
     assert seen.amsl(-489_000) == -1_000

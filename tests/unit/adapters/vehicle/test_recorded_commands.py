@@ -73,7 +73,7 @@ def take(frame: Heard, seen: ObservedVehicle, texts: StatusTexts, commander: Com
         for said in texts.take(frame.message, frame.at_us):
             seen.say(said.severity, said.text)
     else:
-        seen.take(frame.name, frame.message, frame.at_us, frame.at_us)
+        seen.take(frame.name, frame.message, frame.at_us, frame.at_us, frame.at_us)
 
 
 def windows(session: Trace) -> Iterator[tuple[Question, int]]:

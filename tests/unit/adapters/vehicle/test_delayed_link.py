@@ -96,7 +96,9 @@ def test_what_is_delayed_by_less_stays_known_and_its_age_says_so(flavour: str) -
         one.wait(0.2)
         ages = one.monitor.state(one.now_us).ages
         assert set(REPORTED) <= one.known()
-        assert all(ages[signal.slot] >= 500_000 for signal in LATE.signals if signal.name in REPORTED)
+        reported = [ages[signal.slot] for signal in LATE.signals if signal.name in REPORTED]
+        # the way down, as much again that the way up may have taken of the round trip, and until the next report
+        assert 500_000 <= min(reported) <= max(reported) < 500_000 + 500_000 + 600_000
     assert one.vehicle.driver.source.clock.round_trip_us == 1_000_000
 
 

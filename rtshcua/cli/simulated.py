@@ -7,7 +7,7 @@ import typer
 
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.config import Kind
-from rtshcua.simulation.faults import KINDS, parse_fault
+from rtshcua.simulation.faults import OF_VEHICLE, parse_fault
 from rtshcua.virtual.fitting import fitting
 
 _WIND = re.compile(r"\d+(\.\d+)?,\d+(\.\d+)?(,\d+(\.\d+)?)?", re.ASCII)
@@ -45,7 +45,7 @@ Faults = Annotated[
     list[str] | None,
     typer.Option(
         "--fault", metavar="KIND,at=TIME,...", callback=_faults,
-        help=f"what goes wrong (repeatable): {', '.join(KINDS)}; such as battery,at=30s,level=20%",
+        help=f"what goes wrong (repeatable): {', '.join(OF_VEHICLE)}; such as battery,at=30s,level=20%",
     ),
 ]  # fmt: skip
 Home = Annotated[

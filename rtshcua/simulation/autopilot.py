@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink.layouts import TEXT_OCTETS
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.command import Command
 from rtshcua.simulation.config import Boot, SimulationConfig
@@ -19,7 +20,7 @@ from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
 from rtshcua.simulation.mission import Mission, MissionRules
-from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
+from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.parameters import Parameter, Parameters
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import MISSION, Item, Plans

@@ -4,9 +4,9 @@ from math import isnan
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.telemetry import AVAILABLE_MODES, available_modes
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rtshcua.mavlink.signing import KEY_OCTETS
-from rtshcua.simulation.faults import Fault
+from rtshcua.model.faults import Fault
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
 

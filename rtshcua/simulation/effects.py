@@ -11,10 +11,11 @@ from random import Random
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.simulation import faults
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Way
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import Command
-from rtshcua.simulation.faults import Fault, Way, message_number
+from rtshcua.simulation.faults import message_number
 from rtshcua.simulation.link import Link
 from rtshcua.simulation.surroundings import Cylinder, Wind
 

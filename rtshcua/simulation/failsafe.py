@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.battery import Battery
-from rtshcua.simulation.modes import NEEDS_POSITION, Mode
+from rtshcua.simulation.modes import NEEDS_POSITION
 from rtshcua.simulation.sensors import Sensors
 from rtshcua.simulation.vehicle import Vehicle
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.kinematics import Approach, Body
-from rtshcua.simulation.modes import Mode
 
 
 @dataclass(frozen=True, slots=True)

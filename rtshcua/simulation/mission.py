@@ -8,8 +8,8 @@ from math import hypot, isfinite
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
+from rtshcua.model.faults import Mode
 from rtshcua.simulation import plans
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import AMSL_FRAMES, FENCE, MISSION, Item, Plans
 from rtshcua.simulation.vehicle import Landed, Vehicle

@@ -2,35 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
-
-class Mode(StrEnum):
-    """A flight mode by what it does."""
-
-    MANUAL = "manual"
-    """The pilot's sticks alone (MANUAL, STABILIZE)."""
-    ALTITUDE = "altitude"
-    """The pilot's sticks, height held (ALTCTL, ALT_HOLD)."""
-    POSITION = "position"
-    """The pilot's sticks, place held (POSCTL, POSHOLD)."""
-    LOITER = "loiter"
-    """Stays where it is (AUTO.LOITER, LOITER)."""
-    TAKEOFF = "takeoff"
-    """Climbs, then loiters (AUTO.TAKEOFF; ArduCopter takes off in GUIDED)."""
-    GUIDED = "guided"
-    """Flies to position targets as they come (OFFBOARD, GUIDED)."""
-    MISSION = "mission"
-    """Flies the mission that was uploaded (AUTO.MISSION, AUTO)."""
-    ORBIT = "orbit"
-    """Circles a place (PX4 only)."""
-    BRAKE = "brake"
-    """Stops and stays (ArduCopter only)."""
-    RETURN = "return"
-    """Climbs, flies home and lands (AUTO.RTL, RTL)."""
-    LAND = "land"
-    """Lands where it is (AUTO.LAND, LAND)."""
-
+from rtshcua.model.faults import Mode
 
 NEEDS_POSITION = frozenset(
     {Mode.POSITION, Mode.LOITER, Mode.TAKEOFF, Mode.GUIDED, Mode.MISSION, Mode.ORBIT, Mode.BRAKE, Mode.RETURN},

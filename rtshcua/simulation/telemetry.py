@@ -7,9 +7,9 @@ from math import atan2, degrees, hypot
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.failsafe import LOW_TO_LAND
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
 
 GOOD_FLAGS, LOST_FLAGS = 0x33F, 0x025

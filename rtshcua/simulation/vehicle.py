@@ -7,10 +7,10 @@ from enum import Enum, IntEnum, auto
 from math import copysign, hypot
 
 from rtshcua.mavlink import enums
+from rtshcua.model.faults import Mode
 from rtshcua.simulation import battery, guidance
 from rtshcua.simulation.handling import Handling
 from rtshcua.simulation.kinematics import Body, heading
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 
 

@@ -11,14 +11,13 @@ from itertools import count
 from math import hypot
 from random import Random
 
+from rtshcua.model.faults import Fault, Mode
 from rtshcua.simulation.ardupilot.flavour import ArduCopter
 from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.effects import Affected, effects
 from rtshcua.simulation.face import Face
-from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.link import Link
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.px4.flavour import Px4
 
 FLAVOURS: Mapping[Kind, Flavour] = {Kind.PX4: Px4(), Kind.ARDUPILOT: ArduCopter()}

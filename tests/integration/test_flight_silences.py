@@ -10,9 +10,9 @@ from itertools import product
 import pytest
 
 from rtshcua.evidence.report import Verdict
+from rtshcua.model.faults import LinkReorder, LinkSilence, Way, WindStep
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.runtime.view import Stage
-from rtshcua.simulation.faults import LinkReorder, LinkSilence, Way, WindStep
 from rtshcua.virtual.vehicle import TICK_US
 from virtual import case
 from virtual.flight import Flight, Flown

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from recorded.trace import CLIENT, SECOND, Heard, Trace
 from rtshcua.codec.frames import Codec
+from rtshcua.model.faults import Fault
 from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.faults import Fault
 from rtshcua.simulation.world import Simulation
 
 LEAD_US = 3 * SECOND

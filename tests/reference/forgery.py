@@ -18,7 +18,7 @@ from reference.resealing import resealed
 from reference.verifiers import ROOT_KEY, agree
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit, audit
-from rtshcua.simulation.faults import BatteryLevel, Fault
+from rtshcua.model.faults import BatteryLevel, Fault
 from rtshcua.virtual.vehicle import TICK_US
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case

@@ -7,10 +7,10 @@ from msgspec.structs import replace
 
 from reference.flat_case import MIN, M, S
 from reference.kept_frames import Entries, kept
+from rtshcua.model.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.load import Mode
-from rtshcua.simulation.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
 from virtual import case
 from virtual.flight import Flight
 from virtual.once import once

@@ -5,10 +5,10 @@ from math import isfinite, radians
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
 from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, arm_disarm, shared
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 from rtshcua.simulation.plans import AMSL_FRAMES, RELATIVE_FRAMES
 

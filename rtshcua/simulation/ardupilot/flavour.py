@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
+from rtshcua.model.faults import Mode
 from rtshcua.simulation import plans
 from rtshcua.simulation.ardupilot.commands import COMMANDS, above_home, enter_number
 from rtshcua.simulation.ardupilot.parameters import HANDLING, PARAMETERS
@@ -21,7 +22,7 @@ from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
 from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
-from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
+from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import Item
 from rtshcua.simulation.sensors import BootPlan

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS, autopilot_version, extended_sys_state
 
 _PLACE_ONLY = 0xFDF8

@@ -6,10 +6,10 @@ from math import isfinite
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.modes import Px4Mode
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import Command, whole
 from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, arm_disarm, shared
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 
 _STREAM_US = 500_000

@@ -13,11 +13,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
 from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
-from rtshcua.simulation.modes import NEEDS_POSITION, Mode, ModeTable
+from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import AMSL_FRAMES, FENCE_ITEMS, NAVIGATION, RELATIVE_FRAMES, RETURN_POINT, Item
 from rtshcua.simulation.px4.commands import COMMANDS, enter_number

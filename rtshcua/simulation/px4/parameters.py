@@ -1,8 +1,8 @@
 """PX4's parameters, as far as this vehicle has them, and how it flies."""
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.handling import Agility, Handling, Stopping
 from rtshcua.simulation.kinematics import Approach
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.parameters import INT32, Parameter
 
 PARAMETERS = (

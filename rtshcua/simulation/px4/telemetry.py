@@ -6,8 +6,8 @@ from math import nan
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.telemetry import (
     COMMON,
     CURRENT_MODE,

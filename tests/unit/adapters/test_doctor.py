@@ -11,11 +11,11 @@ from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, di
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.model.faults import GpsLoss, LinkLoss
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
 from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.faults import GpsLoss, LinkLoss
 from rtshcua.simulation.place import Home
 from rtshcua.virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 from virtual import case

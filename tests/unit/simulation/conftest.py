@@ -9,8 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec, Received
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import Kind, SimulationConfig
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.world import Simulation
 from virtual.copying import copied
 

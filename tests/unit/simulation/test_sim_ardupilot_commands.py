@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.simulation.modes import Mode
+from rtshcua.model.faults import Mode
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.simulation import faults
+from rtshcua.model import faults
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import Boot
-from rtshcua.simulation.modes import Mode
 
 S = 1_000_000
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK

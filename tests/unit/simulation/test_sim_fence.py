@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import HOME
 from rtshcua.simulation.fence import Area, Circle, FenceLimits, Polygon
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Point
 from rtshcua.simulation.plans import draws_no_fence, from_message
 from virtual import plans as p

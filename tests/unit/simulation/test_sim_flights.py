@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.surroundings import Wind
 from virtual.sampling import each_once
 

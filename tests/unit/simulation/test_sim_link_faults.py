@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.simulation import faults
-from rtshcua.simulation.faults import Way
+from rtshcua.model import faults
+from rtshcua.model.faults import Mode, Way
 from rtshcua.simulation.link import OVERTAKEN_US, Link
-from rtshcua.simulation.modes import Mode
 
 S = 1_000_000
 

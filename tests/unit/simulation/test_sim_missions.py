@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.simulation.modes import Mode
+from rtshcua.model.faults import Mode
 from virtual import plans as p
 
 Pilots = Callable[..., Any]

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from rtshcua.simulation import faults
-from rtshcua.simulation.modes import Mode
+from rtshcua.model import faults
+from rtshcua.model.faults import Mode
 
 S = 1_000_000
 

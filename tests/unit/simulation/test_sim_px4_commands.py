@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.simulation.modes import Mode
+from rtshcua.model.faults import Mode
 
 AMSL = 488.0
 LOITER, TAKEOFF, RETURN, LAND = 50593792, 33816576, 84148224, 100925440

@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.dialects.v20 import development
 
-from rtshcua.simulation.modes import Mode
+from rtshcua.model.faults import Mode
 from virtual import plans as p
 
 Pilots = Callable[..., Any]

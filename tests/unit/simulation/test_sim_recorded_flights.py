@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from recorded import difference
 from recorded.trace import SECOND, Heard, Trace
 from rtshcua.codec.frames import Codec
-from rtshcua.simulation import faults
+from rtshcua.model import faults
 from rtshcua.simulation.config import Boot, Kind, SimulationConfig
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.world import Simulation

@@ -17,7 +17,7 @@ from recorded import difference
 from recorded.flight import LEAD_US, Flight
 from recorded.trace import SECOND, Heard, Trace
 from rtshcua.codec.frames import Codec
-from rtshcua.simulation import faults
+from rtshcua.model import faults
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.place import Home
 

@@ -7,8 +7,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import SimulationConfig
-from rtshcua.simulation.modes import Mode
 
 Pilots = Callable[..., Any]
 KEY = b"shared/traces test key, 32 bytes"

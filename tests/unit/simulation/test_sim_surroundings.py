@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.simulation.faults import Pillar as Standing
+from rtshcua.model.faults import Pillar as Standing
 from rtshcua.simulation.kinematics import Body
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS, Cylinder, Surroundings
 

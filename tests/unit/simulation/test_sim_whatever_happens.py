@@ -8,10 +8,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
-from rtshcua.simulation import faults
+from rtshcua.model import faults
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import Boot, Kind, SimulationConfig
 from rtshcua.simulation.kinematics import MAX_FALL
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 

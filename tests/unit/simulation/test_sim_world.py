@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
-from rtshcua.simulation import faults
+from rtshcua.model import faults
+from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import HOME, Kind, SimulationConfig
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation

@@ -8,10 +8,10 @@ from msgspec.structs import replace
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.faults import LinkDelay
 from rtshcua.onboard.ports import Readings, Ready
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.simulation.config import Kind, SimulationConfig
-from rtshcua.simulation.faults import LinkDelay
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from virtual.copying import copied
 from virtual.policy import POLICY

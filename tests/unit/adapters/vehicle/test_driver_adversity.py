@@ -8,11 +8,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
+from rtshcua.model.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss, LinkSilence, Mode, PilotMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import AirState, Failed, LinkBack, LinkLost, Noted, Readings, Ready, Succeeded, TakenOver
-from rtshcua.simulation.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss, LinkSilence, PilotMode
 from rtshcua.simulation.kinematics import Body
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.place import Home
 from virtual.sampling import each_once
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any
 
+from rtshcua.model.faults import Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import AirState, Crashed, Ready, Sent, Succeeded
-from rtshcua.simulation.modes import Mode
 
 Make = Callable[..., Any]
 

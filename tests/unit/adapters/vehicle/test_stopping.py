@@ -14,10 +14,9 @@ from rtshcua.adapters.vehicle.effects import STILL
 from rtshcua.adapters.vehicle.flavour import ExpectedProgress
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.supervision import LAG_US, Brakes, BrakingWatch, StageProgress
+from rtshcua.model.faults import Kill, LinkDelay, Mode, Pillar
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Crashed, Failed, Ready, Succeeded, TakenOver
-from rtshcua.simulation.faults import Kill, LinkDelay, Pillar
-from rtshcua.simulation.modes import Mode
 from rtshcua.simulation.vehicle import Vehicle
 from virtual.policy import POLICY
 from virtual.sampling import each_once

@@ -17,10 +17,9 @@ from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.codec.frames import Codec
+from rtshcua.model.faults import Fault, LinkDelay, Mode, PilotGoto, PilotMode, PilotPause, PilotSticks
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Failed, Ready, Succeeded, TakenOver
-from rtshcua.simulation.faults import Fault, LinkDelay, PilotGoto, PilotMode, PilotPause, PilotSticks
-from rtshcua.simulation.modes import Mode
 from virtual.copying import copied
 from virtual.policy import POLICY
 from virtual.sampling import each_once

@@ -12,10 +12,10 @@ from reference.forgery import LOG_KEY, ROOT_KEY, edit, flight, prove, read, sign
 from reference.kinds_of_flight import FAULTS, recorded
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit, audit
+from rtshcua.model.faults import BatteryLevel, Fault
 from rtshcua.model.flat.mission import Mission, OnInadmissible
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Event, Interrupted
-from rtshcua.simulation.faults import BatteryLevel, Fault
 from rtshcua.wire.keys import Duty
 from virtual import case
 from virtual.flight import Flight

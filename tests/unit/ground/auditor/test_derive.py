@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from reference.forgery import edit, expect, other_flight, prove, read, signed
 from reference.kinds_of_flight import fallen_back
-from rtshcua.simulation.faults import BatteryLevel
+from rtshcua.model.faults import BatteryLevel
 from virtual import case
 from virtual.flight import Flight
 

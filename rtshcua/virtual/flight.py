@@ -127,6 +127,7 @@ class VirtualFlight:
     given. `log_key` signs the log; it must be one of the root's if that is to be audited. `sink` makes another place
     for the evidence than memory, and `vehicle` is one that was made already, with the clock that it lives by. What the
     vehicle says is heard every `tick_us`: a longer tick makes a flight cheaper, and what happens on it as much later.
+    `before` is the hash of the last line of the vehicle's log before this one.
     Raises ValueError for a bundle that is refused, and what `open_root` raises.
     """
 
@@ -137,7 +138,7 @@ class VirtualFlight:
         self, bundle: bytes, simulated: SimulationConfig | Callable[[Policy], SimulationConfig] = fitting,
         *, root: bytes, log_key: SigningKey = NOBODY, mode: Mode = Mode.SOFTWARE, utc_us: int | None = None,
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
-        sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US,
+        sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
     ) -> None:  # fmt: skip
         policy, mission = _claimed(bundle)
         utc_us = mission.issued_at_us + _LATER_US if utc_us is None else utc_us
@@ -165,7 +166,14 @@ class VirtualFlight:
         self.sink: ReadableSink = MemorySink() if sink is None else sink(self.clock)
         self.sink.append(
             self.recorder.genesis(
-                now, bundle=bundle, root=root, boot=bytes(16), vehicle=loaded.vehicle, mission=mission.name, mode=mode
+                now,
+                bundle=bundle,
+                root=root,
+                boot=bytes(16),
+                vehicle=loaded.vehicle,
+                mission=mission.name,
+                mode=mode,
+                before=before,
             ),
             SYNCED_FIRST,
         )
@@ -183,6 +191,10 @@ class VirtualFlight:
             if self.clock.elapsed_us >= most_s * SECOND:
                 raise TimeoutError(f"after {most_s} s it flies still: {self.runtime.view(self.clock.now())}")
             ending = self.loop.turn(each(self))
+        return self.close(ending)
+
+    def close(self, ending: Ending) -> FlownFlight:
+        """Sign and close the log of a flight that ended so; what came of it."""
         with suppress(OSError):
             self.sink.append(self.recorder.close(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
             self.sink.close()

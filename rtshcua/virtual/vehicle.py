@@ -15,6 +15,8 @@ from rtshcua.simulation.world import Simulation
 #: as often as the simulation ticks itself
 TICK_US = 20_000
 SECOND = 1_000_000
+#: datagrams that a socket holds while nobody reads, as Linux comes (`net.core.rmem_max`); what comes then is lost
+MOST_WAITING = 500
 #: where the clock starts: a monotonic time that is not 0, and a UTC time
 START = Now(7_000_000, 1_767_225_600_000_000, 1_000)
 
@@ -60,10 +62,19 @@ class VirtualVehicle:
         self.lose: Callable[[bytes], bool] = lambda frame: False
         self.hurt: Callable[[bytes], Sequence[bytes]] = lambda datagram: [datagram]
         self._pending: list[Event] = []
+        self._waiting: list[bytes] = []
+
+    def stand_still(self, for_us: int) -> None:
+        """Let time pass in which nobody reads: what is said waits for the next poll, as far as there is room for it."""
+        self.clock.elapsed_us += for_us
+        self._waiting += self.simulation.advance(self.clock.elapsed_us)
+        del self._waiting[MOST_WAITING:]
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
         """Let time pass, at most `timeout_us`; comes back early for anything but readings."""
         events, self._pending = self._pending, []
+        waiting, self._waiting = self._waiting, []
+        self._take(waiting, events)
         end_us = self.clock.elapsed_us + timeout_us
         looked_at = 0
         while True:

@@ -1,0 +1,101 @@
+"""What a flight of a scenario leaves behind: plain values, that a judge in another process can read.
+
+All times are those of the simulation, in us since its start, unless a name says otherwise.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.scenario import Scenario
+
+
+class Sample(NamedTuple):
+    """What really was at a moment, whatever the vehicle reported (`simulation.world.Truth`)."""
+
+    at_us: int
+    latitude: int
+    longitude: int
+    up_mm: int
+    speed_mm_s: int
+    climb_mm_s: int
+    armed: bool
+    in_air: bool
+    crashed: bool
+    mode: Mode
+    battery: int
+    obstacle_mm: int | None
+    """How far it is to the nearest thing that stands around; None: nothing does."""
+    taken_over_us: int | None
+    """Since when somebody else than we flies it, a pilot or the autopilot itself; None: nobody does."""
+
+
+class Arrived(NamedTuple):
+    """A frame of ours that the vehicle received, and when it was sent."""
+
+    at_us: int
+    sent_us: int
+    octets: bytes
+
+
+class Happened(NamedTuple):
+    """An incident of the scenario, by its number, that really came. `note`: what became of it, where that is told."""
+
+    number: int
+    at_us: int
+    fault: Fault
+    text: str
+    note: str = ""
+
+
+class Reaction(NamedTuple):
+    """A fallback was commanded: what it follows from came after `heard_us`, and was acted on at `acted_us`."""
+
+    heard_us: int
+    acted_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """One process of the runtime, from its first record to its last. `ending` None: it was killed, or it broke."""
+
+    began_us: int
+    ended_us: int
+    ending: str | None
+    lines: tuple[bytes, ...]
+    """Its log; what was killed is recovered."""
+    reactions: tuple[Reaction, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioFlown:
+    """One flight of a scenario. `start_us` is what the monotonic clock of the logs said at the simulation's start."""
+
+    scenario: Scenario
+    flavour: str
+    seed: int
+    policy: Policy
+    mission: Mission
+    root: bytes
+    """The name of the key that signed the trust root: what an audit is pinned to."""
+    start_us: int
+    tick_us: int
+    wait_us: int
+    lives: tuple[Life, ...]
+    happened: tuple[Happened, ...]
+    samples: tuple[Sample, ...]
+    arrived: tuple[Arrived, ...]
+    ended_us: int
+    """When the last process ended; what came after it, the vehicle did alone."""
+    left: str | None
+    """Why no process was there any more, though nothing had ended; None: the last one came to its end."""
+    fault: str | None
+    """What went wrong inside the runtime, or that it did not end; None: nothing."""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def ending(self) -> str | None:
+        """How the last process ended."""
+        return self.lives[-1].ending if self.lives else None

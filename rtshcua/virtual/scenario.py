@@ -1,0 +1,572 @@
+"""Flies one flight of a scenario: what goes wrong goes wrong when the scenario says so, in virtual time.
+
+The same arguments give the same flight, byte by byte. Where a scenario leaves a time open, incident `number` (from 0)
+happens after a delay that `Random(f"{scenario.name} {number} {seed}")` draws from its range; what a killed process
+loses, and what babble says, is drawn from the same source afterwards.
+
+What goes wrong with the vehicle, its link and its surroundings is the simulation's affair, to its tick. What goes wrong
+with our own computer and with those who hand in documents happens here, between two turns of the loop.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from heapq import heappop, heappush
+from random import Random  # noqa: TID251  seeded: the same seed draws the same
+from traceback import format_exception
+from typing import Any, Final
+
+import msgspec
+
+from rtshcua.adapters.clock import StepWatch
+from rtshcua.adapters.packs import manoeuvres, packs_of
+from rtshcua.decision.case import environment, situation
+from rtshcua.decision.evaluate import NO_PHASE, Condition, build
+from rtshcua.decision.values import TRUE
+from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.recovery import RECOVERABLE, Examination, ending
+from rtshcua.model import faults
+from rtshcua.model.faults import AgentFault, Fault, HostFault
+from rtshcua.model.flat.situation import Now
+from rtshcua.model.scenario import AfterStep, AtTime, Incident, OnCondition, Scenario
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Action, Append, Dispatch, Ending, Event, Presented, Readings
+from rtshcua.onboard.runtime.monitor import StateMonitor
+from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.surroundings import Wind
+from rtshcua.simulation.world import Simulation
+from rtshcua.virtual.fitting import fitting
+from rtshcua.virtual.flight import MemorySink, VirtualFlight
+from rtshcua.virtual.flown import Arrived, Happened, Life, Reaction, Sample, ScenarioFlown
+from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
+from rtshcua.wire import cose
+from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.recall import RecallDocument, sign_recall
+from rtshcua.wire.replacement import sign_replacement
+from rtshcua.wire.trust import MAX_ROOT
+from rtshcua.wire.untrusted import Untrusted
+
+#: how often what really is is noted, and the longest that the loop waits, in us
+SAMPLE_US: Final = 50_000
+WAIT_US: Final = 50_000
+#: A run that could not begin after a crash is begun anew after so long.
+AGAIN_US: Final = 5 * SECOND
+#: What `rtshcua run` waits for: a heartbeat, then word of whether the vehicle is in the air.
+_HEARTBEAT_US: Final = 10 * SECOND
+_AIR_US: Final = 5 * SECOND
+#: After the last process, the vehicle is watched until it rests or stood still for so long, and at most this long.
+STILL_US: Final = 5 * SECOND
+SETTLE_US: Final = 240 * SECOND
+#: mm/s: what noise and gusts make of a vehicle that stands still
+STILL_MM_S: Final = 700
+#: how long a document speaks that is handed in
+_SPEAKS_US: Final = 300 * SECOND
+_LONGEST_BABBLE: Final = 400
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """Who signs: the log, approvals and recalls, replacements. The trust root must name them for that."""
+
+    log: SigningKey
+    approval: SigningKey
+    mission: SigningKey
+
+
+def fly(
+    bundle: bytes, root: bytes, keys: Keys, scenario: Scenario, flavour: str, seed: int, *, utc_us: int | None = None,
+    tick_us: int = SAMPLE_US, most_s: int = 3_600, chosen: Callable[..., SimulationConfig] = fitting,
+) -> ScenarioFlown:  # fmt: skip
+    """One flight of the bundle under the signed trust root, on the simulated autopilot `flavour`, with this seed.
+
+    `chosen` makes the simulated vehicle, as `fitting` does, for a policy and what is asked of it. A run that has not
+    ended after `most_s` seconds, or out of which an exception comes, is told as the `fault` of what was flown. Raises
+    ValueError for a bundle that is refused, and what `open_root` raises.
+    """
+    return _Flight(bundle, root, keys, scenario, flavour, seed, utc_us, tick_us, most_s, chosen).fly()
+
+
+class _Killed(Exception):
+    """The process of the runtime dies."""
+
+
+class _Sink(MemorySink):
+    """Evidence in memory of a process that may be killed: it knows the class of each line."""
+
+    def __init__(self, *, full: bool) -> None:
+        super().__init__()
+        self.classes: list[int] = []
+        self.full = full
+
+    def append(self, line: bytes, durability: int) -> int:
+        self.classes.append(durability)
+        return super().append(line, durability)
+
+
+class _Watched(Simulation):
+    """The simulation, with what really is noted as time goes, and what it received."""
+
+    def __init__(self, config: SimulationConfig) -> None:
+        super().__init__(config)
+        self.samples: list[Sample] = []
+        self.arrived: list[Arrived] = []
+        self.sent: dict[bytes, int] = {}
+        self._due_us = 0
+        obey = self._face.handle
+
+        def handle(datagram: bytes) -> list[bytes]:
+            at_us = max(self._now_us, self._ticked_us)
+            self.arrived.append(Arrived(at_us, self.sent.get(datagram, at_us), datagram))
+            return obey(datagram)
+
+        self._face.handle = handle  # type: ignore[method-assign]
+
+    def advance(self, to_us: int) -> list[bytes]:
+        """As the simulation does it, and no sample is left out."""
+        datagrams: list[bytes] = []
+        while True:
+            until_us = max(min(to_us, self._due_us), self._now_us)
+            datagrams += super().advance(until_us)
+            if self._now_us >= self._due_us:
+                self._sample()
+            if until_us >= to_us:
+                return datagrams
+
+    def _sample(self) -> None:
+        self._due_us = self._now_us + SAMPLE_US
+        truth = self.truth()
+        self.samples.append(
+            Sample(
+                self._now_us, truth.latitude, truth.longitude, truth.up_mm, truth.speed_mm_s, truth.climb_mm_s,
+                truth.armed, truth.in_air, truth.crashed, truth.mode, truth.battery,
+                getattr(truth, "obstacle_mm", None), getattr(truth, "taken_over_us", None),
+            )
+        )  # fmt: skip
+
+
+class _Flight:
+    """One flight of a scenario: one simulated vehicle, and one process of the runtime after the other."""
+
+    def __init__(
+        self, bundle: bytes, root: bytes, keys: Keys, scenario: Scenario, flavour: str, seed: int, utc_us: int | None,
+        tick_us: int, most_s: int, chosen: Callable[..., SimulationConfig],
+    ) -> None:  # fmt: skip
+        self._bundle, self._root, self._keys, self._scenario = bundle, root, keys, scenario
+        self._flavour, self._seed, self._tick_us, self._most_us = flavour, seed, tick_us, most_s * SECOND
+        self._configs: list[SimulationConfig] = []
+        self._stepped_us = 0  # by how much the machine's time of day was set
+        self._full_until_us: int | None = 0  # None: for good
+        self._lives: list[Life] = []
+        self._happened: list[Happened] = []
+        self._notes: list[str] = []
+        self._chances = [Random(f"{scenario.name} {number} {seed}") for number in range(len(scenario.incidents))]
+        self._agenda: list[tuple[int, int]] = []  # when, and the number of what happens to host or documents
+        self._waits: dict[int, Incident] = {}  # for a step or a condition
+        self._dead_us = 0
+        self._babble: list[tuple[int, int, bytes]] = []  # when, its order, and what is said then
+        self._drawn = 0
+
+        def vehicle(policy: Any) -> SimulationConfig:
+            self._configs.append(self._config(chosen, policy))
+            return self._configs[-1]
+
+        self._flight = VirtualFlight(
+            bundle, vehicle, root=root, log_key=keys.log, utc_us=utc_us, wait_us=WAIT_US, tick_us=tick_us,
+            sink=lambda _: _Sink(full=False),
+        )  # fmt: skip
+        self._world = self._watch(self._flight.vehicle)
+        self._utc_us = self._flight.clock.now().utc_us
+        self._began_us = 0
+        self._begin_life(self._flight)
+        for number, incident in enumerate(scenario.incidents):
+            if isinstance(incident.when, AtTime):
+                self._schedule(number, incident, 0)
+            else:
+                self._waits[number] = incident
+
+    def _config(self, chosen: Callable[..., SimulationConfig], policy: object) -> SimulationConfig:
+        start = self._scenario.start
+        asked: dict[str, object] = {"flavour": Kind(self._flavour), "seed": self._seed}
+        if start.battery is not None:
+            asked["battery"] = start.battery
+        if start.wind_mm_s is not None:
+            asked["wind"] = Wind(start.wind_mm_s, start.wind_from_deg, start.gust_mm_s)
+        return chosen(policy, **asked)
+
+    def _watch(self, vehicle: VirtualVehicle) -> _Watched:
+        world = _Watched(self._configs[-1])
+        self._connect(vehicle, world)
+        return world
+
+    def _connect(self, vehicle: VirtualVehicle, world: _Watched) -> None:
+        vehicle.simulation = world
+
+        def note(frame: bytes) -> bool:
+            world.sent[frame] = vehicle.clock.elapsed_us
+            return False
+
+        vehicle.lose = note
+
+    # -------------------------------------------------------- what happens when
+
+    def _schedule(self, number: int, incident: Incident, since_us: int) -> None:
+        when = incident.when
+        at_us = since_us + self._chances[number].randint(when.from_us, when.to_us)
+        if isinstance(incident.fault, HostFault | AgentFault):
+            heappush(self._agenda, (at_us, number))
+        else:
+            fault = replace(incident.fault, at_us=at_us)
+            self._world.inject(fault)
+            self._happened.append(Happened(number, at_us, fault, incident.text))
+
+    def _begin_life(self, flight: VirtualFlight) -> None:
+        self._flight = flight
+        self._began_us = flight.clock.elapsed_us
+        self._reactions: list[Reaction] = []
+        self._heard_us = flight.clock.elapsed_us
+        self._monitor = StateMonitor(flight.loaded.policy)
+        self._conditions: dict[int, Condition] = {}
+        self._steps = StepWatch(self._machine_us)
+        flight.loop._watch = self._stepped  # the flight's own only counts
+
+    def _machine_us(self) -> tuple[int, int]:
+        clock = self._flight.clock
+        return clock.monotonic_us, self._utc_us + clock.elapsed_us + self._stepped_us
+
+    def _stepped(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
+        """What a turn of the loop did."""
+        at_us = self._flight.clock.elapsed_us
+        for action in actions:
+            if isinstance(action, Dispatch) and not action.needs_record:
+                self._reactions.append(Reaction(self._heard_us, at_us))
+            elif isinstance(action, Append) and self._waits and b'"event":"dispatched"' in action.line:
+                self._dispatched(msgspec.json.decode(action.line), at_us)
+        if self._waits and self._conditional():
+            self._look(now, events, at_us)
+        self._heard_us = at_us
+
+    def _dispatched(self, record: dict[str, Any], at_us: int) -> None:
+        for number, incident in list(self._waits.items()):
+            when = incident.when
+            if isinstance(when, AfterStep) and record["kind"] == 0 and record["step"] == when.step:
+                del self._waits[number]
+                self._schedule(number, incident, at_us)
+
+    def _conditional(self) -> bool:
+        return any(isinstance(incident.when, OnCondition) for incident in self._waits.values())
+
+    def _look(self, now: Now, events: Sequence[Event], at_us: int) -> None:
+        """Whether a condition that something waits for is true in the state that the runtime knows."""
+        monitor, policy = self._monitor, self._flight.loaded.policy
+        for event in events:
+            if isinstance(event, Readings):
+                monitor.update(event)
+        monitor.observe(now)
+        at = environment(situation(monitor.state(now.monotonic_us), policy, now), policy, (), NO_PHASE)
+        for number, incident in list(self._waits.items()):
+            when = incident.when
+            if not isinstance(when, OnCondition):
+                continue
+            condition = self._conditions.get(number)
+            if condition is None:
+                compiler = policy.compiler
+                condition = self._conditions[number] = build(compiler.node(when.condition), compiler.tables)
+            if condition(at) == TRUE:
+                del self._waits[number]
+                self._schedule(number, incident, at_us)
+
+    # -------------------------------------------------------- one process after the other
+
+    def fly(self) -> ScenarioFlown:
+        """Fly until the last process ended and the vehicle rests, or holds."""
+        left: str | None = None
+        fault: str | None = None
+        also: list[Event] = []
+        try:
+            while True:
+                try:
+                    self._live(also)
+                    break
+                except _Killed:
+                    self._bury(lost=True)
+                also, left = self._restart()
+                if left is not None:
+                    break
+        except Exception as error:  # noqa: BLE001  whatever comes out of the runtime is what is looked for
+            fault = "".join(format_exception(error))
+            self._bury(lost=False)
+        ended_us = self._flight.clock.elapsed_us
+        self._settle(ended_us)
+        return self._flown(ended_us, left, fault)
+
+    def _live(self, also: list[Event]) -> None:
+        """Turn by turn until the end. Raises `_Killed`, and TimeoutError for a run that does not end."""
+        flight = self._flight
+        while True:
+            if flight.clock.elapsed_us >= self._most_us:
+                raise TimeoutError(
+                    f"after {self._most_us // SECOND} s it flies still: {flight.runtime.view(flight.clock.now())}"
+                )
+            self._check_disk()
+            also += self._happen()
+            also += self._steps.events(flight.clock.now())
+            how, also = flight.loop.turn(also), []
+            if how is not None:
+                self._close(how)
+                return
+
+    def _close(self, how: Ending) -> None:
+        flight = self._flight
+        flight.close(how)
+        self._lives.append(
+            Life(self._began_us, flight.clock.elapsed_us, how.value, tuple(flight.sink.lines), tuple(self._reactions))
+        )
+
+    def _check_disk(self) -> None:
+        sink = self._flight.sink
+        assert isinstance(sink, _Sink)
+        sink.full = self._is_full()
+
+    def _is_full(self) -> bool:
+        until_us = self._full_until_us
+        return until_us is None or self._flight.clock.elapsed_us < until_us
+
+    def _happen(self) -> list[Event]:
+        """What happens now to the host, and the documents that are handed in now."""
+        events: list[Event] = []
+        clock = self._flight.clock
+        while self._agenda and self._agenda[0][0] <= clock.elapsed_us:
+            _, number = heappop(self._agenda)
+            incident = self._scenario.incidents[number]
+            fault = replace(incident.fault, at_us=clock.elapsed_us)
+            happened = Happened(number, clock.elapsed_us, fault, incident.text)
+            self._happened.append(happened)
+            if isinstance(fault, AgentFault):
+                documents = list(self._documents(number, fault))
+                if not documents:
+                    self._happened[-1] = happened._replace(note="nothing of the mission asks for it")
+                self._present(fault, documents)
+            else:
+                self._hurt(fault)
+        now_us = clock.now().monotonic_us
+        while self._babble and self._babble[0][0] <= clock.elapsed_us:
+            events.append(Presented(now_us, heappop(self._babble)[2], 1))
+        return events
+
+    def _present(self, fault: AgentFault, documents: Sequence[bytes]) -> None:
+        """All at once; babble comes one document a tick."""
+        apart_us = self._tick_us if isinstance(fault, faults.Babble) else 0
+        for count, document in enumerate(documents):
+            self._drawn += 1
+            heappush(self._babble, (fault.at_us + count * apart_us, self._drawn, document))
+
+    def _hurt(self, fault: Fault) -> None:
+        """What goes wrong with the computer that the runtime runs on."""
+        match fault:
+            case faults.RuntimeKilled(_, for_us):
+                self._dead_us = for_us
+                raise _Killed
+            case faults.HostStall(_, for_us):
+                self._flight.vehicle.stand_still(for_us)
+            case faults.DiskFull(at_us, for_us):
+                self._full_until_us = None if for_us is None else at_us + for_us
+                self._check_disk()
+            case faults.ClockStep(_, by_us):
+                self._stepped_us += by_us
+
+    def _bury(self, *, lost: bool) -> None:
+        """Keep what the process leaves behind, and end its log as the next run does.
+
+        A process that is killed between two turns has written all lines but what the writer had no time for: in half of
+        the cases the last line, if nothing was sent on it, is torn.
+        """
+        flight, sink = self._flight, self._flight.sink
+        assert isinstance(sink, _Sink)
+        lines = list(sink.lines)
+        chance = Random(f"{self._scenario.name} killed {len(self._lives)} {self._seed}")
+        if lost and lines and b'"type":"effect"' in lines[-1] and chance.random() < 0.5:
+            lines[-1] = lines[-1][: chance.randrange(1, len(lines[-1]))]
+        recovered = self._recovered(lines, flight.clock.now())
+        self._lives.append(Life(self._began_us, flight.clock.elapsed_us, None, recovered, tuple(self._reactions)))
+
+    def _recovered(self, lines: Sequence[bytes], now: Now) -> tuple[bytes, ...]:
+        key = self._keys.log
+        examination = Examination(key.public)
+        kept = [line for line in lines if examination.take(line)]
+        found = examination.examined()
+        if found.state not in RECOVERABLE:
+            self._notes.append(f"a log was found `{found.state.value}`, and is not recovered")
+            return tuple(lines)
+        draw = partial(int.to_bytes, 1 << 128 | len(self._lives), 32)
+        tail = ending(found, now, lambda text: key.sign(text, duty=Duty.LOG), key.public, draw)
+        return (*kept, *tail.splitlines(keepends=True))
+
+    def _restart(self) -> tuple[list[Event], str | None]:
+        """Begin a run after the one that was killed, as `rtshcua run` does: what it heard, or why there is none."""
+        while True:
+            self._world.advance(self._flight.clock.elapsed_us + self._dead_us)
+            self._flight.clock.elapsed_us += self._dead_us
+            self._skip()
+            if self._flight.clock.elapsed_us >= self._most_us:
+                return [], "it was not begun in all that time"
+            events, why = self._meet()
+            if why is None or not self._world.truth().in_air:
+                return events, why
+            self._notes.append(f"a run did not begin: {why}")
+            self._dead_us = AGAIN_US
+
+    def _skip(self) -> None:
+        """What should have happened to a process while there was none, has not; but the disk and the clock go on."""
+        clock = self._flight.clock
+        while self._agenda and self._agenda[0][0] <= clock.elapsed_us:
+            at_us, number = heappop(self._agenda)
+            incident = self._scenario.incidents[number]
+            fault = replace(incident.fault, at_us=at_us)
+            if isinstance(fault, faults.DiskFull | faults.ClockStep):
+                self._happened.append(Happened(number, at_us, fault, incident.text))
+                self._hurt(fault)
+        self._babble = []
+
+    def _meet(self) -> tuple[list[Event], str | None]:
+        """A new process hears the vehicle, and begins if that flies; what it heard, or why it does not begin."""
+        before = self._flight
+        clock = VirtualClock(Now(START.monotonic_us, self._utc_us + self._stepped_us, START.utc_error_us))
+        clock.elapsed_us = before.clock.elapsed_us
+        self._world.advance(clock.elapsed_us)  # what was said before it listened, nobody heard
+        policy = before.loaded.policy.policy
+        vehicle = VirtualVehicle(
+            policy, self._configs[-1], clock, FrameSession(), manoeuvres=manoeuvres(packs_of(policy.sources)),
+            tick_us=self._tick_us,
+        )  # fmt: skip
+        self._connect(vehicle, self._world)
+        events: list[Event] = []
+
+        def hear(until_us: int, enough: Callable[[], object]) -> None:
+            while not enough() and clock.elapsed_us < until_us:
+                events.extend(vehicle.poll(clock.monotonic_us, WAIT_US))
+
+        hear(clock.elapsed_us + _HEARTBEAT_US, lambda: vehicle.driver.flavour is not None)
+        if vehicle.driver.flavour is not None:
+            hear(clock.elapsed_us + _AIR_US, lambda: vehicle.driver.seen.landed_state)
+        self._flight.clock.elapsed_us = clock.elapsed_us
+        if vehicle.driver.flavour is None:
+            return [], "no-vehicle"
+        if not vehicle.driver.seen.airborne:
+            return [], "replayed"
+        full = self._is_full()
+        before_hash = leaf_hash(self._lives[-1].lines[-1]).hex()
+        try:
+            flight = VirtualFlight(
+                self._bundle, root=self._root, log_key=self._keys.log, wait_us=WAIT_US, resumed=True, vehicle=vehicle,
+                sink=lambda _: _Sink(full=full), tick_us=self._tick_us, before=before_hash,
+            )  # fmt: skip
+        except OSError as error:
+            return [], str(error.strerror)
+        except (Untrusted, ValueError) as error:
+            return [], str(error)
+        self._begin_life(flight)
+        return events, None
+
+    def _settle(self, since_us: int) -> None:
+        """Nobody commands any more: watch until the vehicle rests, or stood still for a while."""
+        world, still_us = self._world, since_us
+        while world.now_us < since_us + SETTLE_US:
+            truth = world.truth()
+            if not truth.in_air and not truth.climb_mm_s:
+                break
+            if truth.speed_mm_s > STILL_MM_S or abs(truth.climb_mm_s) > STILL_MM_S:
+                still_us = world.now_us
+            elif world.now_us - still_us >= STILL_US:
+                break
+            world.advance(world.now_us + SAMPLE_US)
+        world.advance(world.now_us + SAMPLE_US)
+
+    def _flown(self, ended_us: int, left: str | None, fault: str | None) -> ScenarioFlown:
+        bundle, last_us = self._flight.loaded.bundle, self._world.now_us
+        return ScenarioFlown(
+            scenario=self._scenario,
+            flavour=self._flavour,
+            seed=self._seed,
+            policy=bundle.policy,
+            mission=bundle.mission,
+            root=cose.unverified(self._root, limit=MAX_ROOT).kid,
+            start_us=START.monotonic_us,
+            tick_us=self._tick_us,
+            wait_us=WAIT_US,
+            lives=tuple(self._lives),
+            happened=tuple(sorted((each for each in self._happened if each.at_us <= last_us), key=lambda h: h.at_us)),
+            samples=tuple(self._world.samples),
+            arrived=tuple(self._world.arrived),
+            ended_us=ended_us,
+            left=left,
+            fault=fault,
+            notes=tuple(self._notes),
+        )
+
+    # -------------------------------------------------------- documents
+
+    def _documents(self, number: int, fault: AgentFault) -> Iterator[bytes]:
+        """What somebody hands in, signed or not."""
+        loaded, utc_us = self._flight.loaded, self._flight.clock.now().utc_us
+        match fault:
+            case faults.Approval(_, role, copies):
+                yield from copies * self._answers(loaded, role, 1, utc_us)
+            case faults.Disapproval(_, role, copies):
+                yield from copies * self._answers(loaded, role, 0, utc_us)
+            case faults.Recall(_, copies):
+                yield from copies * [self._recall(loaded, utc_us)]
+            case faults.Replacement(_, copies):
+                yield from copies * [self._replacement(loaded)]
+            case faults.Babble(_, copies):
+                yield from self._babbled(loaded, utc_us, copies, self._chances[number])
+
+    def _answers(self, loaded: Loaded, role: str, granted: int, utc_us: int) -> list[bytes]:
+        """Answers of a role to all that it is asked about."""
+        bundle = loaded.bundle
+        policy, vehicle = bundle.policy, bundle.policy.vehicle.identity
+        if role not in policy.roles:
+            return []
+        return [
+            sign_approval(
+                ApprovalDocument(
+                    step.invocation_id, step.binding, vehicle, role, granted, utc_us, utc_us + _SPEAKS_US
+                ),
+                self._keys.approval,
+            )
+            for step in bundle.mission.invocations
+            if confirms(policy, step, policy.roles.index(role))
+        ]  # fmt: skip
+
+    def _recall(self, loaded: Loaded, utc_us: int) -> bytes:
+        vehicle = loaded.bundle.policy.vehicle.identity
+        said = RecallDocument(vehicle, loaded.bundle.mission_digest, b"", utc_us, utc_us + _SPEAKS_US)
+        return sign_recall(said, self._keys.approval)
+
+    def _replacement(self, loaded: Loaded) -> bytes:
+        """The mission in force, its steps after the present one under other ids."""
+        bundle = loaded.bundle
+        present = self._flight.runtime.view(self._flight.clock.now()).step
+        kept = min(present + 1, len(bundle.mission.invocations))
+        return sign_replacement(bundle.mission, over=bundle, kept=kept, key=self._keys.mission)
+
+    def _babbled(self, loaded: Loaded, utc_us: int, copies: int, chance: Random) -> Iterator[bytes]:
+        """Random octets, and documents that were real before an octet of them was changed, lost or doubled."""
+        real = [self._recall(loaded, utc_us), self._replacement(loaded)]
+        for role in loaded.bundle.policy.roles:
+            real += self._answers(loaded, role, 1, utc_us)
+        for _ in range(copies):
+            if chance.random() < 0.3:
+                yield chance.randbytes(chance.randrange(_LONGEST_BABBLE))
+                continue
+            document = bytearray(chance.choice(real))
+            at = chance.randrange(len(document))
+            match chance.randrange(3):
+                case 0:
+                    document[at] ^= 1 << chance.randrange(8)
+                case 1:
+                    del document[at:]
+                case _:
+                    document[at:at] = document[at : at + 8]
+            yield bytes(document)

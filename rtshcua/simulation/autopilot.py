@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from enum import StrEnum
 from functools import partial
 from random import Random
 from types import MappingProxyType
@@ -13,9 +14,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink.layouts import TEXT_OCTETS
 from rtshcua.model.faults import Mode
+from rtshcua.simulation.answers import Lanes
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.command import Command
-from rtshcua.simulation.config import Boot, SimulationConfig
+from rtshcua.simulation.config import Answers, Boot, Estimate, SimulationConfig
 from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
@@ -35,6 +37,8 @@ TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
 LOW_TO_ARM = 0.08
 """The battery level at which it does not arm any more."""
+OFF_US = 1_500_000
+"""How long an autopilot that starts again says nothing: the first frame comes one to two seconds later (recorded)."""
 _REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
 SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
 """The parameters that hold the vehicle's own system id."""
@@ -43,6 +47,13 @@ Handler = Callable[["Autopilot", Command], tuple[int, ...]]
 """Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
 Builder = Callable[["Autopilot"], Message | None]
 """A message with what the vehicle knows now; None if it knows nothing."""
+
+
+class Taker(StrEnum):
+    """Who took the vehicle over from whoever flies it over the link."""
+
+    PILOT = "pilot"
+    FAILSAFE = "failsafe"
 
 
 class Flavour(ABC):
@@ -70,6 +81,7 @@ class Flavour(ABC):
     texts: Mapping[Event, str]
     """`{speed}` is the one of touching down; `{amsl}` and `{up}` are the height of a return, above the sea and home."""
     boot: BootPlan
+    lanes: Lanes
     failsafes: FailsafeRules
     fix: int
     """GPS_RAW_INT.fix_type of a good fix."""
@@ -147,18 +159,25 @@ class Autopilot:
         self.system = config.system
         self.utc_us = config.utc_us
         self.now_us = 0
+        self.since_us = 0
+        """How long ago the last tick was: messages come and are answered between ticks."""
+        self.off_us = 0
+        """How long it goes on saying nothing, for it starts again."""
+        self.taker: Taker | None = None
+        """Who first took the vehicle over in flight, if somebody did."""
         self.link_quality = 10_000
         """What the radio tells of the link, in 1/10000."""
-        self.ground_station_seen = False
-        self.last_target_us: int | None = None
         self.outbox: list[Message] = []
         self.air = Air(config.wind, Random(f"{config.seed} wind"))
         self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
-        fast = config.boot is Boot.FAST
-        pace = flavour.boot.all_s / FAST_S if fast else 1.0
-        self.sensors = Sensors(Random(f"{config.seed} sensors"), config.noise, flavour.coast_s, flavour.boot, pace)
+        self._fast = config.boot is Boot.FAST
+        pace = flavour.boot.all_s / FAST_S if self._fast else 1.0
+        self.sensors = Sensors(
+            Random(f"{config.seed} sensors"), config.noise, flavour.coast_s, flavour.boot, pace,
+            late=config.estimate is Estimate.REAL, strays=config.noise and config.estimate is Estimate.REAL,
+        )  # fmt: skip
+        self._phases = Random(f"{config.seed} phases") if config.answers is Answers.RECORDED else None
         self.surroundings = Surroundings()
-        self._boot_texts = deque(() if fast else flavour.boot.texts)
         handling = replace(
             flavour.handling, cruise=config.cruise_mm_s / 1000, max_speed=config.max_speed_mm_s / 1000,
             return_up=config.return_mm / 1000,
@@ -170,16 +189,25 @@ class Autopilot:
             self.parameters.assign(name, config.system)
         if config.signing_key is not None:
             self.parameters.assign("MAV_SIGN_CFG", 1)
-        self.failsafes = Failsafes(
-            flavour.failsafes, self.vehicle, self.sensors, self.battery, self.parameters.value, self.say
-        )
-        self.streams = Streams(flavour.streams)
-        self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()})
+        self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
         self.signing = VehicleSigning(config.signing_key, config.usb, config.utc_us, config.speed)
         self.plans = Plans()
         self._home_item = flavour.home_item(self.home)
         if self._home_item is not None:
             self.plans.replace(MISSION, (self._home_item,))
+        self._start()
+
+    def _start(self) -> None:
+        """What begins anew with each start. What outlives one is in `__init__`: all that is stored, and the world."""
+        flavour = self.flavour
+        self.ground_station_seen = False
+        self.last_target_us: int | None = None
+        self._boot_texts = deque(() if self._fast else flavour.boot.texts)
+        self.failsafes = Failsafes(
+            flavour.failsafes, self.vehicle, self.sensors, self.battery, self.parameters.value, self.say,
+            self._fail_over,
+        )  # fmt: skip
+        self.streams = Streams(flavour.streams, self._phases)
         self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value)
         self.mission = Mission(
             flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self.send, self.say
@@ -195,13 +223,18 @@ class Autopilot:
 
     def tick(self) -> None:
         """Lets `TICK_US` pass."""
+        if self.off_us:
+            self._stay_off()
+            return
         self.now_us += TICK_US
         self.air.step(_TICK_S)
         sensors, vehicle = self.sensors, self.vehicle
         sensors.step(_TICK_S)
         wind = (self.air.north, self.air.east)
-        load = vehicle.step(_TICK_S, wind, sensors.error, powered=self.battery.level > 0, sees=sensors.has_position)
+        load = vehicle.step(_TICK_S, wind, sensors.error, powered=self.battery.level > 0, sees=sensors.estimates)
         self.battery.drain(_TICK_S, load)
+        if sensors.late:
+            sensors.follow(_TICK_S, vehicle.body)
         if vehicle.in_air and self.surroundings.is_hit(vehicle.body):
             vehicle.crash()
         self.failsafes.step(_TICK_S)
@@ -211,6 +244,40 @@ class Autopilot:
             _, severity, text = self._boot_texts.popleft()
             self.say(severity, text.format(amsl=self.home.amsl_mm // 1000))
         self._tell()
+
+    def reboot(self) -> None:
+        """Starts again: the motors stop, it says nothing for a while, then it comes up with its clock at 0.
+
+        Asked-for streams, modes and targets are forgotten; parameters, plans and keys are stored, and stay.
+        """
+        self.off_us = OFF_US
+        self.vehicle.restart(self.flavour.modes.start)
+        self._pass_away(self.now_us)
+        self.now_us = 0
+        self.outbox.clear()
+
+    def _stay_off(self) -> None:
+        """Lets `TICK_US` pass for the vehicle alone: in the air it falls."""
+        self.air.step(_TICK_S)
+        load = self.vehicle.step(_TICK_S, (self.air.north, self.air.east), self.sensors.error, powered=False)
+        self.battery.drain(_TICK_S, load)
+        if self.vehicle.in_air and self.surroundings.is_hit(self.vehicle.body):
+            self.vehicle.crash()
+        self.vehicle.events.clear()
+        self.off_us -= TICK_US
+        self._pass_away(TICK_US)
+        if not self.off_us:
+            self.sensors.restart()
+            self.plans.listeners.clear()
+            self._start()
+            self.reports.restart()
+            self.plans.read_again()
+            self.outbox.clear()
+
+    def _pass_away(self, time_us: int) -> None:
+        """The time of day goes on without the autopilot's clock."""
+        self.utc_us += time_us
+        self.signing.restart(time_us)
 
     def _tell(self) -> None:
         """What happened, and what stands against arming."""
@@ -246,7 +313,7 @@ class Autopilot:
             flavour.on_mode_in_breach(self)
         began = fence.step(self.now_us, self._where, vehicle.armed and vehicle.in_air)
         if began is not None:
-            flavour.on_breach(self, began)
+            self.take_over(Taker.FAILSAFE, partial(flavour.on_breach, self, began))
         elif breached and fence.breach is None:
             flavour.on_breach_cleared(self)
         self._mode_in_breach = mode
@@ -270,7 +337,21 @@ class Autopilot:
         if timeout is None or vehicle.mode is not Mode.GUIDED or not vehicle.in_air or not vehicle.armed:
             return
         if last is None or self.now_us - last > timeout:
-            vehicle.set_mode(Mode.LOITER)
+            self._fail_over(Mode.LOITER)
+
+    # ------------------------------------------------------------------------------------------- taken over
+
+    def take_over(self, taker: Taker, act: Callable[[], object]) -> None:
+        """Somebody acts who does not fly it over the link: it is taken over if it is armed and obeys."""
+        vehicle = self.vehicle
+        armed, before = vehicle.armed, vehicle.orders
+        act()
+        if armed and self.taker is None and vehicle.orders != before:
+            self.taker = taker
+
+    def _fail_over(self, mode: Mode) -> None:
+        """It enters another mode by itself."""
+        self.take_over(Taker.FAILSAFE, partial(self.vehicle.set_mode, mode))
 
     # ---------------------------------------------------------------------------------------------- state
 
@@ -290,6 +371,9 @@ class Autopilot:
         """Where the vehicle believes to be, noise apart."""
         body, (north, east) = self.vehicle.body, self.sensors.error
         return Point(body.north + north, body.east + east, body.up)
+
+    def _time(self) -> int:
+        return self.now_us
 
     @property
     def boot_ms(self) -> int:

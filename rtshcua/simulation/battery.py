@@ -16,6 +16,9 @@ REST = 0.002
 IDLE = 0.05
 """The load while the motors turn on the ground."""
 
+FAILED_CELL_SAG = 3.0
+"""How many times as much a cell that failed gives way under load: its resistance has risen."""
+
 _INDUCED = 0.7
 """The part of hovering that moves air down; the rest turns the blades."""
 _HOVER_AIR = 7.0
@@ -50,6 +53,10 @@ class Battery:
     used_mah: float = 0.0
     forced_mv: int | None = None
     """What is measured instead of the voltage, if a fault says so."""
+    lost_mv: int = 0
+    """What failed cells do not give any more."""
+    failed: int = 0
+    """How many cells have failed."""
 
     def drain(self, dt: float, load: float) -> None:
         """Takes out what `load` needs for `dt` seconds."""
@@ -61,6 +68,11 @@ class Battery:
     def cap(self, level: float) -> None:
         """Finds that no more than `level` is left."""
         self.level = min(self.level, level)
+
+    def fail_cell(self, drop_mv: int) -> None:
+        """A cell fails: less voltage from now on, and less again under load. The level says nothing of it."""
+        self.lost_mv += drop_mv
+        self.failed = min(_CELLS, self.failed + 1)
 
     @property
     def percent(self) -> int:
@@ -74,7 +86,9 @@ class Battery:
             return self.forced_mv
         below, above = next(pair for pair in pairwise(_CELL_MV) if self.level <= pair[1][0])
         part = (self.level - below[0]) / (above[0] - below[0])
-        return round(_CELLS * (below[1] + part * (above[1] - below[1])) - _SAG_MV * self.load)
+        rest = _CELLS * (below[1] + part * (above[1] - below[1])) - self.lost_mv
+        sag = _SAG_MV * (1.0 + self.failed * (FAILED_CELL_SAG - 1.0) / _CELLS)
+        return max(0, round(rest - sag * self.load))
 
     @property
     def centiamperes(self) -> int:

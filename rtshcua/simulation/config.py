@@ -28,6 +28,24 @@ class Boot(StrEnum):
     """As the real one does: PX4 in 5 s, ArduCopter in 42 s."""
 
 
+class Answers(StrEnum):
+    """How long the autopilot takes to obey and answer."""
+
+    AT_ONCE = "at-once"
+    """No time: when a datagram has come it is obeyed. Streams begin together."""
+    RECORDED = "recorded"
+    """As the real one did: milliseconds, each time others; requests overtake commands. Streams begin at any time."""
+
+
+class Estimate(StrEnum):
+    """How near what the estimator believes is to what is."""
+
+    CLOSE = "close"
+    """Centimetres."""
+    REAL = "real"
+    """As with a satellite receiver: a metre off, slowly straying, and late."""
+
+
 @dataclass(frozen=True, slots=True)
 class SimulationConfig:
     """All that can be chosen; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
@@ -47,6 +65,9 @@ class SimulationConfig:
     wind: Wind = Wind()
     seed: int = 1
     noise: bool = True
+    """Whether sensors have any; without it what is believed does not stray either."""
+    estimate: Estimate = Estimate.CLOSE
+    answers: Answers = Answers.AT_ONCE
     boot: Boot = Boot.FAST
     faults: tuple[Fault, ...] = ()
     signing_key: bytes | None = None

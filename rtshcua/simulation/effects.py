@@ -6,14 +6,14 @@ A pilot's too, past the link: with switches, with sticks, from a ground station 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from math import nan
+from math import cos, nan, radians, sin
 from random import Random
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Way
-from rtshcua.simulation.autopilot import Autopilot
+from rtshcua.simulation.autopilot import Autopilot, Taker
 from rtshcua.simulation.command import Command
 from rtshcua.simulation.faults import message_number
 from rtshcua.simulation.link import Link
@@ -37,6 +37,8 @@ class Affected:
     down: Link
     halt: Callable[[bool], None]
     """Halts the autopilot's loop, or lets it go on."""
+    reboot: Callable[[], None]
+    """Starts the autopilot again."""
 
     def links(self, way: Way) -> tuple[Link, ...]:
         """The links of a direction."""
@@ -58,16 +60,24 @@ def effects(fault: Fault, on: Affected) -> Iterator[Effect]:
         case faults.Obstacle(at_us, distance_mm, for_us):
             see = a.surroundings.see
             yield from _for(at_us, for_us, partial(see, distance_mm / 1000), partial(see, None))
-        case faults.Pillar(at_us, north_mm, east_mm, radius_mm, height_mm, for_us):
-            pillar = Cylinder(north_mm / 1000, east_mm / 1000, radius_mm / 1000, height_mm / 1000)
-            pillars = a.surroundings.pillars
-            yield from _for(at_us, for_us, partial(pillars.append, pillar), partial(pillars.remove, pillar))
+        case faults.Pillar(at_us, north_mm, east_mm, radius_mm, height_mm, for_us, speed_mm_s, towards_deg):
+            place = (north_mm / 1000, east_mm / 1000, radius_mm / 1000, height_mm / 1000)
+            speed, towards = speed_mm_s / 1000, radians(towards_deg)
+            pillar = Cylinder(*place, speed * cos(towards), speed * sin(towards))
+            surroundings = a.surroundings
+            yield from _for(at_us, for_us, partial(surroundings.put, pillar), partial(surroundings.take, pillar))
+        case faults.BatteryCell(at_us, drop_mv):
+            yield at_us, partial(a.battery.fail_cell, drop_mv)
         case faults.BatteryLevel(at_us, level):
             yield at_us, partial(a.battery.cap, level / 10_000)
         case faults.BatteryVoltage(at_us, voltage_mv):
             yield at_us, partial(setattr, a.battery, "forced_mv", voltage_mv)
         case faults.WindStep(at_us, speed_mm_s, from_deg, gust_mm_s):
             yield at_us, partial(a.air.set, Wind(speed_mm_s, from_deg, gust_mm_s))
+        case faults.HostFault() | faults.AgentFault():
+            pass  # not of the vehicle
+        case _:
+            raise _unknown(fault)
 
 
 def _on_receiver(fault: faults.ReceiverFault, a: Autopilot) -> Iterator[Effect]:
@@ -79,6 +89,10 @@ def _on_receiver(fault: faults.ReceiverFault, a: Autopilot) -> Iterator[Effect]:
             yield from _while((sensors,), "glitch", (north_mm / 1000, east_mm / 1000), (0.0, 0.0), at_us, for_us)
         case faults.GpsJump(at_us, north_mm, east_mm):
             yield at_us, partial(sensors.jump, north_mm / 1000, east_mm / 1000)
+        case faults.GpsDrift(at_us, north_mm_s, east_mm_s, for_us):
+            yield from _while((sensors,), "stray", (north_mm_s / 1000, east_mm_s / 1000), (0.0, 0.0), at_us, for_us)
+        case _:
+            raise _unknown(fault)
 
 
 def _on_link(fault: faults.LinkFault, on: Affected) -> Iterator[Effect]:
@@ -104,6 +118,8 @@ def _on_link(fault: faults.LinkFault, on: Affected) -> Iterator[Effect]:
                 yield from _while(links, "silent", True, False, at_us, for_us)
         case faults.LinkQuality(at_us, quality):
             yield at_us, partial(_set, radio, "link_quality", quality)
+        case _:
+            raise _unknown(fault)
 
 
 def _on_autopilot(fault: faults.AutopilotFault, on: Affected) -> Iterator[Effect]:
@@ -122,10 +138,30 @@ def _on_autopilot(fault: faults.AutopilotFault, on: Affected) -> Iterator[Effect
         case faults.MessageSilence(at_us, message, for_us):
             silence = partial(reports.silence, message_number(message))
             yield from _for(at_us, for_us, partial(silence, True), partial(silence, False))
+        case faults.MessageStuck(at_us, message, for_us):
+            stick = partial(reports.stick, message_number(message))
+            yield from _for(at_us, for_us, partial(stick, True), partial(stick, False))
+        case faults.StaleSource(at_us, delay_us, for_us):
+            yield from _for(at_us, for_us, partial(reports.delay, delay_us), partial(reports.delay, 0))
+        case faults.EstimatorUnhealthy(at_us, for_us):
+            yield from _while((on.autopilot.sensors,), "unhealthy", True, False, at_us, for_us)
+        case faults.Reboot(at_us):
+            yield at_us, on.reboot
+        case _:
+            raise _unknown(fault)
+
+
+def _unknown(fault: Fault) -> TypeError:
+    return TypeError(f"nobody has said what {type(fault).__name__} does to a simulated vehicle")
 
 
 def _by_pilot(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
-    """When a pilot does what, and what comes of it."""
+    """When a pilot does what, and takes over if that has an effect."""
+    for at_us, act in _pilots(fault, a):
+        yield at_us, partial(a.take_over, Taker.PILOT, act)
+
+
+def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
     match fault:
         case faults.PilotMode(at_us, mode):
             if mode in a.flavour.modes.numbers:  # the switch has no position for another flavour's mode
@@ -139,6 +175,8 @@ def _by_pilot(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
                 yield at_us + after_us, partial(a.flavour.on_sticks, a, _EVERY_US)
         case faults.Kill(at_us):
             yield at_us, a.vehicle.disarm
+        case _:
+            raise _unknown(fault)
 
 
 def _pause(a: Autopilot) -> None:

@@ -38,18 +38,33 @@ class Face:
         """How many stretches of bytes came that were no good frame."""
         return self._codec.damaged
 
-    def handle(self, datagram: bytes) -> list[bytes]:
-        """Obeys what a datagram holds; the frames that answer it. Never raises, whatever the bytes."""
-        for received in self._codec.parse(datagram):
-            handler = _HANDLERS.get(received.name)
-            if handler is not None and self._is_for_me(received.message) and self._is_trusted(received):
-                handler(self._autopilot, received)
-                self._autopilot.tell_mode()
+    def parse(self, datagram: bytes) -> list[Received]:
+        """The good frames in a datagram, in order. Never raises, whatever the bytes."""
+        return [] if self._autopilot.off_us else self._codec.parse(datagram)
+
+    def lets_in(self, received: Received) -> bool:
+        """Whether a frame is to be obeyed."""
+        return received.name in _HANDLERS and self._is_for_me(received.message) and self._is_trusted(received)
+
+    def obey(self, received: Received) -> list[bytes]:
+        """Obeys a frame that was let in; those that answer it. Never raises, whatever it says."""
+        if self._autopilot.off_us:
+            return []
+        _HANDLERS[received.name](self._autopilot, received)
+        self._autopilot.tell_mode()
         return self._collect()
+
+    def restart(self) -> None:
+        """The autopilot starts again, and counts its frames from the first."""
+        damaged = self._codec.damaged
+        self._codec = Codec(self._system, COMPONENT)
+        self._codec.damaged = damaged
 
     def due(self) -> list[bytes]:
         """The frames to send now: streams that are due, and what happened since."""
         autopilot = self._autopilot
+        if autopilot.off_us:
+            return []
         for number in autopilot.streams.due(autopilot.now_us):
             autopilot.send(autopilot.reports.message(number))
         return self._collect()
@@ -132,7 +147,7 @@ def _setup_signing(a: Autopilot, received: Received) -> None:
 
 def _timesync(a: Autopilot, received: Received) -> None:
     if received.message.tc1 == 0:
-        a.send(mavlink.MAVLink_timesync_message(a.now_us * 1000, received.message.ts1))
+        a.send(mavlink.MAVLink_timesync_message((a.now_us + a.since_us) * 1000, received.message.ts1))
 
 
 def _ping(a: Autopilot, received: Received) -> None:

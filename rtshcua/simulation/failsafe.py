@@ -43,7 +43,7 @@ class FailsafeRules:
 
 
 class Failsafes:
-    """Watches one vehicle. `parameter` reads one by name, `say` sends a text."""
+    """Watches one vehicle. `parameter` reads one by name, `say` sends a text, `enter` enters a mode."""
 
     def __init__(
         self,
@@ -53,6 +53,7 @@ class Failsafes:
         battery: Battery,
         parameter: Callable[[str], float],
         say: Callable[[int, str], None],
+        enter: Callable[[Mode], None],
     ) -> None:
         self._rules = rules
         self._vehicle = vehicle
@@ -60,6 +61,7 @@ class Failsafes:
         self._battery = battery
         self._parameter = parameter
         self._say = say
+        self._enter = enter
         self._without_s = self._low_s = self._back_s = self._measured_s = 0.0
         self._lands_blind = False
         self.low_voltage = False
@@ -78,7 +80,7 @@ class Failsafes:
         self._watch_position(dt)
         if vehicle.mode is not Mode.LAND and battery.level <= LOW_TO_LAND:
             self._say(*self._rules.level)
-            vehicle.set_mode(Mode.LAND)
+            self._enter(Mode.LAND)
 
     def _watch_position(self, dt: float) -> None:
         has_position = self._sensors.has_position
@@ -87,7 +89,8 @@ class Failsafes:
         if self._vehicle.mode in NEEDS_POSITION and self._without_s > self._rules.position_after_s:
             for text in self._rules.position:
                 self._say(*text)
-            self._vehicle.set_mode(Mode.LAND)
+            self._enter(Mode.LAND)
+            self._vehicle.blind = True
             self._vehicle.wait(self._rules.land_pause_s)
             self._lands_blind = True
         elif self._lands_blind and self._back_s >= _BACK_S:
@@ -107,4 +110,4 @@ class Failsafes:
             self._say(4, rules.low_text)
             mode = {1: Mode.LAND, 2: Mode.RETURN}.get(round(self._parameter(rules.low_action)))
             if mode is not None and self._vehicle.in_air:
-                self._vehicle.set_mode(mode)
+                self._enter(mode)

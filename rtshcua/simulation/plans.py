@@ -156,5 +156,14 @@ class Plans:
     def replace(self, kind: int, items: Sequence[Item]) -> None:
         """Stores other items in place of all of that kind."""
         self._items[kind] = tuple(items)
+        self._tell(kind)
+
+    def read_again(self) -> None:
+        """Tells of each kind that is stored, as after a start."""
+        for kind, items in self._items.items():
+            if items:
+                self._tell(kind)
+
+    def _tell(self, kind: int) -> None:
         for listener in self.listeners:
             listener(kind)

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.simulation.autopilot import TICK_US
-from rtshcua.simulation.config import HOME, Boot, Kind, SimulationConfig
+from rtshcua.simulation.config import HOME, Answers, Boot, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.faults import parse_fault
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
@@ -47,6 +47,8 @@ def parser() -> argparse.ArgumentParser:
     add("--return-at", type=_number(float, 2, 1000), default=30.0, help="metres above home that a return climbs to")
     add("--wind", type=_listed("SPEED,FROM[,GUST]", 2, 3), default=[0.0, 0.0], help="m/s, degrees, m/s")
     add("--no-noise", action="store_true", help="sensors without noise")
+    add("--estimate", choices=list(Estimate), default=Estimate.CLOSE, help="how near it is to what is: cm, or as real")
+    add("--answers", choices=list(Answers), default=Answers.RECORDED, help="how long each takes: none, or as recorded")
     add("--boot", choices=list(Boot), default=Boot.FAST, help="how sensors come up: in a second, or as recorded")
     add("--signing-key", type=_key, metavar="FILE", help="the link's key: 32 octets, or as many in hexadecimal")
     add("--usb", action="store_true", help="the vehicle takes the link for USB: it obeys without signatures")
@@ -72,6 +74,8 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         wind=Wind(round(speed * 1000), round(from_deg), round(gust[0] * 1000) if gust else 0),
         seed=options.seed,
         noise=not options.no_noise,
+        estimate=Estimate(options.estimate),
+        answers=Answers(options.answers),
         boot=Boot(options.boot),
         faults=tuple(options.fault),
         signing_key=options.signing_key,
@@ -198,7 +202,7 @@ class _Loop:
         sleep = min(max(TICK_US / 1_000_000 / self._speed, _SHORTEST_SLEEP_S), _LONGEST_SLEEP_S)
         last, now_us = time.monotonic(), 0.0
         while not self._ended:
-            ready = [key.fileobj for key, _ in selector.select(sleep)]
+            ready = [key.fileobj for key, _ in selector.select(self._until_next(sleep, now_us))]
             now = time.monotonic()
             now_us += min((now - last) * self._speed * 1_000_000, _LEAP_US)
             last = now
@@ -207,6 +211,13 @@ class _Loop:
             if self._link in ready:
                 self._hear(int(now_us))
             self._send(self._simulation.advance(int(now_us)))
+
+    def _until_next(self, sleep: float, now_us: float) -> float:
+        """How long to sleep: less if the vehicle answers before."""
+        next_us = self._simulation.next_us
+        if next_us is None:
+            return sleep
+        return min(sleep, max(_SHORTEST_SLEEP_S, (next_us - now_us) / 1_000_000 / self._speed))
 
     def _hear(self, at_us: int) -> None:
         while True:

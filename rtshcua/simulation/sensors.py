@@ -4,6 +4,7 @@ What is ahead: `surroundings`.
 """
 
 from dataclasses import dataclass
+from math import sqrt
 from random import Random
 
 from rtshcua.simulation.kinematics import Body
@@ -52,15 +53,31 @@ _DRIFT = 0.2
 """How fast the estimate strays in each axis while there is no good fix, m/s."""
 _ESTIMATE_NOISE, _FIX_NOISE = 0.03, 0.3
 
+LATE_S = 0.1
+"""How late position and velocity of a real estimate are. Chosen: the recordings do not hold what really was."""
+FIX_LATE_S = 0.16
+"""The same of the receiver's fix: ArduCopter's was 58 to 64 ms behind the estimate on all three recorded flights."""
+WANDER_M, WANDER_S, WANDER_STEP_S = 0.7, 60.0, 1.0
+"""How far a receiver strays in each axis (1 m in the plane; standard deviation), and how long an error lasts."""
+
 
 class Sensors:
     """Sensors with noise from a seeded source.
 
     `coast_s`: how long the estimator goes on without a fix that it believes. `pace`: how much faster than `plan` they
-    come up.
+    come up. `late`: whether what is believed lags behind what is; `strays`: whether the receiver wanders.
     """
 
-    def __init__(self, chance: Random, noisy: bool, coast_s: float, plan: BootPlan, pace: float) -> None:
+    def __init__(
+        self, chance: Random, noisy: bool, coast_s: float, plan: BootPlan, pace: float,
+        late: bool = False, strays: bool = False,
+    ) -> None:  # fmt: skip
+        self.late = late
+        self._strays = strays
+        self._velocity = (0.0, 0.0, 0.0)
+        self._wander = (0.0, 0.0)
+        self._wandering = (0.0, 0.0)
+        self._turns_s = 0.0  # until it wanders elsewhere
         self._chance = chance
         self._noisy = noisy
         self._coast_s = coast_s
@@ -68,6 +85,10 @@ class Sensors:
         self._jump = (0.0, 0.0)
         self.glitch = (0.0, 0.0)
         """How far the receiver alone is off, metres north and east: the estimator does not believe it."""
+        self.stray = (0.0, 0.0)
+        """How fast the receiver strays, m/s north and east: slowly enough to be believed."""
+        self.unhealthy = False
+        """Whether the estimator says that it cannot be trusted, and goes on estimating."""
         self._drift = 0.0
         self._last_fix: Point | None = None
         self._plan = plan
@@ -88,6 +109,35 @@ class Sensors:
             self._drift += _DRIFT * dt
         else:
             self._without_fix_s = self._drift = 0.0
+            if self._strays:
+                self._stray(dt)
+        if self.stray != (0.0, 0.0):
+            self.jump(self.stray[0] * dt, self.stray[1] * dt)
+
+    def _stray(self, dt: float) -> None:
+        """An Ornstein-Uhlenbeck process in each axis, in steps of a second and straight between."""
+        self._turns_s -= dt
+        if self._turns_s <= 0:
+            self._turns_s += WANDER_STEP_S
+            back, spread = 1 / WANDER_S, WANDER_M * sqrt(2 * WANDER_STEP_S / WANDER_S) / WANDER_STEP_S
+            north, east = self._wander
+            self._wandering = (
+                -north * back + self._chance.gauss(0, spread), -east * back + self._chance.gauss(0, spread)
+            )  # fmt: skip
+        self._wander = (self._wander[0] + self._wandering[0] * dt, self._wander[1] + self._wandering[1] * dt)
+
+    def follow(self, dt: float, body: Body) -> None:
+        """Lets the estimate of the velocity follow, as late as it is."""
+        part = dt / LATE_S
+        north, east, up = self._velocity
+        self._velocity = (
+            north + (body.v_north - north) * part, east + (body.v_east - east) * part, up + (body.v_up - up) * part
+        )  # fmt: skip
+
+    def restart(self) -> None:
+        """The autopilot starts again: sensors and estimator come up anew. What is wrong with the receiver stays."""
+        self.age_s = self._without_fix_s = self._drift = 0.0
+        self._come_up()
 
     def _come_up(self) -> None:
         plan, age_s = self._plan, self.age_s
@@ -130,29 +180,46 @@ class Sensors:
     @property
     def has_position(self) -> bool:
         """Whether the estimator vouches for its position."""
+        return self.estimates and not self.unhealthy
+
+    @property
+    def estimates(self) -> bool:
+        """Whether the estimator has a position, whatever it says of it."""
         return self._without_fix_s < self._coast_s and self.locates
 
     @property
     def error(self) -> tuple[float, float]:
         """How far the estimate is off, north and east, noise apart. The vehicle steers by the estimate."""
-        return self._jump[0] + self._drift, self._jump[1] + self._drift
+        wander = self._wander
+        return self._jump[0] + self._drift + wander[0], self._jump[1] + self._drift + wander[1]
+
+    def velocity(self, body: Body) -> tuple[float, float, float]:
+        """The velocity that GLOBAL_POSITION_INT reports: north, east and up."""
+        return self._velocity if self.late else (body.v_north, body.v_east, body.v_up)
 
     def estimate(self, body: Body) -> Point:
         """The position that GLOBAL_POSITION_INT reports."""
         north, east = self.error
+        up = body.up
+        if self.late:
+            north, east, up = (
+                north - self._velocity[0] * LATE_S, east - self._velocity[1] * LATE_S, up - self._velocity[2] * LATE_S
+            )  # fmt: skip
         return Point(
             body.north + north + self._draw(_ESTIMATE_NOISE),
             body.east + east + self._draw(_ESTIMATE_NOISE),
-            body.up + self._draw(_ESTIMATE_NOISE),
+            up + self._draw(_ESTIMATE_NOISE),
         )
 
     def fix(self, body: Body) -> Point:
         """The position that GPS_RAW_INT reports; the last one over again while there is no fix."""
         if self.has_fix or self._last_fix is None:
+            late_s = FIX_LATE_S if self.late else 0.0
+            north, east, up = self._velocity
             self._last_fix = Point(
-                body.north + self._jump[0] + self.glitch[0] + self._draw(_FIX_NOISE),
-                body.east + self._jump[1] + self.glitch[1] + self._draw(_FIX_NOISE),
-                body.up + self._draw(_FIX_NOISE),
+                body.north - north * late_s + self._jump[0] + self._wander[0] + self.glitch[0] + self._draw(_FIX_NOISE),
+                body.east - east * late_s + self._jump[1] + self._wander[1] + self.glitch[1] + self._draw(_FIX_NOISE),
+                body.up - up * late_s + self._draw(_FIX_NOISE),
             )
         return self._last_fix
 

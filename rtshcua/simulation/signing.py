@@ -22,6 +22,7 @@ class VehicleSigning:
     def __init__(self, key: bytes | None, usb: bool, utc_us: int, speed: int) -> None:
         self._usb = usb
         self._speed = speed
+        self._before_us = 0  # how long it ran before it was started again
         self._link: SignedLink | None = None
         if key is not None:
             self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US), 0)
@@ -47,9 +48,13 @@ class VehicleSigning:
         else:
             self._link = None
 
+    def restart(self, after_us: int) -> None:
+        """The autopilot starts again, `after_us` after the last start: its clock begins anew, time stamps go on."""
+        self._before_us += after_us
+
     def seal(self, frame: bytes, now_us: int) -> bytes:
         """The frame as it leaves: signed, if there is a key."""
         return frame if self._link is None else self._link.sign(frame, self._clock(now_us))
 
     def _clock(self, now_us: int) -> int:
-        return now_us * _FULL_SPEED // self._speed
+        return (self._before_us + now_us) * _FULL_SPEED // self._speed

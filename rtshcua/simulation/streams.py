@@ -1,17 +1,23 @@
 """What an autopilot sends unasked, and what faults make of its messages: old values, or none."""
 
+from collections import deque
 from collections.abc import Callable, Mapping
+from copy import copy
+from random import Random
 
 from rtshcua.codec.frames import Message
 
 
 class Streams:
-    """The intervals of a vehicle's streams, in microseconds. `default` holds those that run from boot."""
+    """The intervals of a vehicle's streams, in microseconds. `default` holds those that run from boot.
 
-    def __init__(self, default: Mapping[int, int]) -> None:
+    `phases` draws when each of them begins, within its interval; without it all begin together.
+    """
+
+    def __init__(self, default: Mapping[int, int], phases: Random | None = None) -> None:
         self._default = dict(default)
         self._interval = dict(default)
-        self._due = dict.fromkeys(default, 0)
+        self._due = {number: phases.randrange(every) if phases else 0 for number, every in default.items()}
         self._next_us = 0  # nothing is due before
 
     def set(self, message_id: int, interval_us: int) -> None:
@@ -48,15 +54,25 @@ class Streams:
 
 ALWAYS = frozenset({"HEARTBEAT", "SYSTEM_TIME", "TIMESYNC"})
 """What does not hold a measurement, and goes on when the others are frozen."""
+_STAMPS: Mapping[str, int] = {"time_boot_ms": 1_000, "time_usec": 1}
+"""The fields that tell when, since the start, and how many microseconds one of each is."""
 
 
 class Reports:
-    """Builds the messages of one autopilot by their numbers. A fault may silence one, or freeze all."""
+    """Builds the messages of one autopilot by their numbers. A fault may silence one, or let it stick, or freeze all,
+    or delay all at the source.
 
-    def __init__(self, build: Mapping[int, Callable[[], Message | None]]) -> None:
+    `clock` tells the microseconds since the start.
+    """
+
+    def __init__(self, build: Mapping[int, Callable[[], Message | None]], clock: Callable[[], int]) -> None:
         self._build = build
+        self._clock = clock
         self._silent: set[int] = set()
+        self._stuck: dict[int, Message | None] = {}
         self._old: dict[int, Message | None] | None = None
+        self._delay_us = 0
+        self._made: dict[int, deque[tuple[int, Message | None]]] = {}
 
     def __contains__(self, number: int) -> bool:
         return number in self._build
@@ -67,15 +83,53 @@ class Reports:
             return None
         if self._old is not None and number in self._old:
             return self._old[number]
+        if self._stuck and number in self._stuck:
+            return self._with_new_stamps(self._stuck[number])
+        if self._delay_us and number in self._made:
+            return self._delayed(number)
         return self._build[number]()
 
     def silence(self, number: int, silent: bool) -> None:
         """From now on this message does not come, or comes again."""
         (self._silent.add if silent else self._silent.discard)(number)
 
+    def stick(self, number: int, stuck: bool) -> None:
+        """From now on this message keeps its values, with new time stamps; or tells what is again."""
+        if stuck:
+            self._stuck[number] = self._build[number]() if number in self._build else None
+        else:
+            self._stuck.pop(number, None)
+
     def freeze(self, frozen: bool) -> None:
         """From now on all measurements are those of now, time stamps included; or fresh ones again."""
-        self._old = None
-        if frozen:
-            now = {number: build() for number, build in self._build.items()}
-            self._old = {number: m for number, m in now.items() if m is None or m.get_type() not in ALWAYS}
+        self._old = self._measured() if frozen else None
+
+    def delay(self, delay_us: int) -> None:
+        """From now on all measurements are as old as this when they are sent, and say so; or fresh ones again, at 0."""
+        self._delay_us = delay_us
+        now_us = self._clock()
+        self._made = {number: deque([(now_us, m)]) for number, m in self._measured().items()} if delay_us else {}
+
+    def restart(self) -> None:
+        """The clock begins anew: what was made before is not known any more."""
+        self.delay(self._delay_us)
+
+    def _measured(self) -> dict[int, Message | None]:
+        now = {number: build() for number, build in self._build.items()}
+        return {number: m for number, m in now.items() if m is None or m.get_type() not in ALWAYS}
+
+    def _delayed(self, number: int) -> Message | None:
+        made, now_us = self._made[number], self._clock()
+        made.append((now_us, self._build[number]()))
+        while len(made) > 1 and made[1][0] <= now_us - self._delay_us:
+            made.popleft()
+        return made[0][1]
+
+    def _with_new_stamps(self, message: Message | None) -> Message | None:
+        if message is None:
+            return None
+        renewed, now_us = copy(message), self._clock()
+        for name, unit_us in _STAMPS.items():
+            if hasattr(renewed, name):
+                setattr(renewed, name, now_us // unit_us)
+        return renewed

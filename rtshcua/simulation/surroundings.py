@@ -68,14 +68,16 @@ _BEAM = radians(2.5)
 """Half of what the sensor that looks ahead sees at once, and of a sector."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, slots=True)
 class Cylinder:
-    """A tree, a mast, a house: round, from the ground up. The place is that of its middle."""
+    """A tree, a mast, a house, a crane that drives: round, from the ground up. The place is that of its middle."""
 
     north: float
     east: float
     radius: float
     height: float
+    v_north: float = 0.0
+    v_east: float = 0.0
 
     def seen_from(self, body: Body, bearing: float) -> float | None:
         """How far away it is at this bearing from north; None if it is not there, or the vehicle is above it."""
@@ -95,13 +97,39 @@ class Cylinder:
         """Whether the vehicle is where this is."""
         return body.up < self.height and hypot(self.north - body.north, self.east - body.east) < self.radius
 
+    def distance(self, body: Body) -> float:
+        """How far it is from the vehicle, over the ground or through the air above it; 0 inside."""
+        across = hypot(self.north - body.north, self.east - body.east) - self.radius
+        return hypot(max(0.0, across), max(0.0, body.up - self.height))
+
 
 class Surroundings:
     """All that stands around, and what is said to be ahead though it stands nowhere."""
 
     def __init__(self) -> None:
         self.pillars: list[Cylinder] = []
+        self.moving = False
+        """Whether one of them moves."""
         self._ahead: float | None = None
+
+    def put(self, pillar: Cylinder) -> None:
+        """Something stands there from now on, or moves from there."""
+        self.pillars.append(pillar)
+        self.moving = self.moving or (pillar.v_north, pillar.v_east) != (0.0, 0.0)
+
+    def take(self, pillar: Cylinder) -> None:
+        """It is gone."""
+        self.pillars.remove(pillar)
+
+    def step(self, dt: float) -> None:
+        """Lets `dt` seconds pass for what moves."""
+        for pillar in self.pillars:
+            pillar.north += pillar.v_north * dt
+            pillar.east += pillar.v_east * dt
+
+    def distance(self, body: Body) -> float | None:
+        """How far the nearest thing is; None if nothing stands there."""
+        return min((pillar.distance(body) for pillar in self.pillars), default=None)
 
     def see(self, distance_m: float | None) -> None:
         """Something stays ahead at this distance, wherever the vehicle goes; or does no more."""

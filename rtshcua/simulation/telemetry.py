@@ -69,7 +69,7 @@ def sys_status(a: Autopilot) -> Message | None:
         healthy &= ~mavlink.MAV_SYS_STATUS_GEOFENCE
     if not a.sensors.has_fix:
         healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
-    if not a.sensors.consistent:
+    if not a.sensors.consistent or a.sensors.unhealthy:
         healthy &= ~mavlink.MAV_SYS_STATUS_AHRS
     if a.failsafes.low_voltage:
         healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
@@ -105,6 +105,7 @@ def global_position_int(a: Autopilot) -> Message | None:
     if not sensors.receives:
         return mavlink.MAVLink_global_position_int_message(a.boot_ms, 0, 0, 0, 0, 0, 0, 0, 0)
     point = sensors.estimate(body)
+    v_north, v_east, v_up = sensors.velocity(body)
     latitude, longitude = a.home.globe(point.north, point.east)
     up = round(point.up * 1000) if sensors.has_origin else 0
     return mavlink.MAVLink_global_position_int_message(
@@ -113,9 +114,9 @@ def global_position_int(a: Autopilot) -> Message | None:
         longitude,
         a.home.amsl_mm + up,
         up,
-        round(body.v_north * 100),
-        round(body.v_east * 100),
-        round(-body.v_up * 100),
+        round(v_north * 100),
+        round(v_east * 100),
+        round(-v_up * 100),
         round(degrees(body.yaw) * 100) % 36_000,
     )
 
@@ -130,14 +131,15 @@ def vfr_hud(a: Autopilot) -> Message:
     """VFR_HUD."""
     body = a.vehicle.body
     throttle = round(min(100.0, 45 * a.battery.load)) if a.vehicle.in_air else 0
+    v_north, v_east, v_up = a.sensors.velocity(body)
     airspeed = hypot(body.v_north - a.air.north, body.v_east - a.air.east) if a.vehicle.in_air else 0.0
     return mavlink.MAVLink_vfr_hud_message(
         airspeed,
-        hypot(body.v_north, body.v_east),
+        hypot(v_north, v_east),
         round(degrees(body.yaw)) % 360,
         throttle,
         a.home.amsl_mm / 1000 + body.up,
-        body.v_up,
+        v_up,
     )
 
 

@@ -118,6 +118,11 @@ class Vehicle:
         return self._activity in (Activity.DESCEND, Activity.TOUCHED)
 
     @property
+    def orders(self) -> tuple[object, ...]:
+        """What it is about: another one when somebody told it something that it obeys."""
+        return self.mode, self.armed, self._activity, self.target, self.destination, self.paused
+
+    @property
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
         wanted = self.handling.cruise if self._speed is None else self._speed
@@ -156,6 +161,14 @@ class Vehicle:
         self.events.append(event)
         if self.handling.after_landing is not None and not self.in_air:
             self.mode = self.handling.after_landing
+
+    def restart(self, mode: Mode) -> None:
+        """The autopilot starts again, and comes up in this mode: the motors stop, and all that it was told is gone."""
+        self.disarm()
+        self.events.clear()
+        self.mode = mode
+        self.takeoff_up = self.destination = self._speed = self._nose = None
+        self.blind = self.sent = self.paused = False
 
     def crash(self) -> None:
         """Has flown into something: it falls. The motors are on, for all that the autopilot knows."""

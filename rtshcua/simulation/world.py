@@ -11,10 +11,12 @@ from itertools import count
 from math import hypot
 from random import Random
 
+from rtshcua.codec.frames import Received
 from rtshcua.model.faults import Fault, Mode
+from rtshcua.simulation.answers import Inbox
 from rtshcua.simulation.ardupilot.flavour import ArduCopter
-from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour, Taker
+from rtshcua.simulation.config import Answers, Kind, SimulationConfig
 from rtshcua.simulation.effects import Affected, effects
 from rtshcua.simulation.face import Face
 from rtshcua.simulation.link import Link
@@ -40,18 +42,31 @@ class Truth:
     battery: int
     crashed: bool
     """Whether it flew into something, or came down too hard."""
+    distance_to_obstacle_mm: int | None
+    """How far the nearest thing is that stands around or moves there, through the air; 0 in contact, None for none."""
+    wind_north_mm_s: int
+    """Where the air goes now, gusts included."""
+    wind_east_mm_s: int
+    taken_over_us: int | None
+    """When a pilot or a failsafe first took over in flight, or while it was armed, so that it obeyed; None before."""
+    taken_over_by: Taker | None
 
 
 class Simulation:
     """A vehicle, the air around it, and the link to it. Times are microseconds since its start."""
 
     def __init__(self, config: SimulationConfig) -> None:
-        self._autopilot = Autopilot(FLAVOURS[config.flavour], config)
+        flavour, recorded = FLAVOURS[config.flavour], config.answers is Answers.RECORDED
+        self._autopilot = Autopilot(flavour, config)
         self._face = Face(self._autopilot, config.system)
         self._up = Link(Random(f"{config.seed} uplink"))
         self._down = Link(Random(f"{config.seed} downlink"))
         self._now_us = self._ticked_us = 0
         self._halted = False
+        self._taken_over_us: int | None = None
+        self._inbox = Inbox(flavour.lanes, Random(f"{config.seed} answers")) if recorded else None
+        self.heard: Callable[[int, bytes], None] | None = None
+        """Is given each good frame that comes to the vehicle, and when, if somebody wants to know."""
         self._events: list[tuple[int, int, Callable[[], object]]] = []
         self._order = count()
         for fault in config.faults:
@@ -63,23 +78,38 @@ class Simulation:
         return self._now_us
 
     @property
+    def next_us(self) -> int | None:
+        """When the vehicle gets to what it was sent, if that waits for it: the time to advance to for its answer."""
+        return None if self._inbox is None else self._inbox.next_us
+
+    @property
     def damaged(self) -> int:
         """How many stretches of bytes the vehicle received that were no good frame."""
         return self._face.damaged
 
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
+        autopilot = self._autopilot
         while self._ticked_us + TICK_US <= to_us:
-            self._ticked_us = at_us = self._ticked_us + TICK_US
+            at_us = self._ticked_us + TICK_US
+            if self._inbox:
+                self._obey(self._inbox, at_us - 1)
+            self._ticked_us = at_us
+            if autopilot.surroundings.moving:
+                autopilot.surroundings.step(TICK_US / 1_000_000)
             self._happen(at_us)
             self._deliver(at_us)
             if not self._halted:
-                self._autopilot.tick()
+                autopilot.tick()
                 for frame in self._face.due():
                     self._down.send(frame, at_us)
+            if autopilot.taker is not None and self._taken_over_us is None:
+                self._taken_over_us = at_us
             for frame in self._face.radio_due(at_us):
                 self._down.send(frame, at_us)
         self._now_us = max(self._now_us, to_us)
+        if self._inbox:
+            self._obey(self._inbox, self._now_us)
         return self._down.due(self._now_us)
 
     def receive(self, data: bytes, at_us: int) -> list[bytes]:
@@ -94,13 +124,15 @@ class Simulation:
 
     def inject(self, fault: Fault) -> None:
         """Adds a fault; one whose time is over happens at the next tick."""
-        for at_us, effect in effects(fault, Affected(self._autopilot, self._up, self._down, self._halt)):
+        on = Affected(self._autopilot, self._up, self._down, self._halt, self._reboot)
+        for at_us, effect in effects(fault, on):
             heappush(self._events, (at_us, next(self._order), effect))
 
     def truth(self) -> Truth:
         """What really is, as of the last tick."""
         vehicle = self._autopilot.vehicle
         body = vehicle.body
+        distance = self._autopilot.surroundings.distance(body)
         return Truth(
             round(body.north * 1000),
             round(body.east * 1000),
@@ -113,16 +145,50 @@ class Simulation:
             vehicle.mode,
             round(self._autopilot.battery.level * 10_000),
             vehicle.crashed,
+            None if distance is None else round(distance * 1000),
+            round(self._autopilot.air.north * 1000),
+            round(self._autopilot.air.east * 1000),
+            self._taken_over_us,
+            self._autopilot.taker,
         )
 
     def _halt(self, halted: bool) -> None:
         """The autopilot's loop halts, or goes on: while it does the autopilot stands still, its clock too."""
         self._halted = halted
 
+    def _reboot(self) -> None:
+        self._autopilot.reboot()
+        self._face.restart()
+        if self._inbox:
+            self._inbox.clear()
+
     def _deliver(self, now_us: int) -> None:
-        for datagram in [] if self._halted else self._up.due(now_us):
-            for frame in self._face.handle(datagram):
-                self._down.send(frame, now_us)
+        """What has come over the link is obeyed, at once or when the autopilot gets to it."""
+        if self._halted:
+            return
+        inbox = self._inbox
+        for datagram in self._up.due(now_us):
+            for received in self._face.parse(datagram):
+                if self.heard is not None:
+                    self.heard(now_us, received.frame)
+                if not self._face.lets_in(received):
+                    continue
+                if inbox is None:
+                    self._answer(received, now_us)
+                else:
+                    inbox.put(received, now_us)
+        if inbox:
+            self._obey(inbox, now_us)
+
+    def _obey(self, inbox: Inbox, until_us: int) -> None:
+        if not self._halted:
+            for at_us, received in inbox.due(until_us):
+                self._answer(received, max(at_us, self._ticked_us))  # what waited while it was halted comes after
+
+    def _answer(self, received: Received, now_us: int) -> None:
+        self._autopilot.since_us = now_us - self._ticked_us
+        for frame in self._face.obey(received):
+            self._down.send(frame, now_us)
 
     def _happen(self, now_us: int) -> None:
         while self._events and self._events[0][0] <= now_us:

@@ -15,6 +15,7 @@ from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
 from rtshcua.model.faults import Mode
 from rtshcua.simulation import plans
+from rtshcua.simulation.answers import Delays, Lanes
 from rtshcua.simulation.ardupilot.commands import COMMANDS, above_home, enter_number
 from rtshcua.simulation.ardupilot.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.ardupilot.telemetry import BUILDERS, DEFAULT, GROUPS
@@ -39,6 +40,9 @@ _BASE = (
 """In every mode; guided in those that hold a place."""
 _REPOSITION_M_S = 1.25
 """Half of WPNAV_ACCEL, as `land_run_horizontal_control` takes it."""
+
+_PARAMETERS = frozenset({"PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "PARAM_SET"})
+"""What another thread answers (`GCS_MAVLINK::param_io_timer`)."""
 
 _CEILING, _CIRCLE, _POLYGON = 1, 2, 4
 """The bits of FENCE_TYPE; the floor (8) is not in this vehicle."""
@@ -146,6 +150,15 @@ class ArduCopter(Flavour):
             (41.6, _INFO, "EKF3 IMU1 is using GPS"),
         ),
     )
+    lanes = Lanes(
+        lambda received: received.name in _PARAMETERS,
+        (
+            Delays(
+                (0, 200), (10, 3_000), (30, 4_300), (50, 5_500), (70, 5_900), (90, 6_900), (98, 13_200), (100, 23_100)
+            ),
+            Delays((0, 1_100), (10, 4_900), (30, 6_600), (50, 11_800), (60, 75_800), (100, 94_200)),
+        ),
+    )  # fmt: skip
     failsafes = FailsafeRules(
         position=((_CRITICAL, "EKF variance"), (_CRITICAL, "EKF Failsafe: changed to LAND Mode")),
         position_after_s=0.9,

@@ -37,6 +37,10 @@ _GLITCHING = 1 << 15
 """EKF_GPS_GLITCHING of ArduPilot's EKF_STATUS_FLAGS; the dialect does not have it."""
 
 
+_REJECTED = 1.2
+"""A variance above 1 means that what was measured is refused; FS_EKF_THRESH is 0.8."""
+
+
 def _ekf_status_report(a: Autopilot) -> Message | None:
     sensors = a.sensors
     if not sensors.answers:
@@ -47,9 +51,12 @@ def _ekf_status_report(a: Autopilot) -> Message | None:
         flags = _FIRST_FLAGS
     else:
         flags = GOOD_FLAGS if sensors.has_position else LOST_FLAGS
+    if sensors.unhealthy:
+        flags = 0  # each flag asks `filterHealthy` (AP_NavEKF3_Outputs.cpp, `updateFilterStatus`)
     if sensors.glitching:
         flags |= _GLITCHING
-    return mavlink.MAVLink_ekf_status_report_message(flags, 0.008, 0.005, 0.001, 0.006, 0.0)
+    velocity, place = (_REJECTED, _REJECTED) if sensors.unhealthy else (0.008, 0.005)
+    return mavlink.MAVLink_ekf_status_report_message(flags, velocity, place, 0.001, 0.006, 0.0)
 
 
 def _wind(a: Autopilot) -> Message | None:

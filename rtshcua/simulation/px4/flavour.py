@@ -14,6 +14,7 @@ from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
 from rtshcua.model.faults import Mode
+from rtshcua.simulation.answers import Delays, Lanes
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
 from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
@@ -33,6 +34,10 @@ _ORBITS = enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | enums.MAV_MODE_FLAG_STABILIZ
 _BY_PILOT = _ORBITS | enums.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 _BY_ITSELF = _ORBITS | enums.MAV_MODE_FLAG_AUTO_ENABLED | enums.MAV_MODE_FLAG_GUIDED_ENABLED
 _AUTOMATIC = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND, Mode.ORBIT})
+
+_COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
+_BY_RECEIVER = frozenset({mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL})
+"""The commands that the receiver of messages answers itself; the others it hands to the commander (`Mavlink::send`)."""
 
 _WARN, _HOLD, _RETURN, _TERMINATE, _LAND = 1, 2, 3, 4, 5
 """GF_ACTION; 0 is nothing."""
@@ -106,6 +111,19 @@ class Px4(Flavour):
         position_s=2.4,
         tells_early=False,
     )
+    lanes = Lanes(
+        lambda received: received.name in _COMMANDS and getattr(received.message, "command", None) not in _BY_RECEIVER,
+        (
+            Delays(
+                (0, 300), (10, 4_200), (30, 7_500), (50, 8_800), (70, 12_200), (90, 18_500), (98, 34_200),
+                (100, 333_000),
+            ),
+            Delays(
+                (0, 1_500), (10, 3_800), (30, 7_200), (50, 8_700), (70, 12_000), (90, 20_200), (98, 53_600),
+                (100, 63_000),
+            ),
+        ),
+    )  # fmt: skip
     failsafes = FailsafeRules(
         position=((_CRITICAL, "Failsafe: no global position, landing blindly\t"),),
         level=(_CRITICAL, "Emergency battery level, landing immediately\t"),

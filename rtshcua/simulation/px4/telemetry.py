@@ -43,6 +43,10 @@ _BOOT_FLAGS, _FIRST_FLAGS, _GOOD_FLAGS = 0x480, 0x0E5, 0x3FF
 """As recorded from PX4 v1.16: at first, when it knows its attitude, and in good health on the ground."""
 
 
+_REJECTED, _ASTRAY_M = 1.6, 12.0
+"""Test ratios above 1 mean that what was measured is refused, and `pos_horiz_accuracy` then."""
+
+
 def _estimator_status(a: Autopilot) -> Message | None:
     sensors = a.sensors
     if not sensors.initialised:
@@ -55,9 +59,14 @@ def _estimator_status(a: Autopilot) -> Message | None:
         flags = _GOOD_FLAGS if sensors.has_position else LOST_FLAGS
         if a.vehicle.armed:
             flags &= ~mavlink.ESTIMATOR_CONST_POS_MODE
+    if sensors.unhealthy:
+        flags = flags & LOST_FLAGS | mavlink.ESTIMATOR_ACCEL_ERROR
     if sensors.glitching:
         flags |= mavlink.ESTIMATOR_GPS_GLITCH
-    return mavlink.MAVLink_estimator_status_message(a.now_us, flags, 0.06, 0.04, 0.03, 0.06, 0.005, nan, 0.3, 0.3)
+    velocity, place, off_m = (_REJECTED, _REJECTED, _ASTRAY_M) if sensors.unhealthy else (0.06, 0.04, 0.3)
+    return mavlink.MAVLink_estimator_status_message(
+        a.now_us, flags, velocity, place, 0.03, 0.06, 0.005, nan, off_m, 0.3
+    )
 
 
 def _wind_cov(a: Autopilot) -> Message | None:

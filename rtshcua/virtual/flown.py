@@ -30,6 +30,8 @@ class Sample(NamedTuple):
     """How far it is to the nearest thing that stands around; None: nothing does."""
     taken_over_us: int | None
     """Since when somebody else than we flies it, a pilot or the autopilot itself; None: nobody does."""
+    taken_over_by: str | None
+    """`pilot` or `failsafe`."""
 
 
 class Arrived(NamedTuple):

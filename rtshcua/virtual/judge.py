@@ -1,8 +1,8 @@
 """An independent judge of a flight of a scenario: what went wrong, by what really was.
 
 It reads where the simulated vehicle really was, and which frames of ours it really received. Of the runtime it uses no
-code: zones are judged in floating point, frames are read by pymavlink. Only that the log verifies and that its decisions
-are derived again is asked of the auditor, whose business that is; and what the log says is held against the frames.
+code: zones are judged in floating point, and pymavlink reads the frames. The auditor says whether the logs verify and
+whether their decisions are derived again; what the logs say is then held against the frames.
 
 | slug | is a failure |
 |---|---|
@@ -10,38 +10,42 @@ are derived again is asked of the auditor, whose business that is; and what the 
 | `collision` | it flew into something, or came down too hard |
 | `motion-after-takeover` | a frame that moves it was sent later than W (docs/adr/0034) after somebody took over |
 | `not-ended` | at the end it neither rests on the ground nor stands still in the air |
-| `late` | a frame that moves it came later than a bound allows: a permit's time, a reaction's |
+| `late` | a frame that moves it was sent later than a permit, a step's deadline, or the bound of a reaction allows |
 | `log` | a log does not verify |
 | `derive` | a decision of a log is not derived again |
-| `unlogged-effect` | a frame that moves it, which the log has no command for |
+| `unlogged-effect` | a frame that moves it, which carries out no command that the log has |
 | `fault` | an exception came out of the runtime, or the run did not end |
 
-A failure that physics does not allow to prevent is an *exception* instead, with its `cause`: `excuse` has the causes.
+A failure that physics does not allow to prevent is an *exception* instead, with its `cause` (`excuses`).
 """
 
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import pairwise
+from math import hypot, inf
+from typing import Any, Final
 
-from rtshcua.virtual.flown import ScenarioFlown
+import msgspec
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-SLUGS = (
+from rtshcua.evidence.report import Verdict
+from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
+from rtshcua.virtual.excuses import Excuses, Failure
+from rtshcua.virtual.flown import Arrived, Life, Sample, ScenarioFlown
+
+SLUGS: Final = (
     "outside-fence", "collision", "motion-after-takeover", "not-ended", "late", "log", "derive", "unlogged-effect",
     "fault",
 )  # fmt: skip
-
-
-class Failure(NamedTuple):
-    """What went wrong, when (us of the simulation), and by how much, in mm or us, where that can be said.
-
-    `cause` None: it should not have happened. Else it is an exception: that caused it, and nothing could be done.
-    """
-
-    slug: str
-    at_us: int
-    text: str
-    amount: int = 0
-    cause: str | None = None
+#: us: no frame that moves the vehicle leaves on a mode report that is older (docs/adr/0034)
+MODE_WITHIN_US: Final[Mapping[str, int]] = {"px4": 300_000, "ardupilot": 200_000}
+#: mm/s: what noise and gusts make of a vehicle that stands still, and us: for how long it must, at the end
+STILL_MM_S: Final = 700
+STILL_US: Final = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +57,9 @@ class Margins:
     obstacle_mm: int | None = None
     """How near it came to something that stands around."""
     stop_us: int | None = None
-    """The longest time that a fallback took from what caused it to its first frame."""
+    """The longest time from what caused a fallback to the first frame of it."""
     takeover_us: int | None = None
-    """How long after a takeover the last frame that moves the vehicle was sent."""
+    """The longest time from a takeover to a frame that moves the vehicle; it may have been sent before."""
     ended_us: int | None = None
     """How long the vehicle went on after the last process had ended."""
 
@@ -70,6 +74,383 @@ class Judgement:
 
 
 def judge(flown: ScenarioFlown) -> Judgement:
-    """What is to be said of a flight. Of each slug the first and the worst occurrence in each process are told."""
-    found: Sequence[Failure] = ()
-    return Judgement(tuple(found), (), Margins())
+    """What is to be said of a flight. Of each slug the first and the worst occurrence are told."""
+    excuses = Excuses(flown)
+    fence, fence_mm = _fence(flown)
+    motion = _motion(flown)
+    reactions, stop_us = _reactions(flown, motion, excuses)
+    takeovers, takeover_us = _takeovers(flown, motion, excuses)
+    end, ended_us = _end(flown)
+    found = [
+        *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
+        *_unlogged(flown, motion), *_faults(flown),
+    ]  # fmt: skip
+    judged = [excuses.judged(each) for each in found]
+    margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)
+    return Judgement(
+        _told([each for each in judged if each.cause is None]),
+        _told([each for each in judged if each.cause is not None]),
+        margins,
+    )
+
+
+def _told(found: Sequence[Failure]) -> tuple[Failure, ...]:
+    """The first and the worst of each slug and cause, in the order of time."""
+    chosen: set[Failure] = set()
+    for slug, cause in {(each.slug, each.cause) for each in found}:
+        alike = [each for each in found if (each.slug, each.cause) == (slug, cause)]
+        chosen |= {min(alike, key=lambda each: each.at_us), max(alike, key=lambda each: each.amount)}
+    return tuple(sorted(chosen, key=lambda each: (each.at_us, each.slug, each.text)))
+
+
+# ---------------------------------------------------------------- place
+
+
+def inside_mm(zone: Zone, x: float, y: float, up: float) -> float:
+    """How far inside a zone a point is, in mm; negative: how far outside. x is east, y is north of home."""
+    level = _level_mm(zone, x, y)
+    height = min(zone.ceiling - up, up - zone.floor)
+    return -hypot(level, height) if level < 0 and height < 0 else min(level, height)
+
+
+def _level_mm(zone: Zone, x: float, y: float) -> float:
+    if zone.shape == CIRCLE:
+        east, north, square = zone.data
+        return float(square) ** 0.5 - hypot(x - east, y - north)
+    within, nearest = False, inf
+    for ring in _rings(zone):
+        for (ax, ay), (bx, by) in zip(ring, (*ring[1:], ring[0]), strict=True):
+            if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+                within = not within
+            dx, dy = bx - ax, by - ay
+            along = max(0.0, min(1.0, ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)))
+            nearest = min(nearest, hypot(x - ax - along * dx, y - ay - along * dy))
+    return nearest if within else -nearest
+
+
+def _rings(zone: Zone) -> list[list[tuple[int, int]]]:
+    data = zone.data
+    if zone.shape == POLYGON:
+        return [list(zip(data[::2], data[1::2], strict=True))]
+    counts, at, rings = data[1 : 1 + data[0]], 1 + data[0], []
+    for count in counts:
+        rings.append(list(zip(data[at : at + 2 * count : 2], data[at + 1 : at + 2 * count : 2], strict=True)))
+        at += 2 * count
+    return rings
+
+
+def airspace_mm(policy: Policy, x: float, y: float, up: float) -> float:
+    """How far inside the airspace a point is, in mm; negative: outside. Infinite where there is none."""
+    airspace = policy.airspace
+    if airspace is None:
+        return inf
+    inside = [zone for number in airspace.inside if not _at_times(zone := policy.zones[number])]
+    outside = [zone for number in airspace.outside if not _at_times(zone := policy.zones[number])]
+    return min(
+        (*(inside_mm(zone, x, y, up) for zone in inside), *(-inside_mm(zone, x, y, up) for zone in outside)),
+        default=inf,
+    )
+
+
+def _at_times(zone: Zone) -> bool:
+    return bool(zone.daily or zone.dates)
+
+
+def local_mm(policy: Policy, latitude: int, longitude: int) -> tuple[float, float]:
+    """East and north of home, in mm, as the policy projects."""
+    projection = policy.projection
+    scale = 1 / (1 << SHIFT)
+    turned = (longitude - projection.longitude + 1_800_000_000) % 3_600_000_000 - 1_800_000_000
+    return turned * projection.east * scale, (latitude - projection.latitude) * projection.north * scale
+
+
+def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
+    """Where it left the airspace, the first time and farthest out; how far inside it always was.
+
+    Between two places that are d apart the distance to an edge changes by d at most: what is far inside for sure is
+    not worked out.
+    """
+    worst, found = inf, list[Failure]()
+    x0 = y0 = up0 = 0.0
+    known = -inf  # how far inside it was at x0, y0, up0
+    for sample in flown.samples:
+        if sample.crashed:
+            break
+        if not sample.in_air:
+            continue
+        x, y = local_mm(flown.policy, sample.latitude, sample.longitude)
+        if known - hypot(x - x0, y - y0, sample.up_mm - up0) > max(worst, 0):
+            continue
+        x0, y0, up0 = x, y, float(sample.up_mm)
+        known = airspace_mm(flown.policy, x, y, up0)
+        worst = min(worst, known)
+        if known < 0:
+            place = f"{x / 1000:.1f} m east and {y / 1000:.1f} m north of home, {up0 / 1000:.1f} m up"
+            text = f"{-known / 1000:.2f} m outside the airspace: {place}"
+            found.append(Failure("outside-fence", sample.at_us, text, round(-known)))
+    return found, None if worst == inf else round(worst)
+
+
+def _nearest(samples: Sequence[Sample]) -> int | None:
+    return min(
+        (sample.obstacle_mm for sample in samples if sample.obstacle_mm is not None and sample.in_air), default=None
+    )
+
+
+def _collision(flown: ScenarioFlown) -> list[Failure]:
+    for before, sample in pairwise(flown.samples):
+        if sample.crashed and not before.crashed:
+            near = min((d for d in (before.obstacle_mm, sample.obstacle_mm) if d is not None), default=None)
+            what = "came down too hard" if near is None or near > _TOUCHES_MM else "flew into something"
+            return [
+                Failure(
+                    "collision", sample.at_us, f"it {what} at {before.speed_mm_s / 1000:.1f} m/s", before.speed_mm_s
+                )
+            ]
+    return []
+
+
+_TOUCHES_MM: Final = 1_000
+
+
+# ---------------------------------------------------------------- the end
+
+
+def _end(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
+    samples = flown.samples
+    if not samples:
+        return [], None
+    last = samples[-1]
+    moving = [each for each in samples if each.at_us > flown.ended_us and each.in_air and not _is_still(each)]
+    ended_us = max(0, moving[-1].at_us - flown.ended_us) if moving else 0
+    if not last.in_air:
+        return [], ended_us
+    where = f"{last.up_mm / 1000:.1f} m up in {last.mode}, at {last.speed_mm_s / 1000:.1f} m/s"
+    if flown.ending == "completed":
+        return [
+            Failure("not-ended", last.at_us, f"the run says that it completed the mission, and it flies {where}")
+        ], ended_us
+    if any(not _is_still(each) for each in samples if each.at_us > last.at_us - STILL_US):
+        return [Failure("not-ended", last.at_us, f"it flies on {where}", last.speed_mm_s)], ended_us
+    return [], ended_us
+
+
+def _is_still(sample: Sample) -> bool:
+    return sample.speed_mm_s <= STILL_MM_S and abs(sample.climb_mm_s) <= STILL_MM_S
+
+
+def _faults(flown: ScenarioFlown) -> list[Failure]:
+    return [] if flown.fault is None else [Failure("fault", flown.ended_us, flown.fault)]
+
+
+# ---------------------------------------------------------------- frames
+
+#: HEARTBEAT, PARAM_REQUEST_READ, PARAM_REQUEST_LIST, MISSION_REQUEST, MISSION_REQUEST_LIST, MISSION_ACK,
+#: MISSION_REQUEST_INT, TIMESYNC, STATUSTEXT
+_QUIET: Final = frozenset({0, 20, 21, 40, 43, 47, 51, 111, 253})
+#: about a fence or a parameter: they change how it flies, and move nothing
+_SETTINGS: Final = frozenset({"PARAM_SET", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_CLEAR_ALL"})
+_FENCE: Final = 1
+_NOWHERE: Final = 0x7FFFFFFF
+_ASKS: Final = frozenset({401, 511, 512})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
+_LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
+#: what DO_SET_MODE is a part of, by its parameters 2 and 3
+_MODES: Final[Mapping[str, Mapping[tuple[int, int], frozenset[MotionKind]]]] = {
+    "px4": {
+        (4, 3): frozenset({MotionKind.CLIMB, MotionKind.HOLD}),
+        (4, 5): frozenset({MotionKind.HOME}),
+        (4, 6): frozenset({MotionKind.LAND}),
+    },
+    "ardupilot": {
+        (4, 0): _LEGS | {MotionKind.CLIMB},
+        (17, 0): frozenset({MotionKind.HOLD}),
+        (6, 0): frozenset({MotionKind.HOME}),
+        (9, 0): frozenset({MotionKind.LAND}),
+    },
+}
+
+
+def moves(octets: bytes, flavour: str) -> frozenset[MotionKind] | None:
+    """What kinds of motion a frame can be a part of; none at all where no command of ours looks so. None: it moves
+    nothing.
+    """
+    if len(octets) >= 10 and octets[0] == 0xFD and int.from_bytes(octets[7:10], "little") in _QUIET:
+        return None
+    try:
+        message = dialect.MAVLink(None).decode(bytearray(octets))
+    except dialect.MAVError:
+        return None  # nobody obeys it
+    name = message.get_type()
+    if name in _SETTINGS and getattr(message, "mission_type", _FENCE) == _FENCE:
+        return None
+    if name == "SET_POSITION_TARGET_GLOBAL_INT":
+        return _LEGS
+    if name not in ("COMMAND_LONG", "COMMAND_INT"):
+        return frozenset()
+    return _moves(message, name, flavour)
+
+
+def _moves(message: Any, name: str, flavour: str) -> frozenset[MotionKind] | None:
+    match message.command:
+        case 176:  # DO_SET_MODE
+            return _MODES[flavour].get((int(message.param2), int(message.param3)), frozenset())
+        case 400 if message.param1 == 1 and message.param2 == 0:  # COMPONENT_ARM_DISARM
+            return frozenset({MotionKind.CLIMB})
+        case 22:  # NAV_TAKEOFF
+            return frozenset({MotionKind.CLIMB})
+        case 178:  # DO_CHANGE_SPEED
+            return _LEGS
+        case 192 if name == "COMMAND_INT":  # DO_REPOSITION
+            return frozenset({MotionKind.HOLD}) if (message.x, message.y) == (_NOWHERE, _NOWHERE) else _LEGS
+    return None if message.command in _ASKS else frozenset()
+
+
+Motion = Sequence[tuple[Arrived, frozenset[MotionKind]]]
+"""Frames that move the vehicle, in the order in which they were sent, and what each can be a part of."""
+
+
+def _motion(flown: ScenarioFlown) -> Motion:
+    read = ((frame, moves(frame.octets, flown.flavour)) for frame in flown.arrived)
+    return sorted(((frame, kinds) for frame, kinds in read if kinds is not None), key=lambda each: each[0].sent_us)
+
+
+# ---------------------------------------------------------------- somebody took over
+
+
+def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[Failure], int | None]:
+    """Frames that left later than W after a takeover took effect, while that still lasted."""
+    times = [sample.at_us for sample in flown.samples]
+    found, latest = list[Failure](), None
+    within_us = MODE_WITHIN_US[flown.flavour] + flown.tick_us + flown.wait_us
+    for frame, _ in motion:
+        at = bisect_right(times, frame.at_us) - 1
+        since_us = flown.samples[at].taken_over_us if at >= 0 else None
+        if since_us is None or frame.at_us <= since_us:
+            continue
+        latest = max(latest or 0, frame.at_us - since_us)
+        after_us = frame.sent_us - since_us
+        if after_us > within_us + excuses.delay_us(since_us, frame.sent_us):
+            text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
+            found.append(Failure("motion-after-takeover", frame.at_us, text, after_us))
+    return found, latest
+
+
+def _name(frame: Arrived) -> str:
+    message = dialect.MAVLink(None).decode(bytearray(frame.octets))
+    number = getattr(message, "command", None)
+    known = dialect.enums["MAV_CMD"].get(number) if number is not None else None
+    return str(known.name if known is not None else message.get_type())
+
+
+# ---------------------------------------------------------------- in time
+
+
+def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[Failure], int | None]:
+    """From what a fallback follows from to its first frame: a turn of the loop, and what the mode's report takes."""
+    sent = [frame.sent_us for frame, _ in motion]
+    found, latest = list[Failure](), None
+    within_us = flown.wait_us + 2 * flown.tick_us
+    for life in flown.lives:
+        ends = (*(each.acted_us for each in life.reactions[1:]), life.ended_us + 1)
+        for reaction, end_us in zip(life.reactions, ends, strict=False):
+            first_us = next((each for each in sent if reaction.acted_us <= each < end_us), None)
+            if first_us is None:
+                continue  # nothing had to be sent, or could be
+            took_us = first_us - reaction.heard_us
+            latest = max(latest or 0, took_us)
+            if took_us > within_us + 2 * excuses.delay_us(reaction.heard_us, first_us):
+                text = (
+                    f"a fallback took {took_us / 1e6:.3f} s to its first frame; {within_us / 1e6:.3f} s are the bound"
+                )
+                found.append(Failure("late", first_us, text, took_us))
+    return found, latest
+
+
+def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
+    """The first frame of a command leaves within its permit's time, a step's within its deadline."""
+    for life in flown.lives:
+        decided: dict[tuple[int, int, int], dict[str, Any]] = {}
+        for record in _records(life):
+            ref = (record.get("kind"), record.get("step"), record.get("link"))
+            if record["type"] == "decision":
+                decided[ref] = record
+            elif record.get("event") == "dispatched" and ref in decided:
+                at_us = record["at_us"] - flown.start_us
+                first = next((frame for frame, _ in motion if at_us <= frame.sent_us <= life.ended_us), None)
+                if first is not None:
+                    yield from _in_time(flown, first, decided[ref])
+
+
+def _in_time(flown: ScenarioFlown, first: Arrived, decision: dict[str, Any]) -> Iterator[Failure]:
+    if decision["at_us"] > first.sent_us + flown.start_us:
+        return
+    after_us = first.sent_us - (decision["valid_until_us"] - flown.start_us)
+    if after_us > 0:
+        text = f"{_name(first)} was sent {after_us / 1e6:.3f} s after its permit's time was over"
+        yield Failure("late", first.sent_us, text, after_us)
+    if decision["kind"] == 0:
+        contract = flown.mission.invocations[decision["step"]].contract
+        released_us = max([decision["context"]["released_us"], *(each[3] for each in decision["context"]["approvals"])])
+        after_us = first.sent_us + flown.start_us - released_us - contract.deadline_us
+        if after_us > 0:
+            text = f"step {decision['step']} began {after_us / 1e6:.3f} s after its deadline"
+            yield Failure("late", first.sent_us, text, after_us)
+
+
+# ---------------------------------------------------------------- logs
+
+
+def _records(life: Life) -> list[dict[str, Any]]:
+    """What of a log can be read."""
+    records = []
+    for line in life.lines:
+        try:
+            records.append(msgspec.json.decode(line))
+        except msgspec.DecodeError:
+            break
+    return records
+
+
+def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
+    for life in flown.lives:
+        auditor = Auditor(flown.root)
+        for line in life.lines:
+            auditor.take(line)
+        report = auditor.audit().report
+        if report.verdict is Verdict.VERIFIED:
+            continue
+        at_us = max(0, report.last_us - flown.start_us)
+        if report.failure is None:
+            yield Failure("log", life.ended_us, f"incomplete: {report.shortfall.text if report.shortfall else ''}")
+            continue
+        auditor = Auditor(flown.root, derive=False)
+        for line in life.lines:
+            auditor.take(line)
+        slug = "derive" if auditor.audit().report.failure is None else "log"
+        yield Failure(slug, at_us, f"record {report.failure.record}: {report.failure.slug}: {report.failure.text}")
+
+
+def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
+    """Frames that carry out no command that a log had at that time: its last command is of another kind, or over."""
+    kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
+    for life in flown.lives:
+        effects = [record for record in _records(life) if record["type"] == "effect" and record["token"] >= 0]
+        times = [record["at_us"] - flown.start_us for record in effects]
+        for frame, parts in motion:
+            if not life.began_us <= frame.sent_us <= life.ended_us:
+                continue
+            upto = effects[: bisect_right(times, frame.sent_us)]
+            begun = next((record for record in reversed(upto) if record["event"] == "dispatched"), None)
+            if begun is None:
+                yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent, and no command was")
+                continue
+            over = [r for r in upto if r["token"] == begun["token"] and r is not begun and r["at_us"] > begun["at_us"]]
+            if kinds.get(begun["detail"]) not in parts:
+                text = f"{_name(frame)} was sent, and the last command was `{begun['detail']}`"
+                yield Failure("unlogged-effect", frame.sent_us, text)
+            elif over and over[0]["at_us"] - flown.start_us < frame.sent_us:
+                text = f"{_name(frame)} was sent after `{begun['detail']}` had ended: {over[0]['event']}"
+                yield Failure("unlogged-effect", frame.sent_us, text)
+    for frame, _ in motion:
+        if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):
+            yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")

@@ -1,0 +1,284 @@
+"""What of a failure nobody could have prevented, and why: an exception is told with its cause, and never dropped.
+
+| cause | excuses | as far as |
+|---|---|---|
+| `position` | being outside the airspace | the position was off, and a stop takes; without one, the wind carries it |
+| `wind` | being outside, a collision, flying on | it cannot fly against wind and gusts, now or shortly before |
+| `motors` | a collision, being outside | motors stopped, or the autopilot started again, in the air |
+| `battery` | a collision, coming down too hard | the battery was made empty, and is |
+| `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
+| `failsafe` | being outside, flying on | the autopilot took over by itself |
+| `unseen` | motion after a takeover | ArduCopter's pause, which nothing reports |
+| `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
+| `link` | a collision, a late reaction | nothing came from the vehicle, or nothing got there |
+| `process` | a collision, flying on, an unlogged effect | our process was dead, or did not get to run |
+| `disk` | an incomplete log, an unlogged effect | the disk was full |
+"""
+
+from collections.abc import Callable, Iterator
+from math import hypot
+from typing import Final, NamedTuple
+
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Way
+from rtshcua.virtual.flown import Happened, Sample, ScenarioFlown
+
+#: mm/s: what a multirotor of this size does not fly against, and us: how long after it counts
+STRONG_MM_S: Final = 12_000
+_AFTER_WIND_US: Final = 30_000_000
+#: the estimator goes on believing for so long after the receiver is right again
+_AFTER_GLITCH_US: Final = 10_000_000
+#: mm/s: sticks that nudge a landing ArduCopter
+_NUDGE_MM_S: Final = 1_250
+#: us: what is overtaken comes so much later
+_REORDER_US: Final = 60_000
+#: mm/s^2 and us: how a vehicle brakes that declares nothing
+_BRAKING: Final = 2_000
+_REACTION_US: Final = 1_000_000
+_STANDS_MM_S: Final = 500
+#: a process that is killed has not written the last of these
+_UNWRITTEN_US: Final = 250_000
+_RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
+_FOREVER: Final = 1 << 60
+
+
+class Failure(NamedTuple):
+    """What went wrong, when (us of the simulation), and by how much, in mm, mm/s or us, where that can be said.
+
+    `cause` None: it should not have happened. Else it is an exception: that caused it, and nothing could be done.
+    """
+
+    slug: str
+    at_us: int
+    text: str
+    amount: int = 0
+    cause: str | None = None
+
+
+class Excuses:
+    """What excuses failures of one flight."""
+
+    def __init__(self, flown: ScenarioFlown) -> None:
+        self._flown = flown
+        self._happened = flown.happened
+        vehicle = flown.policy.vehicle
+        self._braking = vehicle.braking or _BRAKING
+        self._reaction_us = vehicle.reaction_us or _REACTION_US
+        self._rules: dict[str, tuple[Callable[[Failure], str | None], ...]] = {
+            "outside-fence": (self._motors, self._taken, self._wind, self._position, self._nudged),
+            "collision": (
+                self._motors, self._battery, self._taken, self._wind, self._process, self._link, self._obstacle,
+            ),
+            "not-ended": (self._taken, self._wind, self._process),
+            "motion-after-takeover": (self._unseen,),
+            "late": (self._link,),
+            "log": (self._disk,),
+            "unlogged-effect": (self._disk, self._killed),
+        }  # fmt: skip
+
+    def judged(self, failure: Failure) -> Failure:
+        """The failure, with its cause if there is an excuse."""
+        for rule in self._rules.get(failure.slug, ()):
+            cause = rule(failure)
+            if cause is not None:
+                return failure._replace(cause=cause)
+        return failure
+
+    def delay_us(self, from_us: int, to_us: int) -> int:
+        """How much later than on a good link something may have come between two moments, in one direction: what the
+        link adds, or holds back, and how long nobody read.
+        """
+        total = 0
+        for fault in self._during(from_us, to_us):
+            match fault:
+                case faults.LinkDelay(_, delay_us):
+                    total += delay_us
+                case faults.LinkJitter(_, jitter_us):
+                    total += jitter_us
+                case faults.LinkReorder():
+                    total += _REORDER_US
+                case faults.LinkSilence(at_us, for_us) | faults.Stall(at_us, for_us) | faults.HostStall(at_us, for_us):
+                    total += min(for_us or _FOREVER, to_us - at_us)
+                case faults.StaleSource(_, delay_us):
+                    total += delay_us
+        return total
+
+    # -------------------------------------------------------- what happened before
+
+    def _before(self, at_us: int, *kinds: type[Fault]) -> Iterator[Fault]:
+        return (each.fault for each in self._happened if each.at_us <= at_us and isinstance(each.fault, kinds))
+
+    def _during(self, from_us: int, to_us: int) -> Iterator[Fault]:
+        """What began before `to_us`, and was not over before `from_us`."""
+        return (each.fault for each in self._happened if each.at_us <= to_us and _ends_us(each) >= from_us)
+
+    def _sample(self, at_us: int) -> Sample | None:
+        found = None
+        for sample in self._flown.samples:
+            if sample.at_us > at_us:
+                break
+            found = sample
+        return found
+
+    def _stop_mm(self, from_us: int, to_us: int) -> float:
+        """The way that a stop took at the greatest speed between two moments."""
+        speeds = [sample.speed_mm_s for sample in self._flown.samples if from_us <= sample.at_us <= to_us]
+        speed = max(speeds, default=0)
+        return speed * self._reaction_us / 1e6 + speed**2 / (2 * self._braking)
+
+    # -------------------------------------------------------- causes
+
+    def _motors(self, failure: Failure) -> str | None:
+        for fault in self._before(failure.at_us, faults.Kill, faults.Reboot):
+            sample = self._sample(fault.at_us)
+            if sample is not None and sample.in_air:
+                return "motors"
+        return None
+
+    def _battery(self, failure: Failure) -> str | None:
+        sample = self._sample(failure.at_us)
+        made = any(self._before(failure.at_us, faults.BatteryLevel, faults.BatteryCell))
+        return "battery" if made and sample is not None and sample.battery <= 0 else None
+
+    def _taken(self, failure: Failure) -> str | None:
+        sample = self._sample(failure.at_us)
+        if sample is None or sample.taken_over_us is None or sample.taken_over_us >= failure.at_us:
+            return None
+        if sample.taken_over_by == "pilot":
+            return "pilot"
+        return "failsafe" if failure.slug != "collision" else None
+
+    def _wind(self, failure: Failure) -> str | None:
+        start = self._flown.scenario.start
+        winds = [(0, start.wind_mm_s or 0, start.gust_mm_s)]
+        for fault in self._before(failure.at_us, faults.WindStep):
+            assert isinstance(fault, faults.WindStep)
+            winds.append((fault.at_us, fault.speed_mm_s, fault.gust_mm_s))
+        ends = [*(at_us for at_us, _, _ in winds[1:]), _FOREVER]
+        for (_, speed, gust), end_us in zip(winds, ends, strict=True):
+            if speed + 2 * gust >= STRONG_MM_S and end_us + _AFTER_WIND_US >= failure.at_us:
+                return "wind"
+        return None
+
+    def _position(self, failure: Failure) -> str | None:
+        off, since_us = 0.0, failure.at_us
+        for fault in self._before(failure.at_us, faults.ReceiverFault):
+            ended_us = fault.at_us + (getattr(fault, "for_us", None) or _FOREVER)
+            lasted_s = (min(ended_us, failure.at_us) - fault.at_us) / 1e6
+            match fault:
+                case faults.GpsJump(_, north_mm, east_mm):
+                    off += hypot(north_mm, east_mm)
+                case faults.GpsDrift(_, north_mm_s, east_mm_s):
+                    off += hypot(north_mm_s, east_mm_s) * lasted_s
+                case faults.GpsGlitch(_, north_mm, east_mm) if failure.at_us <= ended_us + _AFTER_GLITCH_US:
+                    off += hypot(north_mm, east_mm)
+                case faults.GpsLoss() if failure.at_us <= ended_us + _AFTER_GLITCH_US:
+                    off += (self._air_mm_s(failure.at_us) + 1_000) * lasted_s
+                case _:
+                    continue
+            since_us = min(since_us, fault.at_us)
+        return "position" if off and failure.amount <= off + self._stop_mm(since_us, failure.at_us) else None
+
+    def _air_mm_s(self, at_us: int) -> float:
+        start = self._flown.scenario.start
+        strongest = (start.wind_mm_s or 0) + 2 * start.gust_mm_s
+        for fault in self._before(at_us, faults.WindStep):
+            assert isinstance(fault, faults.WindStep)
+            strongest = max(strongest, fault.speed_mm_s + 2 * fault.gust_mm_s)
+        return strongest
+
+    def _nudged(self, failure: Failure) -> str | None:
+        nudged = 0.0
+        for fault in self._before(failure.at_us, faults.PilotSticks):
+            assert isinstance(fault, faults.PilotSticks)
+            nudged += fault.for_us / 1e6 * _NUDGE_MM_S
+        return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
+
+    def _unseen(self, failure: Failure) -> str | None:
+        paused = self._flown.flavour == "ardupilot" and any(self._before(failure.at_us, faults.PilotPause))
+        others = any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto, faults.PilotSticks))
+        return "unseen" if paused and not others else None
+
+    def _link(self, failure: Failure) -> str | None:
+        """Nothing came from the vehicle, or got there, while something had to be done."""
+        from_us = failure.at_us - 5_000_000
+        for fault in self._during(from_us, failure.at_us):
+            match fault:
+                case faults.LinkSilence(way=way) if failure.slug != "late" or way is not Way.UP:
+                    return "link"
+                case faults.LinkLoss(loss=loss) if loss >= 3_000 or failure.slug == "late":
+                    return "link"
+                case faults.LinkDelay(delay_us=delay_us) if delay_us >= 500_000:
+                    return "link"
+                case faults.Stall() | faults.Reboot():
+                    return "link"
+                case faults.MessageSilence(message="HEARTBEAT") if failure.slug == "late":
+                    return "link"
+        return None
+
+    def _process(self, failure: Failure) -> str | None:
+        """Nobody was there, or could do anything: dead, or held up, and no longer than a stop after that."""
+        flown = self._flown
+        if failure.slug == "not-ended":
+            return "process" if flown.left is not None and not flown.fault else None
+        ends = [
+            (killed.ended_us, after.began_us)
+            for killed, after in zip(flown.lives, (*flown.lives[1:], None), strict=True)
+            if killed.ending is None and after is not None
+        ]
+        if flown.left is not None:
+            ends.append((flown.ended_us, _FOREVER))
+        for fault in self._before(failure.at_us, faults.HostStall):
+            assert isinstance(fault, faults.HostStall)
+            ends.append((fault.at_us, fault.at_us + fault.for_us))
+        for died_us, back_us in ends:
+            if died_us <= failure.at_us <= back_us + self._reaction_us + 2_000_000:
+                return "process"
+        return None
+
+    def _obstacle(self, failure: Failure) -> str | None:
+        pillars = [fault for fault in self._before(failure.at_us, faults.Pillar) if isinstance(fault, faults.Pillar)]
+        if not pillars:
+            return None
+        policy = self._flown.policy
+        ranged = any(source.message in _RANGES for signal in policy.signals for source in signal.sources)
+        if not ranged or failure.amount < _STANDS_MM_S:
+            return "obstacle"
+        if any(fault.message in _RANGES for fault in self._before(failure.at_us, faults.MessageStuck)):  # type: ignore[attr-defined]
+            return "obstacle"
+        newest = max(pillars, key=lambda pillar: pillar.at_us)
+        sample = self._sample(newest.at_us)
+        near = sample.obstacle_mm if sample is not None else None
+        away = self._next_distance(newest.at_us) if near is None else near
+        if newest.speed_mm_s or (away is not None and away <= self._stop_mm(newest.at_us, failure.at_us) + 2_000):
+            return "obstacle"
+        return None
+
+    def _next_distance(self, at_us: int) -> int | None:
+        for sample in self._flown.samples:
+            if sample.at_us >= at_us and sample.obstacle_mm is not None:
+                return sample.obstacle_mm
+        return None
+
+    def _disk(self, failure: Failure) -> str | None:
+        if failure.slug == "log" and not failure.text.startswith("incomplete"):
+            return None
+        for fault in self._before(failure.at_us, faults.DiskFull):
+            assert isinstance(fault, faults.DiskFull)
+            if fault.for_us is None or failure.at_us <= fault.at_us + fault.for_us:
+                return "disk"
+        return None
+
+    def _killed(self, failure: Failure) -> str | None:
+        """What was sent in the last moment before a process died may not be written: a fallback waits for no record."""
+        for life in self._flown.lives:
+            if life.ending is None and 0 <= life.ended_us - failure.at_us <= _UNWRITTEN_US:
+                return "process"
+        return None
+
+
+def _ends_us(happened: Happened) -> int:
+    for_us = getattr(happened.fault, "for_us", None)
+    if isinstance(happened.fault, faults.Reboot):
+        return happened.at_us + 10_000_000
+    return happened.at_us + (_FOREVER if for_us is None else for_us)

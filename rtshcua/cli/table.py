@@ -32,6 +32,7 @@ COMMANDS = (
     Row("lint", "write", "report that and what is worth a second look; fix it, ignore it, for CI too", quick=True),
     Row("fmt", "write", "lay sources out in the one style; comments stay where they are"),
     Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit"),
+    Row("campaign", "write", "fly a mission thousands of times with faults drawn by chance, and judge each"),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
     Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
     Row("docs", "write", "render skills and policies as one page that a person can sign off on"),

@@ -1,0 +1,260 @@
+"""Which faults a flight of a campaign has: how many, of what kind, when and how deep, as chance and coverage have it.
+
+The same campaign, number and tally give the same scenario, in whatever process, on whatever machine.
+
+- How many: 1 to 6, in `HOW_MANY` parts of a hundred.
+- Which kind: half of the time a group by its weight in `GROUPS`, then one of its kinds, each as likely; half of the
+  time that pair of a kind and a state change, of `CANDIDATES` drawn so, which was tried least.
+- When: a fifth of the time anywhere in the flight, else from `BEFORE_US` before to `AFTER_US` after a state change that
+  was seen, nearer ones likelier.
+- How deep: each parameter as `RANGES` says, evenly, or evenly in its logarithm, in steps that a person would write.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from math import exp, log
+from random import Random
+from typing import Any, Final
+
+from rtshcua.campaign.written import incident_text
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start
+
+S: Final = 1_000_000
+FLAVOURS: Final = ("px4", "ardupilot")
+#: of a hundred flights, so many have 1, 2, ... faults
+HOW_MANY: Final = (35, 25, 18, 12, 7, 3)
+CANDIDATES: Final = 8
+BEFORE_US: Final = 3 * S
+AFTER_US: Final = 6 * S
+_LATER: Final = 1.5  # how much likelier near than far, as a power
+
+#: how likely a group is, and what is in it
+GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
+    (
+        24,
+        (
+            faults.LinkDelay, faults.LinkJitter, faults.LinkReorder, faults.LinkLoss, faults.LinkSilence,
+            faults.LinkSilence, faults.LinkQuality,
+        ),
+    ),
+    (
+        18,
+        (
+            faults.Freeze, faults.StaleSource, faults.MessageStuck, faults.MessageSilence, faults.Stall,
+            faults.EstimatorUnhealthy, faults.Reboot,
+        ),
+    ),
+    (12, (faults.GpsLoss, faults.GpsJump, faults.GpsDrift, faults.GpsGlitch)),
+    (12, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
+    (8, (faults.Obstacle, faults.Pillar)),
+    (14, (faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotSticks, faults.Kill)),
+    (6, (faults.RuntimeKilled, faults.HostStall, faults.DiskFull, faults.ClockStep)),
+    (6, (faults.Approval, faults.Disapproval, faults.Recall, faults.Replacement, faults.Babble)),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Whole numbers from `low` to `high` in steps of `step`; `by_ratio`: small ones as likely as large ones."""
+
+    low: int
+    high: int
+    step: int
+    by_ratio: bool = False
+
+    def draw(self, chance: Random) -> int:
+        """One of them."""
+        if not self.by_ratio:
+            return self.low + self.step * chance.randrange((self.high - self.low) // self.step + 1)
+        drawn = exp(chance.uniform(log(self.low), log(self.high)))
+        return min(self.high, max(self.low, round(drawn / self.step) * self.step))
+
+
+_LASTS = Range(200_000, 45 * S, 100_000, by_ratio=True)
+_SOMEWHERE = Range(-60_000, 60_000, 1_000)
+#: what a parameter of a kind is drawn from, and of all kinds that name it where there is no kind before it
+RANGES: Final[Mapping[tuple[type[Fault] | None, str], Range]] = {
+    (None, "for_us"): _LASTS,
+    (None, "delay_us"): Range(50_000, 5 * S, 50_000, by_ratio=True),
+    (None, "jitter_us"): Range(20_000, 2 * S, 20_000, by_ratio=True),
+    (None, "part"): Range(100, 5_000, 100),
+    (None, "loss"): Range(500, 9_500, 500),
+    (None, "quality"): Range(0, 10_000, 500),
+    (None, "level"): Range(200, 6_000, 100),
+    (None, "drop_mv"): Range(300, 3_700, 100),
+    (None, "voltage_mv"): Range(12_000, 25_000, 500),
+    (None, "speed_mm_s"): Range(0, 18_000, 500),
+    (None, "gust_mm_s"): Range(0, 4_000, 500),
+    (None, "from_deg"): Range(0, 350, 10),
+    (None, "towards_deg"): Range(0, 350, 10),
+    (None, "north_mm"): _SOMEWHERE,
+    (None, "east_mm"): _SOMEWHERE,
+    (None, "up_mm"): Range(2_000, 40_000, 1_000),
+    (None, "north_mm_s"): Range(-1_500, 1_500, 100),
+    (None, "east_mm_s"): Range(-1_500, 1_500, 100),
+    (None, "distance_mm"): Range(500, 30_000, 500, by_ratio=True),
+    (None, "radius_mm"): Range(500, 3_000, 500),
+    (None, "height_mm"): Range(5_000, 60_000, 1_000),
+    (None, "copies"): Range(1, 3, 1),
+    (None, "shuffle"): Range(0, 1_000, 1),
+    (None, "by_us"): Range(-3_600 * S, 3_600 * S, 10 * S),
+    (faults.GpsJump, "north_mm"): Range(-15_000, 15_000, 500),
+    (faults.GpsJump, "east_mm"): Range(-15_000, 15_000, 500),
+    (faults.GpsGlitch, "north_mm"): Range(-40_000, 40_000, 1_000),
+    (faults.GpsGlitch, "east_mm"): Range(-40_000, 40_000, 1_000),
+    (faults.Pillar, "speed_mm_s"): Range(0, 2_000, 500),
+    (faults.RuntimeKilled, "for_us"): Range(500_000, 20 * S, 500_000, by_ratio=True),
+    (faults.HostStall, "for_us"): Range(100_000, 8 * S, 100_000, by_ratio=True),
+    (faults.Stall, "for_us"): Range(200_000, 20 * S, 100_000, by_ratio=True),
+    (faults.StaleSource, "delay_us"): Range(200_000, 8 * S, 100_000, by_ratio=True),
+    (faults.Babble, "copies"): Range(5, 200, 5, by_ratio=True),
+}
+#: messages that may fall silent or stick
+MESSAGES: Final = (
+    "GLOBAL_POSITION_INT", "HEARTBEAT", "SYS_STATUS", "BATTERY_STATUS", "GPS_RAW_INT", "EXTENDED_SYS_STATE",
+    "POSITION_TARGET_GLOBAL_INT", "DISTANCE_SENSOR", "RADIO_STATUS", "COMMAND_ACK", "TIMESYNC", "ATTITUDE",
+)  # fmt: skip
+_MODES: Final = tuple(Mode)
+_LASTS_FOR_GOOD: Final = 0.15  # how often what may last for good does
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A state change that a flight was seen to make: what it was, without numbers, and when."""
+
+    label: str
+    at_us: int
+
+
+@dataclass
+class Tally:
+    """What a campaign has seen and tried: what the next round is drawn by.
+
+    `moments` are the state changes of flights, by flavour; `tried` counts pairs of a kind of fault and the state change
+    that it was near.
+    """
+
+    moments: dict[str, list[Moment]] = field(default_factory=dict)
+    tried: dict[tuple[str, str], int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """What a campaign draws from: the skills of its mission's steps, how long it takes by flavour, who may approve."""
+
+    skills: tuple[str, ...]
+    lasts_us: Mapping[str, int]
+    roles: tuple[str, ...] = ()
+    flavours: tuple[str, ...] = FLAVOURS
+    kinds: frozenset[type[Fault]] = frozenset(faults.KINDS.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A scenario of one seed and flavour, and the pairs that it tries."""
+
+    scenario: Scenario
+    tries: tuple[tuple[str, str], ...]
+
+
+#: what nothing was near: a time that was drawn from the whole flight
+ANYWHERE: Final = "anywhere"
+
+
+def draw(campaign: int, number: int, space: Space, tally: Tally) -> Drawn:
+    """Flight `number` of the campaign of that seed."""
+    chance = Random(f"campaign {campaign} flight {number}")
+    flavour = space.flavours[number % len(space.flavours)]
+    seed = chance.randrange(1, 1 << 31)
+    many = chance.choices(range(1, len(HOW_MANY) + 1), HOW_MANY)[0]
+    incidents: list[Incident] = []
+    tries: list[tuple[str, str]] = []
+    while len(incidents) < many:
+        kind, moment = _pair(chance, space, tally.moments.get(flavour, []), tally)
+        fault = _fault(chance, kind, space)
+        when = _when(chance, space, flavour, moment)
+        incidents.append(Incident(when, fault, incident_text(when, fault, space.skills)))
+        tries.append((kind.__name__, ANYWHERE if moment is None else moment.label))
+    start = Start(
+        battery=chance.choice((10_000, 10_000, 8_000, 6_000)),
+        wind_mm_s=chance.choice((0, 2_000, 4_000, 7_000)),
+        wind_from_deg=10 * chance.randrange(36),
+        gust_mm_s=chance.choice((0, 500, 1_500)),
+    )
+    scenario = Scenario(f"flight {number} of campaign {campaign}", (flavour,), seed, seed, start, tuple(incidents), ())
+    return Drawn(scenario, tuple(tries))
+
+
+def _pair(chance: Random, space: Space, moments: Sequence[Moment], tally: Tally) -> tuple[type[Fault], Moment | None]:
+    guided = bool(moments) and chance.random() < 0.5
+    pairs = [(_kind(chance, space), _moment(chance, moments)) for _ in range(CANDIDATES if guided else 1)]
+    return min(pairs, key=lambda pair: tally.tried.get((pair[0].__name__, pair[1].label if pair[1] else ANYWHERE), 0))
+
+
+def _kind(chance: Random, space: Space) -> type[Fault]:
+    groups = [(weight, [kind for kind in kinds if kind in space.kinds]) for weight, kinds in GROUPS]
+    groups = [(weight, kinds) for weight, kinds in groups if kinds]
+    return chance.choice(chance.choices([kinds for _, kinds in groups], [weight for weight, _ in groups])[0])
+
+
+def _moment(chance: Random, moments: Sequence[Moment]) -> Moment | None:
+    if not moments or chance.random() < 0.2:
+        return None
+    label = chance.choice(sorted({each.label for each in moments}))
+    return chance.choice([each for each in moments if each.label == label])
+
+
+def _when(chance: Random, space: Space, flavour: str, moment: Moment | None) -> AtTime | AfterStep:
+    if moment is None:
+        if chance.random() < 0.5:
+            after = Range(0, 20 * S, 100_000).draw(chance)
+            return AfterStep(chance.randrange(len(space.skills)), after, after)
+        at = Range(0, max(space.lasts_us[flavour], S), 100_000).draw(chance)
+        return AtTime(at, at)
+    away = chance.random() ** _LATER
+    at = moment.at_us + round((AFTER_US if chance.random() < 0.6 else -BEFORE_US) * away / 20_000) * 20_000
+    return AtTime(max(at, 0), max(at, 0))
+
+
+def _fault(chance: Random, kind: type[Fault], space: Space) -> Fault:
+    values: dict[str, Any] = {"at_us": 0}
+    for each in fields(kind):
+        if each.name == "at_us":
+            continue
+        optional = each.default is None
+        if optional and chance.random() < _LASTS_FOR_GOOD:
+            values[each.name] = None
+            continue
+        values[each.name] = _value(chance, kind, each.name, space)
+    made = kind(**values)
+    if isinstance(made, faults.LinkSilence) and made.for_us is None:
+        return replace(made, held=False)  # what is held back for good is lost
+    return made
+
+
+def _value(chance: Random, kind: type[Fault], name: str, space: Space) -> object:
+    if name == "way":
+        return chance.choice((Way.BOTH, Way.BOTH, Way.UP, Way.DOWN))
+    if name == "held":
+        return chance.random() < 0.25
+    if name == "mode":
+        return chance.choice(_MODES)
+    if name == "message":
+        return chance.choice(MESSAGES)
+    if name == "role":
+        return chance.choice(space.roles or ("supervisor",))
+    span = RANGES.get((kind, name)) or RANGES[None, name]
+    return span.draw(chance)
+
+
+def undrawn() -> list[str]:
+    """The parameters of kinds that no range is stated for: none, or a campaign does not know what to draw."""
+    words = {"at_us", "way", "held", "mode", "message", "role"}
+    return [
+        f"{kind.__name__}.{each.name}"
+        for kind in set(faults.KINDS.values())
+        for each in fields(kind)
+        if each.name not in words and (kind, each.name) not in RANGES and (None, each.name) not in RANGES
+    ]

@@ -1,0 +1,114 @@
+"""One flight of a campaign: flown, judged, and told in a line. Maybe in another process, or on another machine."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from time import process_time_ns
+from typing import Any, Final
+
+import msgspec
+
+from rtshcua.campaign.results import Failed, Result
+from rtshcua.model.scenario import Scenario
+from rtshcua.virtual import development
+from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.judge import judge
+from rtshcua.virtual.scenario import Keys, fly
+from rtshcua.wire.keys import Duty
+
+#: a flight in which a process died
+LOST: Final = "process-died"
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """What all flights of a campaign share: the bundle, and the trust root that it is signed under (`development`)."""
+
+    bundle: bytes
+    root: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A flight that is to be flown."""
+
+    number: int
+    scenario: Scenario
+    tries: tuple[tuple[str, str], ...] = ()
+
+
+def flown(field: Field, scenario: Scenario) -> ScenarioFlown:
+    """The first flight of a scenario: of its first flavour and seed."""
+    made = development.keys()
+    keys = Keys(log=made[Duty.LOG], approval=made[Duty.APPROVAL], mission=made[Duty.MISSION])
+    return fly(field.bundle, field.root, keys, scenario, scenario.flavours[0], scenario.first_seed)
+
+
+def fly_one(field: Field, flight: Flight) -> Result:
+    """The flight, judged."""
+    began = process_time_ns()
+    was = flown(field, flight.scenario)
+    verdict = judge(was)
+    log = sha256()
+    for life in was.lives:
+        for line in life.lines:
+            log.update(line)
+    return Result(
+        flight.number,
+        was.flavour,
+        was.seed,
+        tuple(incident.text for incident in flight.scenario.incidents),
+        flight.tries,
+        was.ending or "none",
+        tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
+        tuple(
+            Failed(each.failure.slug, each.failure.text, each.failure.at_us, each.cause) for each in verdict.exceptions
+        ),
+        dict(verdict.margins),
+        tuple(moments(was)),
+        was.samples[-1].at_us,
+        log.hexdigest(),
+        (process_time_ns() - began) // 1_000,
+    )
+
+
+def lost(flight: Flight) -> Result:
+    """The flight, when the process that flew it died, more than once."""
+    scenario = flight.scenario
+    failed = Failed(LOST, "the process that flew it died, and the next one too")
+    texts = tuple(incident.text for incident in scenario.incidents)
+    return Result(
+        flight.number,
+        scenario.flavours[0],
+        scenario.first_seed,
+        texts,
+        flight.tries,
+        "none",
+        (failed,),
+        (),
+        {},
+        (),
+        0,
+        "",
+    )
+
+
+def moments(was: ScenarioFlown) -> Iterator[tuple[str, int]]:
+    """The state changes of a flight: what was sent, and what the vehicle then really did."""
+    for life in was.lives:
+        for line in life.lines:
+            if b'"event":"dispatched"' in line:
+                record: dict[str, Any] = msgspec.json.decode(line)
+                said = record["detail"].split("(")[0].split()[0]
+                yield f"{said} sent" if record["kind"] == 0 else f"fallback {said}", record["at_us"] - was.start_us
+        if life.ending is not None:
+            yield life.ending, life.ended_us
+    before = was.samples[0]
+    for sample in was.samples[1:]:
+        if sample.armed != before.armed:
+            yield "armed" if sample.armed else "disarmed", sample.at_us
+        if sample.in_air != before.in_air:
+            yield "airborne" if sample.in_air else "down", sample.at_us
+        if sample.mode is not before.mode:
+            yield f"mode {sample.mode}", sample.at_us
+        before = sample

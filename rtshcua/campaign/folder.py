@@ -1,0 +1,88 @@
+"""A campaign's folder: what was asked for, the results as they come, the report, and the failures as scenarios.
+
+- `campaign.json`: what must be the same when it goes on
+- `results.jsonl`: a line a flight, on the disk before the next is asked about
+- `report.html`, `report.json`: made anew whenever it stops
+- `failures/SLUG.rts`: the smallest flight that fails so, as a scenario
+"""
+
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from rtshcua.adapters.store.reading import open_regular, read_if_there
+from rtshcua.adapters.store.writing import append, make_folder, replace, write_new
+from rtshcua.campaign import results
+from rtshcua.campaign.page import page
+from rtshcua.campaign.results import Result
+from rtshcua.campaign.summary import Summary, as_json
+from rtshcua.diagnostics.refusal import Refusal
+
+_LARGEST: Final = 1 << 16
+
+
+class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What makes a campaign the same one: a flight of this number is drawn and flown alike wherever all of it is equal.
+
+    `bundle` is the SHA-256 of what is flown, `version` that of this program.
+    """
+
+    mission: str
+    issued_at_us: int
+    bundle: str
+    seed: int
+    flavours: tuple[str, ...]
+    version: str
+
+
+class Folder:
+    """The folder, which is made if it is missing."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.report = path / "report.html"
+
+    def identity(self) -> Identity | Refusal | None:
+        """What was begun here; None: nothing yet."""
+        kept = read_if_there(self.path / "campaign.json", _LARGEST)
+        if kept is None:
+            return None
+        try:
+            return msgspec.json.decode(kept, type=Identity)
+        except msgspec.MsgspecError:
+            return Refusal("malformed", f"`{self.path / 'campaign.json'}` is not what a campaign left", _ANOTHER)
+
+    def begin(self, identity: Identity) -> None:
+        """Begin a campaign. Raises OSError; FileExistsError where one was begun meanwhile."""
+        make_folder(self.path)
+        write_new(self.path / "campaign.json", msgspec.json.format(msgspec.json.encode(identity)) + b"\n")
+
+    def past(self) -> dict[int, Result]:
+        """What was flown so far."""
+        try:
+            with open_regular(self.path / "results.jsonl") as file:
+                return results.read(file)
+        except FileNotFoundError:
+            return {}
+
+    def keep(self, result: Result) -> None:
+        """Keep a result, on the disk."""
+        append(self.path / "results.jsonl", results.line(result))
+
+    def tell(self, summary: Summary) -> None:
+        """Write the report, over an earlier one."""
+        replace(self.path / "report.json", msgspec.json.format(msgspec.json.encode(as_json(summary))) + b"\n")
+        replace(self.report, page(summary).encode())
+
+    def scenario(self, slug: str) -> Path:
+        """Where the smallest flight that fails so is kept."""
+        return self.path / "failures" / f"{slug}.rts"
+
+    def save(self, slug: str, text: str) -> None:
+        """Keep it."""
+        make_folder(self.path / "failures")
+        replace(self.scenario(slug), text.encode())
+
+
+_ANOTHER: Final = "give another folder with `-o`, or take this one away"

@@ -1,0 +1,132 @@
+"""What a campaign found, as one object for programs, and for the page that people read."""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import msgspec
+
+from rtshcua.campaign.results import Failed, Result
+
+#: bars of a histogram
+_BARS: Final = 24
+
+
+class Found(msgspec.Struct, frozen=True):
+    """All flights that the judge found the same fault in: how many, and those with the lowest numbers."""
+
+    slug: str
+    flights: int
+    first: tuple[int, ...]
+    text: str
+    incidents: tuple[str, ...]
+    why: str = ""
+    scenario: str = ""
+
+
+class Margin(msgspec.Struct, frozen=True):
+    """One of the judge's numbers over all flights: the least and the greatest, in which flight, and the spread."""
+
+    name: str
+    flights: int
+    least: int
+    least_in: int
+    middle: int
+    greatest: int
+    greatest_in: int
+    bars: tuple[int, ...]
+    """How many flights in each of as many equal parts from the least to the greatest."""
+
+
+class Summary(msgspec.Struct, frozen=True):
+    """What `report.json` holds. Times in us; `endings` by kind of autopilot, `kinds` by kind of fault."""
+
+    mission: str
+    campaign: int
+    flights: int
+    flown_us: int
+    took_us: int
+    endings: dict[str, dict[str, int]]
+    failures: tuple[Found, ...]
+    exceptions: tuple[Found, ...]
+    margins: tuple[Margin, ...]
+    kinds: dict[str, dict[str, int]]
+    near: dict[str, dict[str, int]]
+    """How often a kind of fault was near a state change."""
+
+    @property
+    def failed(self) -> int:
+        """How many flights failed."""
+        return sum(each.flights for each in self.failures)
+
+
+def summarise(mission: str, campaign: int, results: Mapping[int, Result], scenarios: Mapping[str, str]) -> Summary:
+    """Of results by number; `scenarios` says in which file the shrunken flight of a failure is kept, by slug."""
+    ordered = [results[number] for number in sorted(results)]
+    endings: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    kinds: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    near: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for result in ordered:
+        endings[result.flavour][result.ending] += 1
+        for kind in sorted({kind for kind, _ in result.tries}):
+            kinds[kind][result.ending] += 1
+            kinds[kind]["failed"] += bool(result.failures)
+        for kind, label in result.tries:
+            near[kind][label] += 1
+    return Summary(
+        mission,
+        campaign,
+        len(ordered),
+        sum(each.flown_us for each in ordered),
+        sum(each.took_us for each in ordered),
+        _plain(endings),
+        _found(ordered, lambda result: result.failures, scenarios),
+        _found(ordered, lambda result: result.exceptions, {}),
+        tuple(_margins(ordered)),
+        _plain(kinds),
+        _plain(near),
+    )
+
+
+def _plain(counted: Mapping[str, Counter[str]]) -> dict[str, dict[str, int]]:
+    return {name: dict(sorted(counts.items())) for name, counts in sorted(counted.items())}
+
+
+def _found(
+    results: Sequence[Result], of: Callable[[Result], Iterable[Failed]], scenarios: Mapping[str, str]
+) -> tuple[Found, ...]:
+    found: dict[tuple[str, str], list[tuple[Result, Failed]]] = {}
+    for result in results:
+        for slug, why in {(each.slug, each.why) for each in of(result)}:
+            one = next(each for each in of(result) if (each.slug, each.why) == (slug, why))
+            found.setdefault((slug, why), []).append((result, one))
+    return tuple(
+        Found(
+            slug,
+            len(flights),
+            tuple(result.number for result, _ in flights[:10]),
+            flights[0][1].text,
+            flights[0][0].incidents,
+            why,
+            scenarios.get(slug, ""),
+        )
+        for (slug, why), flights in sorted(found.items(), key=lambda each: (-len(each[1]), each[0]))
+    )
+
+
+def _margins(results: Sequence[Result]) -> Iterable[Margin]:
+    names = sorted({name for result in results for name in result.margins})
+    for name in names:
+        values = sorted((result.margins[name], result.number) for result in results if name in result.margins)
+        (least, least_in), (greatest, greatest_in) = values[0], values[-1]
+        bars = [0] * _BARS
+        for value, _ in values:
+            bars[min(_BARS - 1, (value - least) * _BARS // max(greatest - least, 1))] += 1
+        middle = values[len(values) // 2][0]
+        yield Margin(name, len(values), least, least_in, middle, greatest, greatest_in, tuple(bars))
+
+
+def as_json(summary: Summary) -> dict[str, Any]:
+    """For a program."""
+    made: dict[str, Any] = msgspec.to_builtins(summary)
+    return made | {"failed": summary.failed}

@@ -1,0 +1,129 @@
+"""Who flies a campaign's flights: the cores of this machine, or (extra `cluster`) the workers of a Dask scheduler.
+
+A worker that dies takes no flight with it: it is flown again, by another. Only a flight that a process died of twice is
+given up, and counts as a failure.
+"""
+
+import errno
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from multiprocessing import get_context
+from typing import Final
+
+from rtshcua.campaign.flights import Field, Flight, fly_one, lost
+from rtshcua.campaign.results import Result
+
+#: how often a process may die while it flies a flight
+_MOST_DEATHS: Final = 2
+
+
+class Here:
+    """This process alone."""
+
+    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+        """Flies these, one after the other."""
+        return (fly_one(field, flight) for flight in flights)
+
+    def close(self) -> None:
+        """There is nobody to let go."""
+
+
+class Processes:
+    """`jobs` processes, as many as there are cores if it is not said."""
+
+    def __init__(self, jobs: int | None = None) -> None:
+        self._jobs = jobs or cores()
+        self._pool: ProcessPoolExecutor | None = None
+
+    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+        """Flies these, all at once."""
+        left = {flight.number: flight for flight in flights}
+        deaths = 0
+        while left:
+            # After a death nobody knows which flight it was: they are flown one by one until it dies again.
+            together = list(left.values()) if not deaths else list(left.values())[:1]
+            try:
+                for result in self._all(field, together):
+                    del left[result.number]
+                    yield result
+                deaths = 0 if len(together) > 1 else deaths
+            except BrokenProcessPool:
+                self.close()
+                deaths += 1
+                if deaths > _MOST_DEATHS and len(together) == 1:
+                    del left[together[0].number]
+                    yield lost(together[0])
+                    deaths = 0
+
+    def _all(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(self._jobs, mp_context=get_context("spawn"), initializer=_quiet)
+        futures = [self._pool.submit(fly_one, field, flight) for flight in flights]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            for future in futures:
+                future.cancel()
+
+    def close(self) -> None:
+        """Ends the processes; what they fly is not waited for."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            for process in list((pool._processes or {}).values()):
+                with suppress(OSError):
+                    process.terminate()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+class Cluster:
+    """The workers of a scheduler, at an address such as `tcp://10.0.0.1:8786`. Raises OSError where there is none.
+
+    They have this package installed, in this version. How connections are secured (`tls://`) is Dask's configuration.
+    """
+
+    def __init__(self, address: str) -> None:
+        from distributed import Client  # noqa: PLC0415  # an extra, and slow to load
+
+        try:
+            self._client = Client(address, timeout=10)
+        except (OSError, ValueError):
+            raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
+
+    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+        """Flies these; one whose worker is lost is given to another."""
+        from distributed import KilledWorker, as_completed  # noqa: PLC0415
+
+        by_key = {}
+        futures = []
+        for flight in flights:
+            future = self._client.submit(fly_one, field, flight, pure=False, retries=_MOST_DEATHS)
+            by_key[future.key] = flight
+            futures.append(future)
+        try:
+            for future in as_completed(futures):
+                try:
+                    yield future.result()
+                except KilledWorker:
+                    yield lost(by_key[future.key])
+        finally:
+            self._client.cancel(futures)
+
+    def close(self) -> None:
+        """Leaves the cluster."""
+        self._client.close()
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _quiet() -> None:
+    """Ctrl-C is for the process that was started; it ends these."""
+    import signal  # noqa: PLC0415
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

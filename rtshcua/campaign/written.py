@@ -1,0 +1,80 @@
+"""A scenario as its source is written: what a failure is kept as, and what a person reads."""
+
+from collections.abc import Sequence
+
+from rtshcua.model.faults import KINDS, Fault, Parameter, parameters
+from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.scenario import AfterStep, AtTime, OnCondition, Scenario, Start, When
+
+_NAMES = {kind: name.replace("-", "_") for name, kind in KINDS.items()}
+
+
+def scenario_text(scenario: Scenario, mission: str, imported: str, comment: str = "") -> str:
+    """A source with this scenario of a mission of the file `imported`; `comment` says what it is kept for."""
+    lines = [f"// {line}".rstrip() for line in comment.splitlines()]
+    lines += [f'import "{imported}"', "", f'scenario "{scenario.name}" {{', f"  flies  {mission}"]
+    lines.append(f"  aboard {', '.join(scenario.flavours)}")
+    first, last = scenario.first_seed, scenario.last_seed
+    lines.append(f"  seeds  {first}" if first == last else f"  seeds  {first} .. {last}")
+    lines += start_lines(scenario.start)
+    lines += [f"  {each.text}" for each in scenario.incidents]
+    lines += [f"  expect {each.text}" for each in scenario.expectations]
+    return "\n".join([*lines, "}", ""])
+
+
+def start_lines(start: Start) -> list[str]:
+    """How it starts, a line each."""
+    lines = []
+    if start.battery is not None:
+        lines.append(f"  start  battery = {display(start.battery, Dimension.RATIO)}")
+    if start.wind_mm_s is not None:
+        speed, gust = (display(each, Dimension.SPEED) for each in (start.wind_mm_s, start.gust_mm_s))
+        lines.append(f"  start  wind(speed = {speed}, from = {start.wind_from_deg} deg, gust = {gust})")
+    return lines
+
+
+def incident_text(when: When, fault: Fault, skills: Sequence[str]) -> str:
+    """`2 s after goto link_silence(for = 5 s, way = up)`; `skills` are those of the mission's steps, in order."""
+    return f"{_when(when, skills)} {fault_text(fault)}"
+
+
+def fault_text(fault: Fault) -> str:
+    """`link_silence(for = 5 s, way = up)`: what is as it would be if nothing were said is left out."""
+    said = []
+    for each in parameters(type(fault)):
+        value = getattr(fault, each.field)
+        if value is None or (not each.needed and value == type(fault).__dataclass_fields__[each.field].default):
+            continue
+        said.append(f"{each.name} = {_value(each, value)}")
+    return f"{_NAMES[type(fault)]}({', '.join(said)})"
+
+
+def _value(parameter: Parameter, value: object) -> str:
+    unit = parameter.unit
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if unit is None or not isinstance(value, int):
+        return str(value)
+    if unit.dimension is Dimension.DURATION:
+        return _time(value)
+    return str(value) if unit.dimension is None else display(value * unit.canonical, unit.dimension)
+
+
+def _when(when: When, skills: Sequence[str]) -> str:
+    between = _time(when.from_us)
+    if when.to_us != when.from_us:
+        between += f" .. {_time(when.to_us)}"
+    match when:
+        case AtTime():
+            return f"at {between}"
+        case AfterStep(step):
+            skill = skills[step]
+            nth = skills[: step + 1].count(skill)
+            named = skill if skills.count(skill) == 1 else f"{skill} {nth}"
+            return f"{between} after {named}" if when.to_us else f"after {named}"
+        case OnCondition(condition):
+            return f"{between} after when {condition.text}" if when.to_us else f"when {condition.text}"
+
+
+def _time(us: int) -> str:
+    return display(us, Dimension.DURATION) if us else "0 s"

@@ -1,0 +1,53 @@
+"""Keys that nobody has to keep secret, and the trust root that names them: for flights that only ever were virtual.
+
+A vehicle trusts the root that is pinned on it, and this one is pinned nowhere. It says of itself that it is for
+development, and so does each of its keys.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Final
+
+from rtshcua.ground.compiler import sign
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.keys import ANY, Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot
+
+_SPEAKERS: Final = (Duty.MISSION, Duty.APPROVAL)
+_LIFETIME_US: Final = 10 * 366 * 86_400 * 1_000_000
+
+
+@cache
+def keys() -> Mapping[Duty, SigningKey]:
+    """One key for each duty; the same in each process."""
+    return {
+        duty: SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True)
+        for number, duty in enumerate(Duty)
+    }  # fmt: skip
+
+
+@cache
+def root(issued_at_us: int) -> bytes:
+    """A signed root that lets them speak for any role and vehicle, from a UTC time on."""
+    made = keys()
+    signed = TrustRoot(
+        version=1,
+        development=True,
+        issued_at_us=issued_at_us,
+        expires_at_us=issued_at_us + _LIFETIME_US,
+        keys=tuple(
+            key.verification(
+                roles=(ANY,) if duty in _SPEAKERS else (),
+                sources=("agent", "operator") if duty in _SPEAKERS else (),
+                vehicles=() if duty is Duty.ROOT else (ANY,),
+            )
+            for duty, key in made.items()
+        ),
+    )
+    return signed.sign(made[Duty.ROOT])
+
+
+def seal(policy: Policy, mission: Mission) -> bytes:
+    """The bundle, signed with them."""
+    return sign.sign(policy, mission, policy_key=keys()[Duty.POLICY], mission_key=keys()[Duty.MISSION])

@@ -178,10 +178,10 @@ def draw(campaign: int, number: int, space: Space, tally: Tally) -> Drawn:
         incidents.append(Incident(when, fault, incident_text(when, fault, space.skills)))
         tries.append((kind.__name__, ANYWHERE if moment is None else moment.label))
     start = Start(
-        battery=chance.choice((10_000, 10_000, 8_000, 6_000)),
-        wind_mm_s=chance.choice((0, 2_000, 4_000, 7_000)),
+        battery=chance.choice((10_000, 10_000, 9_000, 8_000)),
+        wind_mm_s=chance.choice((0, 2_000, 3_000, 5_000)),
         wind_from_deg=10 * chance.randrange(36),
-        gust_mm_s=chance.choice((0, 500, 1_500)),
+        gust_mm_s=chance.choice((0, 500, 1_000)),
     )
     scenario = Scenario(f"flight {number} of campaign {campaign}", (flavour,), seed, seed, start, tuple(incidents), ())
     return Drawn(scenario, tuple(tries))

@@ -61,10 +61,8 @@ def fly_one(field: Field, flight: Flight) -> Result:
         flight.tries,
         was.ending or "none",
         tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
-        tuple(
-            Failed(each.failure.slug, each.failure.text, each.failure.at_us, each.cause) for each in verdict.exceptions
-        ),
-        dict(verdict.margins),
+        tuple(Failed(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
+        {name: value for name, value in asdict(verdict.margins).items() if value is not None},
         tuple(moments(was)),
         was.samples[-1].at_us,
         log.hexdigest(),

@@ -1,0 +1,155 @@
+"""A campaign is the same however many fly it, in whatever order, wherever it was interrupted."""
+
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rtshcua.campaign import campaign, workers
+from rtshcua.campaign.campaign import FIRST, ROUND, Order, drawn, fly, rounds
+from rtshcua.campaign.drawing import Space
+from rtshcua.campaign.flights import LOST, Field, Flight, lost
+from rtshcua.campaign.results import Failed, Result, line, read, tally
+from rtshcua.campaign.workers import Here, Processes
+
+S = 1_000_000
+SPACE = Space(("takeoff", "goto", "return_home"), {"px4": 60 * S, "ardupilot": 70 * S})
+FIELD = Field(b"bundle", b"root")
+ORDER = Order(5, 230, SPACE)
+
+
+def result(flight: Flight) -> Result:
+    """What comes of a flight here: made of its number alone."""
+    chance = Random(flight.number)
+    moments = tuple((label, chance.randrange(60 * S)) for label in ("airborne", "down"))
+    failed = (Failed("late", "too late", 3),) if flight.number % 7 == 0 else ()
+    texts = tuple(each.text for each in flight.scenario.incidents)
+    flavour, seed = flight.scenario.flavours[0], flight.scenario.first_seed
+    return Result(
+        flight.number, flavour, seed, texts, flight.tries, "completed", failed, (), {}, moments, 60 * S, "00"
+    )  # fmt: skip
+
+
+class Shuffled:
+    """Workers whose results come in an order of their own; `most` flights, then it is interrupted."""
+
+    def __init__(self, seed: int = 0, most: int = 10**9) -> None:
+        self.chance, self.left = Random(seed), most
+        self.flown: list[int] = []
+
+    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+        assert field is FIELD
+        for flight in self.chance.sample(flights, len(flights)):
+            if not self.left:
+                raise KeyboardInterrupt
+            self.left -= 1
+            self.flown.append(flight.number)
+            yield result(flight)
+
+    def close(self) -> None:
+        pass
+
+
+def all_of(workers: Shuffled, past: dict[int, Result] | None = None) -> dict[int, Result]:
+    flown = {} if past is None else past
+    fly(ORDER, FIELD, workers, flown, lambda _: None)
+    return flown
+
+
+def test_rounds_have_every_number_once() -> None:
+    assert [number for each in rounds(333) for number in each] == list(range(333))
+    assert [len(each) for each in rounds(333)] == [FIRST, ROUND, ROUND, ROUND, 13]
+
+
+def test_the_order_in_which_flights_come_back_changes_nothing() -> None:
+    assert all_of(Shuffled(1)) == all_of(Shuffled(2))
+
+
+@pytest.mark.parametrize("most", [0, 1, FIRST - 1, FIRST, FIRST + 1, FIRST + ROUND + 50])
+def test_an_interrupted_campaign_goes_on_as_if_nothing_had_been(most: int) -> None:
+    first = Shuffled(3, most)
+    past: dict[int, Result] = {}
+    with pytest.raises(KeyboardInterrupt):
+        all_of(first, past)
+    assert len(past) == most
+    kept = read([line(each) for each in past.values()])
+    second = Shuffled(4)
+    assert all_of(second, kept) == all_of(Shuffled(5))
+    assert sorted(first.flown + second.flown) == list(range(ORDER.flights))
+
+
+def test_more_flights_can_be_asked_for_later() -> None:
+    few: dict[int, Result] = {}
+    fly(Order(5, 40, SPACE), FIELD, Shuffled(), few, lambda _: None)
+    assert few == {number: each for number, each in all_of(Shuffled()).items() if number < 40}
+
+
+def test_a_flight_can_be_drawn_again_by_its_number() -> None:
+    flown = all_of(Shuffled())
+    for number in (0, FIRST, FIRST + ROUND + 7):
+        made = drawn(ORDER, number, flown)
+        assert tuple(each.text for each in made.scenario.incidents) == flown[number].incidents
+        assert made.tries == flown[number].tries
+
+
+def test_a_torn_line_counts_as_not_flown() -> None:
+    lines = [line(each) for each in all_of(Shuffled()).values()]
+    torn = [*lines[:-1], lines[-1][: len(lines[-1]) // 2]]
+    assert len(read(torn)) == ORDER.flights - 1
+    assert len(read([b"\xff\n", b"{}\n", b"\n", *lines])) == ORDER.flights
+
+
+def test_what_was_seen_is_counted_by_kind_and_moment() -> None:
+    flown = all_of(Shuffled())
+    seen = tally(flown[number] for number in sorted(flown))
+    assert {each.label for each in seen.moments["px4"]} == {"airborne", "down"}
+    assert sum(seen.tried.values()) == sum(len(each.tries) for each in flown.values())
+
+
+# ------------------------------------------------------------------------------ processes
+
+
+def _dies_once(field: Field, flight: Flight) -> Result:
+    mark = Path(field.root.decode())
+    if flight.number == 3 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return result(flight)
+
+
+def _dies_always(field: Field, flight: Flight) -> Result:
+    if flight.number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return result(flight)
+
+
+def few() -> list[Flight]:
+    return [Flight(number, drawn(ORDER, number, {}).scenario) for number in range(5)]
+
+
+def test_a_flight_whose_process_died_is_flown_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(workers, "fly_one", _dies_once)
+    processes = Processes(1)
+    flown = list(processes.fly(Field(b"", str(tmp_path / "died").encode()), few()))
+    processes.close()
+    assert sorted(flown, key=lambda each: each.number) == [result(flight) for flight in few()]
+
+
+def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(workers, "fly_one", _dies_always)
+    processes = Processes(1)
+    flown = sorted(processes.fly(FIELD, few()), key=lambda each: each.number)
+    processes.close()
+    assert flown == [lost(flight) if flight.number == 3 else result(flight) for flight in few()]
+    assert flown[3].failures[0].slug == LOST
+
+
+def test_one_process_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "fly_one", lambda _, flight: result(flight))
+    assert list(Here().fly(FIELD, few())) == [result(flight) for flight in few()]
+    assert campaign.FIRST < campaign.ROUND

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from rtshcua.campaign.drawing import Drawn, Space, draw
-from rtshcua.campaign.flights import Field, Flight, Result
-from rtshcua.campaign.results import tally
+from rtshcua.campaign.flights import Field, Flight
+from rtshcua.campaign.results import Result, tally
 
 #: flights of a round; the first is small, for it knows nothing of the mission
 FIRST: Final = 20

@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields, replace
 from typing import Final
 
 from rtshcua.campaign.written import incident_text
-from rtshcua.model.faults import UNITS, Fault, Way
+from rtshcua.model.faults import UNITS, Fault
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, OnCondition, Scenario, Start, When
 
 #: the steps in which a number of each unit is rounded, coarse ones first, by the end of a field's name
@@ -84,7 +84,7 @@ def _weaker(fault: Fault) -> Iterator[Fault]:
             continue
         if each.default is not MISSING and each.default is not None and _is_simpler(each.default, value):
             yield replace(fault, **{each.name: each.default})
-        if type(value) is not int or isinstance(value, Way):
+        if type(value) is not int:
             continue
         suffix = next(unit.suffix for unit in UNITS if each.name.endswith(unit.suffix))
         if abs(value) >= 2 * _ROUND[suffix][-1]:

@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing import get_context
-from typing import Final
+from typing import Any, Final
 
 from rtshcua.campaign.flights import Field, Flight, fly_one, lost
 from rtshcua.campaign.results import Result
@@ -89,7 +89,7 @@ class Cluster:
         from distributed import Client  # noqa: PLC0415  # an extra, and slow to load
 
         try:
-            self._client = Client(address, timeout=10)
+            self._client: Any = _loose(Client)(address, timeout=10)
         except (OSError, ValueError):
             raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
 
@@ -104,7 +104,7 @@ class Cluster:
             by_key[future.key] = flight
             futures.append(future)
         try:
-            for future in as_completed(futures):
+            for future in _loose(as_completed)(futures):
                 try:
                     yield future.result()
                 except KilledWorker:
@@ -120,6 +120,11 @@ class Cluster:
 def cores() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _loose(untyped: Any) -> Any:
+    """Something of Dask, which says nothing of its types."""
+    return untyped
 
 
 def _quiet() -> None:

@@ -141,19 +141,15 @@ def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
 
 
 def _other(folder: Folder, begun: Identity, asked: Identity) -> Refusal:
-    names = {
-        "bundle": "what is flown",
-        "version": "this program",
-        "flavours": "the autopilots",
-        "issued_at_us": "`--at`",
+    words = {
+        "bundle": "bundle (its sources changed)",
+        "version": "version of this program",
+        "issued_at_us": "time of issue",
     }
     differ = [name for name in Identity.__struct_fields__ if getattr(begun, name) != getattr(asked, name)]
-    what = " and ".join(names.get(name, f"the {name}") for name in differ)
-    return Refusal(
-        "usage",
-        f"`{folder.path}` holds another campaign: {what} differ",
-        "give another folder with `-o`, or take it away",
-    )
+    what = " and ".join(f"another {words.get(name, name)}" for name in differ)
+    help = "give another folder with `-o`, or take this one away"
+    return Refusal("usage", f"`{folder.path}` holds a campaign with {what}", help)
 
 
 def _space(

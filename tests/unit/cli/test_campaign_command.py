@@ -1,0 +1,187 @@
+"""`rtshcua campaign`: what it asks for, how it goes on, what it keeps, and how it ends."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua import library
+from rtshcua.campaign import workers
+from rtshcua.campaign.flights import Field, Flight, fly_one
+from rtshcua.campaign.results import Failed, Result
+from rtshcua.cli import app, campaign
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.faults import GpsLoss
+
+S = 1_000_000
+SHORT = str(library.root() / "missions" / "short.rts")
+#: a day on which the shipped mission may fly
+AT = ("--at", "2026-06-01T08:00:00Z")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def flies(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Field, Flight], Result]], None]:
+    """Lets flights be flown in another way."""
+
+    def put(fly: Callable[[Field, Flight], Result]) -> None:
+        monkeypatch.setattr(workers, "fly_one", fly)
+        monkeypatch.setattr(campaign, "fly_one", fly)
+
+    return put
+
+
+def told(flight: Flight, *failures: Failed) -> Result:
+    scenario = flight.scenario
+    texts = tuple(each.text for each in scenario.incidents)
+    return Result(
+        flight.number, scenario.flavours[0], scenario.first_seed, texts, flight.tries, "completed", failures, (),
+        {"fence_mm": 20_000 + flight.number}, (("airborne", 5 * S), ("down", 50 * S)), 60 * S, "00", S,
+    )  # fmt: skip
+
+
+def good(_: Field, flight: Flight) -> Result:
+    return told(flight)
+
+
+def without_gps(_: Field, flight: Flight) -> Result:
+    """Fails whenever the fix is lost."""
+    lost = any(isinstance(each.fault, GpsLoss) for each in flight.scenario.incidents)
+    return told(flight, Failed("collision", "flew into a <pillar>", 7 * S)) if lost else told(flight)
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    code = app.main(["campaign", SHORT, *AT, "-j", "1", *words])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The one that flies: a few real flights, from the source to the report."""
+    code, out, err = run(capsys, "--flights", "4", "--json", "--fault", "link-silence", "--fault", "wind", "-o", "made")
+    assert (code, err) == (ExitCode.OK, "")
+    found = json.loads(out)["campaign"]
+    assert (found["mission"], found["flights"], found["failed"], found["campaign"]) == ("short", 4, 0, 1)
+    assert set(found["kinds"]) <= {"LinkSilence", "WindStep"}
+    assert sum(sum(counts.values()) for counts in found["endings"].values()) == 4
+    lines = [json.loads(line) for line in Path("made/results.jsonl").read_text().splitlines()]
+    assert all(line["flown_us"] > S and len(line["log"]) == 64 for line in lines)
+    again = [fly_one_again(lines[0])]
+    assert [each.log for each in again] == [lines[0]["log"]]
+
+
+def fly_one_again(line: dict[str, Any]) -> Result:
+    """Flight 0 once more, in this process, from what the folder says alone."""
+    from rtshcua.campaign.campaign import Order, drawn
+    from rtshcua.campaign.drawing import FLAVOURS
+    from rtshcua.cli.campaign import _kinds, _space
+    from rtshcua.cli.sources import compile_sources
+    from rtshcua.virtual import development
+
+    begun = json.loads(Path("made/campaign.json").read_text())
+    compiled, _ = compile_sources([Path(SHORT)], mission=None, issued_at_us=begun["issued_at_us"])
+    assert compiled.policy is not None
+    assert compiled.mission is not None
+    field = Field(development.seal(compiled.policy, compiled.mission), development.root(begun["issued_at_us"]))
+    kinds = _kinds(["link-silence", "wind"])
+    assert isinstance(kinds, frozenset)
+    space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds)
+    assert not hasattr(space, "slug")
+    made = drawn(Order(begun["seed"], 4, space), line["number"], {})
+    return fly_one(field, Flight(line["number"], made.scenario, made.tries))
+
+
+def test_it_goes_on_where_it_stopped(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    seen: list[int] = []
+
+    def interrupted(field: Field, flight: Flight) -> Result:
+        seen.append(flight.number)
+        if len(seen) == 12:
+            raise KeyboardInterrupt
+        return good(field, flight)
+
+    flies(interrupted)
+    code, _, _ = run(capsys, "--flights", "30")
+    assert code == ExitCode.INTERRUPTED
+    folder = Path("runs/campaign-short-1")
+    assert json.loads((folder / "report.json").read_text())["flights"] == 9  # two calm ones were flown before
+    flies(good)
+    assert run(capsys, "--flights", "30")[0] == ExitCode.OK
+    assert json.loads((folder / "report.json").read_text())["flights"] == 30
+    assert len((folder / "results.jsonl").read_text().splitlines()) == 30
+
+
+def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(without_gps)
+    code, out, _ = run(capsys, "--flights", "120")
+    assert code == ExitCode.TESTS
+    assert "failed   collision: " in out
+    text = Path("runs/campaign-short-1/failures/collision.rts").read_text()
+    assert text.startswith("// collision: flew into a <pillar>\n// Flight ")
+    assert 'import "lib:missions/short.rts"' in text
+    incidents = [line for line in text.splitlines() if line.startswith(("  at ", "  after "))]
+    assert len(incidents) == 1
+    assert "gps_loss(" in incidents[0]
+    page = Path("runs/campaign-short-1/report.html").read_text()
+    assert "flew into a &lt;pillar&gt;" in page
+    assert "<pillar>" not in page
+
+
+def test_another_campaign_in_the_folder_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(good)
+    assert run(capsys, "--flights", "1", "-o", "made")[0] == ExitCode.OK
+    code, _, err = run(capsys, "--flights", "1", "-o", "made", "--seed", "2")
+    assert code == ExitCode.USAGE
+    assert "`made` holds a campaign with another seed" in err
+    Path("made/campaign.json").write_text("{}")
+    code, _, err = run(capsys, "--flights", "1", "-o", "made")
+    assert code == ExitCode.INPUT
+    assert "is not what a campaign left" in err
+
+
+def test_a_mission_that_fails_without_faults_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(lambda _, flight: told(flight, Failed("collision", "flew into the ground")))
+    code, _, err = run(capsys)
+    assert code == ExitCode.USAGE
+    assert "on px4 the mission fails even if nothing goes wrong: flew into the ground" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--fault", "storm"], "no such fault: `storm`"),
+        (["--at", "noon"], "`noon` is not a UTC time"),
+        (["--cluster", "tcp://127.0.0.1:9"], "`--jobs` is for this machine"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], words: list[str], text: str
+) -> None:
+    code, _, err = run(capsys, *words)
+    assert code == ExitCode.USAGE
+    assert text in err
+    assert not Path("runs").exists()
+
+
+def test_a_cluster_that_does_not_answer_is_named(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    code = app.main(["campaign", SHORT, *AT, "--cluster", "nonsense", "--flights", "1"])
+    assert code == ExitCode.LINK
+    assert "no cluster answers" in capsys.readouterr().err

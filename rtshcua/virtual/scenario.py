@@ -114,16 +114,7 @@ class _Watched(Simulation):
         self.arrived: list[Arrived] = []
         self.sent: dict[bytes, int] = {}
         self._due_us = 0
-        if hasattr(self, "heard"):
-            self.heard = self._note
-            return
-        obey = self._face.handle
-
-        def handle(datagram: bytes) -> list[bytes]:
-            self._note(max(self._now_us, self._ticked_us), datagram)
-            return obey(datagram)
-
-        self._face.handle = handle  # type: ignore[method-assign]
+        self.heard = self._note
 
     def _note(self, at_us: int, frame: bytes) -> None:
         self.arrived.append(Arrived(at_us, self.sent.get(frame, at_us), frame))
@@ -146,9 +137,9 @@ class _Watched(Simulation):
             Sample(
                 self._now_us, truth.latitude, truth.longitude, truth.up_mm, truth.speed_mm_s, truth.climb_mm_s,
                 truth.armed, truth.in_air, truth.crashed, truth.mode, truth.battery,
-                getattr(truth, "distance_to_obstacle_mm", None),
-                getattr(truth, "taken_over_us", None),
-                getattr(truth, "taken_over_by", None),
+                truth.distance_to_obstacle_mm,
+                truth.taken_over_us,
+                truth.taken_over_by,
             )
         )  # fmt: skip
 

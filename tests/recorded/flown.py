@@ -28,6 +28,11 @@ from rtshcua.onboard.runtime.monitor import StateMonitor
 TRACES = Path(__file__).resolve().parents[1] / "traces"
 SECOND = 1_000_000
 TICK_US = 50_000
+#: what is asked for by REQUEST_MESSAGE
+ASKED = {
+    "HEARTBEAT": mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    "POSITION_TARGET_GLOBAL_INT": mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
+}
 #: an autopilot that was not heard for so long answers nothing either
 SILENT_US = 300_000
 #: monotonic time of the autopilot's start
@@ -79,7 +84,7 @@ class Recorded:
         self._frames = FrameSession()
         self.driver = Driver(self.policy, self._frames, fence=False)
         self._reader, self._teller = Codec(0, 0), Codec(1, 1)
-        self._beat = b""
+        self._told: dict[int, bytes] = {}  # the last report of mode and target
         self._alive_us = START_US  # when the autopilot itself was last heard
         self._now_us = START_US
         self._boots: deque[int] = deque(maxlen=20)  # boot time minus ours, as the last stamps have it
@@ -160,8 +165,8 @@ class Recorded:
 
     def _receive(self, frame: bytes) -> None:
         for received in self._reader.parse(frame):
-            if received.name == "HEARTBEAT" and received.component == 1:
-                self._beat = frame
+            if received.name in ASKED and received.component == 1:
+                self._told[ASKED[received.name]] = frame
         heard = self.driver.receive(frame, self._now_us)
         self._boots += [boot_us - self._now_us for boot_us in map(_boot_us, heard.frames) if boot_us]
         self._take(heard.events)
@@ -172,7 +177,7 @@ class Recorded:
             (received,) = self._reader.parse(frame)
             self.sent.append((round(self.second, 2), received))
             if received.name == "COMMAND_LONG" and received.message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
-                self._tell_mode()
+                self._tell(int(received.message.param1))
             elif received.name.startswith("COMMAND_") and self.acknowledges:
                 self._acknowledge(received.message.command)
             elif received.name == "TIMESYNC" and self._boots:
@@ -185,11 +190,11 @@ class Recorded:
             return
         self._receive(self._teller.pack(mavlink.MAVLink_command_ack_message(number, 0, 0, 0, 1, OURS)))
 
-    def _tell_mode(self) -> None:
-        """As both real ones answer: acknowledged, and the mode as it was told last."""
+    def _tell(self, number: int) -> None:
+        """As both real ones answer: acknowledged, and as it was told last."""
         self._acknowledge(mavlink.MAV_CMD_REQUEST_MESSAGE)
-        if self._beat and self._now_us - self._alive_us <= SILENT_US:
-            self._receive(self._beat)
+        if number in self._told and self._now_us - self._alive_us <= SILENT_US:
+            self._receive(self._told[number])
 
     def _answer_clock(self, at_us: int, ts1_ns: int) -> None:
         if self._now_us - self._alive_us > SILENT_US:

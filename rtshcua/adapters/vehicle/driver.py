@@ -276,7 +276,7 @@ class Driver:
             events.append(ports.Noted(now_us, "it answers again"))
 
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
-        """Go on with the manoeuvre; where a frame of it waits for the mode, ask at once."""
+        """Go on with the manoeuvre; where a frame of it waits until it is known who flies, ask at once."""
         manoeuvre = self._manoeuvre
         if manoeuvre is None:
             return
@@ -295,11 +295,11 @@ class Driver:
             send += self._ask(now_us)
 
     def _ask(self, now_us: int) -> list[Message]:
-        """Ask for the mode, if it is time to."""
+        """Ask who flies, if it is time to."""
         if self._released:
             return []
         flies = self.seen.airborne or (self._manoeuvre is not None and not self._manoeuvre.over)
-        asks = self._aids.mode.due(self.system, self.seen, now_us, flies=flies)
+        asks = self._aids.query.due(self.system, self.seen, now_us, flies=flies)
         if asks:
             self._watch.asked(now_us)
         return asks

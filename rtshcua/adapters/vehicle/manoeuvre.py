@@ -105,7 +105,7 @@ class Commander:
         return [stage.message]
 
 
-# ---------------------------------------------------------------- the mode
+# ---------------------------------------------------------------- who flies it, asked for
 
 #: An unanswered question is put again after this long.
 AGAIN_US: Final = 100_000
@@ -113,40 +113,58 @@ AGAIN_US: Final = 100_000
 IDLE_US: Final = 1_000_000
 #: and while something does, where the mode is streamed fast enough.
 STREAMED_US: Final = 300_000
+#: So long after the mode a target may be told that was asked for with it. One that has none to tell of tells nothing:
+#: ArduCopter accepts the question then, PX4 denies it.
+TARGET_US: Final = 100_000
 
 
-class ModeQuery:
+class WhoFliesQuery:
     """Asks for HEARTBEAT. `within_us`: no frame that moves the vehicle leaves on an older mode report.
 
     PX4 sends its HEARTBEAT once a second, whatever interval is asked for, and a pilot who takes over in between would
     be flown over. Both autopilots answer REQUEST_MESSAGE of HEARTBEAT within milliseconds, so the mode is asked for:
-    again and again while something of ours flies, and once more right before a frame that begins a motion
-    (docs/adr/0034).
+    again and again while something of ours flies, and once more right before a frame that begins a motion. Where the
+    vehicle has a target of ours, a pilot may have given it another without any change of mode: then
+    POSITION_TARGET_GLOBAL_INT is asked for in the same round trip (docs/adr/0034).
     """
 
-    def __init__(self, within_us: int) -> None:
-        self._within_us = within_us
+    def __init__(self, within_us: int, slack: int = 1) -> None:
+        self._within_us = within_us * slack
+        self._target_us = TARGET_US * slack
         self._asked_us: int | None = None
-        self._wanted_beats: int | None = None  # how many heartbeats had come when a frame began to wait
+        self._came: tuple[int, int] | None = None  # how many reports of mode and target had, when a frame began to wait
+        self._target = False  # the frame waits for a target, too
+        #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
+        self.ends_us: int | None = None
 
     def is_young(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down."""
         return seen.heartbeat_us is not None and now_us - seen.heartbeat_us <= self._within_us
 
-    def is_newer(self, seen: ObservedVehicle) -> bool:
-        """Whether a mode report came since this was first asked for one frame: it will do for any."""
-        if self._wanted_beats is None:
-            self._wanted_beats = seen.beats
+    def is_newer(self, seen: ObservedVehicle, now_us: int, *, target: bool) -> bool:
+        """Whether a mode report came since this was first asked for one frame, and with `target` a report of that too,
+        or none in good time: it will do for any frame.
+        """
+        if self._came is None:
+            self._came = seen.beats, seen.targets
             self._asked_us = None  # ask at once
-        return seen.beats > self._wanted_beats
+        self._target = target
+        beats, targets = self._came
+        if seen.beats == beats:
+            return False
+        if not target or (seen.targets > targets and now_us - seen.target_us <= self._within_us):
+            return True
+        if self.ends_us is None:
+            self.ends_us = now_us + self._target_us
+        return now_us >= self.ends_us
 
     def sent(self) -> None:
         """The frame left, or is not wanted any more: the next one asks anew."""
-        self._wanted_beats = None
+        self._came, self._target, self.ends_us = None, False, None
 
     def due(self, system: int, seen: ObservedVehicle, now_us: int, *, flies: bool) -> list[Message]:
         """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
-        if self._wanted_beats is not None:
+        if self._came is not None:
             every_us = AGAIN_US
         elif not flies:
             every_us = IDLE_US
@@ -157,7 +175,8 @@ class ModeQuery:
         if self._asked_us is not None and now_us - self._asked_us < every_us:
             return []
         self._asked_us = now_us
-        return [messages.request(system, "HEARTBEAT")]
+        names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target else ("HEARTBEAT",)
+        return [messages.request(system, name) for name in names]
 
 
 # ---------------------------------------------------------------- a manoeuvre
@@ -183,7 +202,7 @@ class Aids:
         self.flavour = flavour
         self.brakes = brakes
         self.commander = commander
-        self.mode = ModeQuery(flavour.mode_within_us * commander.slack)
+        self.query = WhoFliesQuery(flavour.mode_within_us, commander.slack)
         self.targets = TargetWatch()
 
 
@@ -218,12 +237,12 @@ class Manoeuvre:
         #: until then `advance` has nothing to say, unless something is observed or acknowledged
         self.due_us = 0
         seen.hush()
-        aids.mode.sent()
+        aids.query.sent()
         self._enter(seen)
 
     @property
     def waits(self) -> bool:
-        """Whether a frame waits until the mode is known."""
+        """Whether a frame waits until it is known who flies."""
         return self._waits and not self.over
 
     @property
@@ -280,32 +299,35 @@ class Manoeuvre:
             self._commander.start(stage, seen.up_us)
 
     def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
-        """Whether the mode is known well enough for a frame that moves the vehicle (docs/adr/0034)."""
-        mode = self._aids.mode
-        if self._command.kind in _URGENT and mode.is_young(seen, now_us):
+        """Whether it is known well enough who flies, for a frame that moves the vehicle (docs/adr/0034)."""
+        query, urgent = self._aids.query, self._command.kind in _URGENT
+        if urgent and query.is_young(seen, now_us):
             return True
-        return mode.is_newer(seen)
+        return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent)
 
     def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""
         self._waits, self._entered_us = False, seen.up_us
-        self._aids.mode.sent()
         target = self._left[0].target
         if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
             self._aids.targets.expect(target, seen)
         if self._left[0].spare and self._is_done(seen):
-            return []
+            return []  # the next one may leave at once
+        self._aids.query.sent()
         return self._commander.start(self._left[0], seen.up_us)
 
     def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
         """The message once more, where it needs to be: never of a target that the autopilot flies to."""
         commander, stage = self._commander, self._left[0]
         goes = self._aids.targets.shown or (self._progress is not None and self._progress.shown)
-        if self._waits or (stage.command is None and goes):
+        if self._waits:
             return []
-        if seen.up_us < commander.due_us or not self._may_send(seen, now_us):
+        if (stage.command is None and goes) or seen.up_us < commander.due_us:
+            self._aids.query.sent()
             return []
-        self._aids.mode.sent()
+        if not self._may_send(seen, now_us):
+            return []
+        self._aids.query.sent()
         self._aids.targets.told_again()
         return commander.due(seen.up_us)
 
@@ -313,6 +335,8 @@ class Manoeuvre:
         """When to look again, in real time, unless something is seen before."""
         if self.over:
             return NEVER
+        if self._aids.query.ends_us is not None:
+            return self._aids.query.ends_us
         if not self._left:
             ends = self._held_us is not None and self._command.hold_us
             at_us = (self._held_us or 0) + self._command.hold_us if ends else NEVER

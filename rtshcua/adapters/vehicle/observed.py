@@ -138,7 +138,8 @@ class ObservedVehicle:
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
     so now, of a position that is not old. `target` is where the autopilot says that it flies to. `descent` is how fast
     it sinks and `tilt` how many degrees it leans (`tilt_us`: told then), whoever vouches for that. `beats` counts
-    heartbeats; `up_us` is link time, see `LinkWatch`. `notes` collects what an operator should know.
+    heartbeats and `targets` reports of a target (`target_us`: told last); `up_us` is link time, see `LinkWatch`.
+    `notes` collects what an operator should know.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -156,6 +157,8 @@ class ObservedVehicle:
     tilt: int = 0
     tilt_us: int = 0
     target: Reported | None = None
+    target_us: int = 0
+    targets: int = 0
     fix: int = 0
     prearm: bool = False
     unwell: tuple[str, ...] = ()
@@ -196,6 +199,8 @@ class ObservedVehicle:
             case "POSITION_TARGET_GLOBAL_INT":
                 if message.coordinate_frame in _ABOVE_SEA and isfinite(message.alt):
                     self.target = message.lat_int, message.lon_int, round(message.alt * 1_000)
+                    self.target_us = now_us
+                    self.targets += 1
             case "ATTITUDE":
                 self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
             case "GPS_RAW_INT":

@@ -144,6 +144,11 @@ class TargetWatch:
         #: whether the autopilot was seen to fly to the present target
         self.shown = False
 
+    @property
+    def compares(self) -> bool:
+        """Whether there is a target of ours that what the autopilot reports is compared with."""
+        return self._expected is not None
+
     def expect(self, target: ExpectedTarget | None, seen: ObservedVehicle) -> None:
         """From now on this is what it should fly to; None: nothing that could be compared.
 

@@ -118,3 +118,17 @@ def test_how_many_items_there_are_is_a_parameter(pilot: Pilots) -> None:
     assert (a.last("PARAM_VALUE").param_id, a.last("PARAM_VALUE").param_value) == ("FENCE_TOTAL", 4)
     p.upload(a, p.mission(a, [p.takeoff(5)]))
     assert (a.last("PARAM_VALUE").param_id, a.last("PARAM_VALUE").param_value) == ("MIS_TOTAL", 2)
+
+
+def test_the_target_is_told_when_it_is_asked_for_if_there_is_one(pilot: Pilots, flavour: str) -> None:
+    """PX4 denies what it has nothing to tell of; ArduCopter acknowledges it, and sends nothing."""
+    a = pilot(flavour).ready()
+    asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 87, 0, 0, 0, 0, 0, 0)
+    (refused,) = a.send(asked)
+    assert (refused.name, refused.message.result) == ("COMMAND_ACK", 2 if a.px4 else 0)
+    a.take_off()
+    a.go_to(40, 30, 20)
+    a.wait(1)
+    told = a.send(asked)
+    assert {frame.name for frame in told} == {"POSITION_TARGET_GLOBAL_INT", "COMMAND_ACK"}
+    assert [frame.message.result for frame in told if frame.name == "COMMAND_ACK"] == [0]

@@ -16,12 +16,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.manoeuvre import TARGET_US
 from rtshcua.codec.frames import Codec
-from rtshcua.model.faults import Fault, LinkDelay, Mode, PilotGoto, PilotMode, PilotPause, PilotSticks
+from rtshcua.model.faults import Fault, LinkDelay, MessageSilence, Mode, PilotGoto, PilotMode, PilotPause, PilotSticks
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Failed, Ready, Succeeded, TakenOver
 from virtual.copying import copied
-from virtual.policy import POLICY
+from virtual.policy import POLICY, geo
 from virtual.sampling import each_once
 
 Make = Callable[..., Any]
@@ -33,6 +34,8 @@ TICK_US = 40 * MS
 #: how often landed state and target are reported
 REPORTED_US = 100 * MS
 DELAYS_US = (0, 20 * MS, 150 * MS)
+#: where our own next command leads, in mm
+NEXT = (200_000, 90_000)
 
 
 def moves(frame: bytes) -> bool:
@@ -48,17 +51,26 @@ def moves(frame: bytes) -> bool:
     return False
 
 
+def steers(frame: bytes) -> bool:
+    """Whether it tells the autopilot where to fly, or how: a speed alone takes the vehicle from nobody."""
+    (received,) = Codec(1, 1).parse(frame)
+    return getattr(received.message, "command", None) != mavlink.MAV_CMD_DO_CHANGE_SPEED
+
+
 class Sent:
-    """When frames left that move the vehicle."""
+    """When frames left that move the vehicle, and which of them steer it."""
 
     def __init__(self, one: Any) -> None:
         self.at_us: list[int] = []
+        self.steering_us: list[int] = []
         self._one = one
         one.vehicle.lose = self
 
     def __call__(self, frame: bytes) -> bool:
         if moves(frame):
             self.at_us.append(self._one.now_us)
+            if steers(frame):
+                self.steering_us.append(self._one.now_us)
         return False
 
 
@@ -116,6 +128,42 @@ def test_a_takeover_is_seen_while_it_holds(aloft: Make, flavour: str, name: str)
     else:
         one.until(TakenOver, 3)
     assert sent.at_us == []
+
+
+def unstreamed(one: Any) -> None:
+    """Somebody on the link stops the stream of targets: nothing but asking shows one."""
+    number = mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT
+    off = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, number, -1, 0, 0, 0, 0, 0)
+    one.vehicle.simulation.receive(Codec(255, 190).pack(off), one.vehicle.clock.elapsed_us)
+
+
+def test_another_target_is_seen_before_our_next_one_leaves_though_none_is_streamed(aloft: Make) -> None:
+    """Both answer REQUEST_MESSAGE of POSITION_TARGET_GLOBAL_INT: it is asked for with the mode."""
+    one = aloft()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(5)
+    unstreamed(one)
+    one.wait(1)
+    sent = Sent(one)
+    one.vehicle.simulation.inject(TAKEOVERS["go-to"](0))
+    one.wait(1)
+    assert not any(isinstance(event, TakenOver) for event in one.events)
+    one.begin(MotionKind.FLY, (200_000, 90_000), altitude=25_000, speed=5_000)
+    assert one.until(TakenOver, 1).how == "another target"
+    one.wait(5)
+    assert sent.at_us == []
+
+
+@pytest.mark.parametrize("delay_us", [0, 150 * MS])
+def test_a_target_that_is_never_told_holds_nothing_up_for_long(aloft: Make, delay_us: int) -> None:
+    one = under_way(aloft, delay_us)
+    one.vehicle.simulation.inject(MessageSilence(0, "POSITION_TARGET_GLOBAL_INT"))
+    one.wait(1)
+    sent = Sent(one)
+    begins_us = one.now_us
+    one.begin(MotionKind.FLY, (200_000, 90_000), altitude=25_000, speed=5_000)
+    one.wait(2)
+    assert sent.at_us[0] <= begins_us + 2 * delay_us + TARGET_US + TICK_US
 
 
 def test_sticks_end_what_px4_does_by_itself(aloft: Make, flavour: str) -> None:
@@ -219,15 +267,17 @@ def holds(one: Any, flavour: str, name: str, acts_us: int, phase_us: int, delay_
     simulation.inject(TAKEOVERS[name](simulation.now_us + takes_us - one.now_us))
     one.wait((begins_us - one.now_us) / S)
     if not any(isinstance(event, TakenOver) for event in one.events):
-        one.begin(MotionKind.FLY, (200_000, 90_000), altitude=25_000, speed=5_000)
+        one.begin(MotionKind.FLY, NEXT, altitude=25_000, speed=5_000)
         one.wait(6)
     latest_us, late_us = max(sent.at_us, default=0), takes_us + WITHIN_US[flavour] + 2 * delay_us + TICK_US
     if any(isinstance(event, TakenOver) for event in one.events):
         one.wait(3)
         assert max(sent.at_us, default=0) == latest_us, "nothing is sent once it shows"
-    else:  # ours was on its way, and came before any report showed the pilot's
-        assert takes_us - TICK_US <= latest_us + delay_us <= takes_us + REPORTED_US
+    else:  # ours was on its way, and came before any report showed the pilot's; a speed follows once ours shows
+        assert takes_us - TICK_US <= sent.steering_us[-1] + delay_us <= takes_us + REPORTED_US
+        assert one.vehicle.driver.seen.target[:2] == pytest.approx(geo(NEXT), abs=10)
     assert latest_us <= late_us, f"{(latest_us - takes_us) / MS} ms after it took effect"
+    assert max(sent.steering_us, default=0) <= late_us - delay_us
 
 
 def try_all(aloft: Make, flavour: str, name: str, *, whole: bool) -> None:
@@ -242,7 +292,18 @@ def test_no_frame_leaves_later_than_w(aloft: Make, flavour: str, name: str) -> N
     try_all(aloft, flavour, name, whole=False)
 
 
+@pytest.mark.parametrize("flavour", ["ardupilot"])
+def test_a_go_to_that_comes_before_our_question_is_not_flown_over(aloft: Make) -> None:
+    """It took effect 20 ms before our next target left, and none was streamed between: one that is asked for shows."""
+    one = under_way(aloft, DELAYS_US[1])
+    holds(one, "ardupilot", "go-to", 20 * MS, 0, DELAYS_US[1])
+    assert [event.how for event in one.events if isinstance(event, TakenOver)] == ["another target"]
+
+
 @pytest.mark.soak
-@pytest.mark.parametrize("name", ["land", "return", "position", "go-to"])
+@pytest.mark.parametrize(
+    ("name", "flavour"),
+    [*product(["land", "return", "position", "go-to"], ["px4", "ardupilot"]), ("pause", "px4")],
+)
 def test_no_frame_leaves_later_than_w_at_any_moment(aloft: Make, flavour: str, name: str) -> None:
     try_all(aloft, flavour, name, whole=True)

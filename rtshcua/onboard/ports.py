@@ -109,6 +109,14 @@ class LinkBack(Event, frozen=True):
     """The vehicle is heard again, and answers, after `LinkLost`. Its state is not fresh yet."""
 
 
+class Answering(Event, frozen=True):
+    """Whether the vehicle answers, each time that this changes: one that is heard, and has answered nothing for longer
+    than the link's limit, seems not to hear us. It may be silent meanwhile, too.
+    """
+
+    answers: bool
+
+
 class Interrupted(Event, frozen=True):
     """The operator asked this program to stop (SIGINT, SIGTERM): fall back first, then end."""
 
@@ -191,7 +199,7 @@ class Ending(StrEnum):
     RECALLED = "recalled"  # an operator called it back; it fell back first
     STOOD_DOWN = "stood-down"  # the pilot or the autopilot took over
     CRASHED = "crashed"  # the vehicle came down as no landing does; nothing more is sent
-    LINK_LOST = "link-lost"  # the vehicle went silent
+    LINK_LOST = "link-lost"  # the vehicle went silent, or answered nothing
     INTERRUPTED = "interrupted"  # the operator stopped it; it fell back first
     EVIDENCE_LOST = "evidence-lost"  # nothing could be recorded any more
 

@@ -4,8 +4,8 @@ import pytest
 
 from reference.documents import low, recall
 from reference.flat_case import S
-from reference.world import FakeVehicle, Run, assert_audited, renewed
-from rtshcua.onboard.ports import AirState, Ending, Event, EvidenceFailed, Interrupted, Presented
+from reference.world import START, FakeVehicle, Run, assert_audited, renewed
+from rtshcua.onboard.ports import AirState, Answering, Ending, Event, EvidenceFailed, Interrupted, Presented, Ready
 from rtshcua.onboard.runtime.limits import Limits
 
 OF = low()
@@ -43,6 +43,27 @@ def test_one_that_never_counts_as_ready_comes_down_too(known: bool) -> None:
         run.tick(AirState(0, True, True))
     run.until_over()
     assert run.flown[-1] in ("return_home", "emergency_land")
+
+
+def test_one_that_answers_nothing_is_not_told_what_to_do_before_it_does() -> None:
+    """What brings it home is chosen when it arrives; chosen before, on what was known then, it lands it on the spot."""
+    run = back()
+    run.tick(AirState(0, True, True), Answering(0, answers=False))
+    run.until(lambda run: run.clock.now().monotonic_us > START.monotonic_us + Limits().ready_us + 10 * S, 140)
+    assert (run.flown, run.ending) == ([], None)
+    run.tick(Answering(0, answers=True), Ready(0))
+    run.until_over()
+    assert run.flown[-1] == "return_home"
+    assert_audited(run)
+
+
+def test_one_that_never_answers_is_given_up_when_it_cannot_fly_any_more() -> None:
+    run = back()
+    run.tick(AirState(0, True, True), Answering(0, answers=False))
+    flies_us = OF.bundle.policy.vehicle.endurance_us
+    run.until_over((flies_us + Limits().silent_us) // S + 1)
+    assert (run.flown, run.ending) == ([], Ending.LINK_LOST)
+    assert_audited(run)
 
 
 def test_one_that_is_on_the_ground_is_left_there() -> None:

@@ -9,9 +9,11 @@ from itertools import product
 
 import pytest
 
+from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.evidence.report import Verdict
 from rtshcua.model.faults import LinkReorder, LinkSilence, Way, WindStep
 from rtshcua.onboard.ports import Ending, Event
+from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
 from rtshcua.virtual.vehicle import TICK_US
 from virtual import case
@@ -116,6 +118,71 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
 )
 def test_a_silence_lands_nothing_on_the_spot(flavour: str, stage: str, seconds: float, way: Way) -> None:
     lands_at_home(flavour, stage, seconds, way)
+
+
+class Killed(Exception):
+    """The program was, in the air."""
+
+
+def resumed(flavour: str, seconds: float) -> Flown:
+    """Killed on a leg, and begun again while the vehicle does not hear us for so long."""
+    first = Flight(shipped("standard"), simulated(flavour), tick_us=TICK_US)
+    since_us: list[int] = []
+
+    def each(flight: Flight) -> Sequence[Event]:
+        if running(1)(flight):
+            since_us.append(flight.clock.elapsed_us)
+            if since_us[-1] - since_us[0] > 2 * UNDER_WAY:
+                raise Killed
+        return ()
+
+    with pytest.raises(Killed):
+        first.fly(each)
+    vehicle = first.vehicle
+    if seconds:
+        silence = LinkSilence(vehicle.simulation.now_us, round(seconds * case.S), Way.UP)
+        vehicle.simulation.inject(silence)
+    vehicle.driver = Driver(first.loaded.bundle.policy, vehicle.frames, fence=False)
+    second = Flight(shipped("standard"), simulated(flavour), tick_us=TICK_US, resumed=True, vehicle=vehicle)
+    return second.fly()
+
+
+@pytest.mark.parametrize(
+    ("flavour", "seconds"),
+    [
+        pytest.param(flavour, seconds, marks=() if tried else pytest.mark.soak)
+        for flavour, seconds, tried in (
+            ("px4", 0.0, True), ("px4", 10.0, False), ("px4", 150.0, False),
+            ("ardupilot", 0.0, False), ("ardupilot", 10.0, True), ("ardupilot", 150.0, False),
+        )
+    ],
+)  # fmt: skip
+def test_begun_again_in_the_air_it_comes_home_and_lands_nothing_on_the_spot(flavour: str, seconds: float) -> None:
+    """PX4 streams all at once: what it said was judged before any of it had an age, and landed it there."""
+    flown = resumed(flavour, seconds)
+    truth = flown.vehicle.simulation.truth()
+    assert flown.dispatched() == ["hover", "return_home"]
+    assert (flown.ending, truth.armed) == (Ending.ABORTED, False)
+    assert abs(truth.north_mm) + abs(truth.east_mm) < 5_000
+
+
+@pytest.mark.parametrize(
+    ("flavour", "stage"),
+    [
+        pytest.param(flavour, stage, marks=() if (flavour, stage) == ("px4", "takeoff") else pytest.mark.soak)
+        for flavour, stage in product(FLAVOURS, STAGES)
+    ],
+)
+def test_a_vehicle_that_never_hears_us_again_is_not_waited_for_without_an_end(flavour: str, stage: str) -> None:
+    """It has no failsafe of its own for that: it does what it was told last, until its battery brings it down."""
+    flown = fly(flavour, stage, 1e5, Way.UP)
+    assert flown.audit().report.verdict is Verdict.VERIFIED
+    told = f"{flown.ending} {flown.dispatched()}"
+    assert flown.ending in (Ending.COMPLETED, Ending.ABORTED, Ending.STOOD_DOWN, Ending.LINK_LOST), told
+    last_us = flown.loaded.bundle.policy.vehicle.endurance_us + Limits().silent_us
+    assert flown.vehicle.clock.elapsed_us <= 90 * case.S + last_us, told
+    if flown.ending is not Ending.LINK_LOST and stage != "waiting":
+        assert not flown.vehicle.simulation.truth().armed or flown.effects("taken-over"), told
 
 
 @pytest.mark.soak

@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.source_time import SourceTime
-from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, StreamRequests
+from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, PATIENCE_US, StreamRequests
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
@@ -69,6 +69,9 @@ class Driver:
         self._unsent: int | None = None  # the token of a command of which no frame left yet
         self._moving = False  # a frame that moves the vehicle is among those to be packed
         self._watch = LinkWatch(slack)
+        self._was_mute = False
+        self._answers_us: int | None = None  # it was found to answer in the air, before it was ready
+        self._timed = False  # and the times of what it says are known, or not waited for any more
         self._crash = CrashWatch()
         self._spoken: set[str] = set()
         self._beat_us: int | None = None
@@ -81,10 +84,12 @@ class Driver:
         """What `Ready` waits for, in words; None once it was given, or when only streams are still to come."""
         if self._was_ready:
             return None
-        if self.flavour is None or self.seen.airborne:
+        if self.flavour is None:
             return self.link.crowd or self.seen.unready
-        # before anything flies it must have answered: its mode has to be known before each frame that moves it
+        # before anything is sent it must have answered: its mode has to be known before each frame that moves it
         mute = None if self._watch.answers else "it answers nothing that it is asked"
+        if self.seen.airborne:
+            return self.link.crowd or mute or self.seen.unready
         waits = self.link.crowd or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
 
@@ -119,6 +124,7 @@ class Driver:
             self._beat_us = now_us
             send.append(messages.heartbeat())
         self.seen.pass_time(now_us)
+        self._watch.strict = self._watch.strict or self.seen.airborne  # what is sent to it there has to arrive
         ts1_ns = self.source.clock.due(now_us)
         if ts1_ns is not None:
             send.append(messages.time_sync(ts1_ns))
@@ -263,6 +269,9 @@ class Driver:
         was = self._watch.down
         changed = self._watch.look(now_us)
         self.seen.up_us, down = self._watch.up_us, self._watch.down
+        if self._watch.mute != self._was_mute:
+            self._was_mute = self._watch.mute
+            events.append(ports.Answering(now_us, answers=not self._was_mute))
         if not changed:
             return
         if SILENT in (was, down):
@@ -319,8 +328,19 @@ class Driver:
         return "" if seen.mode in flavour.ours else flavour.mode_name(seen.mode)
 
     def _is_ready(self, now_us: int) -> bool:
-        waits = self.link.crowd if self.seen.airborne else self.unready
-        return waits is None and self._streams.settled(now_us)
+        """In the air it need not be fit to arm, but what brings it home is chosen by what is known of it. So it must
+        answer, for a while the times of what it says are awaited, and then one report of each kind.
+        """
+        if not self.seen.airborne:
+            return self.unready is None and self._streams.settled(now_us)
+        if self.link.crowd is not None or not self._watch.answers:
+            return False
+        if self._answers_us is None:
+            self._answers_us = now_us
+        if not self._timed and (self.source.unready is None or now_us - self._answers_us > PATIENCE_US):
+            self._timed = True
+            self._streams.renew(now_us)
+        return self._timed and self._streams.settled(now_us)
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""

@@ -130,8 +130,12 @@ class LinkWatch:
         self._seen_us: int | None = None
         #: link time: how long the link was up in sum, as of the last look
         self.up_us = 0
-        #: whether it ever answered anything: one that never did cannot be held to it
+        #: whether it ever answered anything
         self.answers = False
+        #: whether it counts as unanswered though it never answered anything, too
+        self.strict = False
+        #: whether it answered nothing for too long, and did not since; also while it is silent
+        self.mute = False
         #: why the link is down; None while it is up
         self.down: str | None = None
 
@@ -146,7 +150,7 @@ class LinkWatch:
 
     def answered(self) -> None:
         """It answered."""
-        self._unanswered_us, self.answers = None, True
+        self._unanswered_us, self.answers, self.mute = None, True, False
 
     def look(self, now_us: int) -> bool:
         """Let time pass; True when `down` is another than at the last look."""
@@ -164,6 +168,8 @@ class LinkWatch:
             self._unanswered_us = None
             return SILENT
         asked_us = self._unanswered_us
-        if self.answers and asked_us is not None and now_us - asked_us > UNANSWERED_US * self._slack:
+        held = self.answers or self.strict
+        if held and asked_us is not None and now_us - asked_us > UNANSWERED_US * self._slack:
+            self.mute = True
             return UNANSWERED
         return None

@@ -104,6 +104,11 @@ class StreamRequests:
         """The link was silent: rates are measured anew."""
         self._measured_us = None
 
+    def renew(self, now_us: int) -> None:
+        """What was heard so far does not count as heard."""
+        self._heard_us.clear()
+        self._since_us = now_us
+
     def settled(self, now_us: int) -> bool:
         """Whether one message of each group was heard, or was waited for long enough."""
         if self._since_us is None:

@@ -83,6 +83,10 @@ class MissionController:
             self._began_us = now.monotonic_us
         if self.stage is _ENDED or (self.link.state is not _UP and not self._judges(now)):
             return False
+        if self.link.mute and self._is_gone(now.monotonic_us):
+            self._journal.effect(now, "link-lost", detail="it is heard, but answers nothing")
+            self.stand_down(now, Ending.LINK_LOST)
+            return False
         stage = self.stage
         if stage is _RUNNING:
             return self._supervise(now)
@@ -111,8 +115,8 @@ class MissionController:
         return True
 
     def _is_gone(self, now_us: int) -> bool:
-        """Whether the silence was waited out: in the air the vehicle may come back as long as it can fly, unless
-        somebody waits for this program to stop.
+        """Whether it was waited out that the vehicle is silent, or answers nothing: in the air that may end as long as
+        it can fly, unless somebody waits for this program to stop.
         """
         limit_us = self._limits.silent_us
         if self.aloft and not self._stopping:
@@ -137,7 +141,8 @@ class MissionController:
     def _wait(self, now: Now, began_us: int) -> bool:
         vehicle = self.vehicle
         if not vehicle.ready or vehicle.airborne is None:
-            if now.monotonic_us - began_us > self._limits.ready_us:
+            # one in the air that answers nothing is waited for longer: nothing that is sent would arrive
+            if now.monotonic_us - began_us > self._limits.ready_us and not (self.link.mute and self.aloft):
                 self._journal.effect(now, "never-ready")
                 return self._come_down(now)
             return False
@@ -228,6 +233,9 @@ class MissionController:
         if self.dispatcher.active is None and self.vehicle.at_rest:
             self.down(now)
         elif not self._fallback.turn(now, self.monitor.state(now.monotonic_us)):
+            if self.link.mute:  # nothing of it has arrived: it is tried until that is waited out
+                self._fallback.land()
+                return False
             self._journal.effect(now, "stranded")
             self.stand_down(now, self._cause or Ending.ABORTED)
         return False

@@ -3,8 +3,8 @@
 The bounds are computed from the policy, and held against every path of small runs by a search (docs/model-checking.md).
 Each wait of the runtime has a limit of its own. It is noticed at the next step of the loop, at most `period_us` later,
 and when the link was lost only on fresh state, at most `flapping_us` after it was back. Time in which the vehicle is
-not heard is not counted here: a silence lasts no longer than the vehicle can fly and `silent_us`, then the run stands
-down.
+not heard, or answers nothing, is not counted here: that lasts no longer than the vehicle can fly and `silent_us`, then
+the run stands down.
 """
 
 from rtshcua.model.flat.contract import Contract, Link
@@ -16,10 +16,11 @@ from rtshcua.onboard.ports import Frozen
 class Limits(Frozen):
     """How long the runtime waits for the world, in us.
 
-    `ready_us` for a vehicle that is ready. `silent_us` for a lost link to come back: on the ground, or once somebody
-    asked this program to stop; in the air that, and as long as the vehicle can fly. When the link is back, `fresh_us`
-    for fresh state: longer than a link must be silent to count as lost, so that nothing is judged after one message and
-    no more. A link that comes and goes is waited for `flapping_us` in all, from when it was back first.
+    `ready_us` for a vehicle that is ready. `silent_us` for a lost link to come back, or for a vehicle that answers
+    nothing to answer: on the ground, or once somebody asked this program to stop; in the air that, and as long as the
+    vehicle can fly. When the link is back, `fresh_us` for fresh state: longer than a link must be silent to count as
+    lost, so that nothing is judged after one message and no more. A link that comes and goes is waited for
+    `flapping_us` in all, from when it was back first.
 
     The last link of the contingency has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us`
     bounds how long a deferred step is left without asking again when nothing was received.

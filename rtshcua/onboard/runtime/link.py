@@ -8,6 +8,9 @@
 What is known of a vehicle that was silent is old. What was current when the link was lost, and is stale when it is
 back, has to be reported again, measured after the loss, before anything is decided on it; for a bounded time, for it
 may never be. Signals that were stale or missing before are not waited for: their absence is no news.
+
+A vehicle that is heard, but answers nothing, is judged as ever: what is sent may arrive yet. It is waited for no longer
+than one that is silent.
 """
 
 from enum import Enum, auto
@@ -55,6 +58,7 @@ class LinkSupervision:
         self.state = LinkState.UP
         self._since_us: int | None = None  # the silence began; None: none is under way
         self._waits_us: int | None = None  # and is waited out since then
+        self._mute_us: int | None = None  # it answers nothing, and that is waited out since then
         self._lost_us = 0  # the link was lost last
         self._first_back_us: int | None = None  # the link was back first in this silence,
         self._back_us = 0  # and last
@@ -67,6 +71,18 @@ class LinkSupervision:
     def down(self) -> bool:
         """Whether the vehicle is not heard: nothing that is sent would arrive."""
         return self.state is _DOWN
+
+    @property
+    def mute(self) -> bool:
+        """Whether the vehicle answers nothing: what is sent does not seem to arrive."""
+        return self._mute_us is not None
+
+    def answering(self, now_us: int, *, answers: bool) -> None:
+        """The vehicle is found to answer nothing, or it answers again."""
+        if answers:
+            self._mute_us = None
+        elif self._mute_us is None:
+            self._mute_us = now_us
 
     def lost(self, now_us: int, heard_us: int, *, takes_off: bool) -> bool:
         """The link is lost: the vehicle was last heard at `heard_us`, and what was current then will be awaited.
@@ -102,12 +118,13 @@ class LinkSupervision:
         self._awaits_air = False
 
     def hurry(self, now_us: int) -> None:
-        """Somebody waits for the end from now on: a silence that is under way is waited out anew."""
+        """Somebody waits for the end from now on: a silence that is under way is waited out anew, of either kind."""
         self._waits_us = None if self._since_us is None else now_us
+        self._mute_us = None if self._mute_us is None else now_us
 
     def waited_us(self, now_us: int) -> int:
-        """How long a silence that is under way was waited out; 0 if there is none."""
-        return 0 if self._waits_us is None else now_us - self._waits_us
+        """How long a silence that is under way was waited out, or that it answers nothing; 0 if neither is."""
+        return max((now_us - us for us in (self._waits_us, self._mute_us) if us is not None), default=0)
 
     def awaits(self, now_us: int) -> bool:
         """Whether nothing may be judged now, for fresh state may still come. To be asked while it is awaited."""

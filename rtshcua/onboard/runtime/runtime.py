@@ -168,6 +168,8 @@ class EventHandler:
                 controller.link_lost(now, event)
             case ports.LinkBack():
                 controller.link_back(now)
+            case ports.Answering():
+                controller.link.answering(now.monotonic_us, answers=event.answers)
             case ports.Interrupted():
                 self._journal.effect(now, "interrupted")
                 controller.stop(now)

@@ -28,6 +28,7 @@ from reference.world import TICK, FakeVehicle, Run, assert_audited, loaded, rene
 from rtshcua.model.flat.policy import AfterSilence
 from rtshcua.onboard.ports import (
     AirState,
+    Answering,
     Ending,
     Event,
     Failed,
@@ -506,6 +507,101 @@ def test_interrupted_in_a_silence_falls_back_once_the_state_is_fresh() -> None:
     come_back(run, 0)
     assert run.flown[-1] == "hover"
     assert run.until_over().ending is Ending.INTERRUPTED
+
+
+# ------------------------------------------------------------------------------- heard, but it answers nothing
+
+DEAF = {"takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_land"}
+
+
+def mute(run: Run) -> Run:
+    """What is sent does not arrive any more; the vehicle is heard all the while."""
+    run.vehicle.deaf = DEAF
+    run.tick(Answering(0, answers=False))
+    return run
+
+
+def go_on(run: Run, us: int) -> None:
+    until_us = run.clock.now().monotonic_us + us
+    while run.clock.now().monotonic_us < until_us and run.ending is None:
+        run.tick()
+
+
+@pytest.mark.parametrize("situation", AIR)
+def test_one_that_answers_nothing_is_waited_for_as_long_as_it_can_fly(situation: Situation) -> None:
+    """Its chain is flown meanwhile, as far as it may arrive, and its end is not the end of the run."""
+    run = mute(situation(AfterSilence.CONTINUE))
+    go_on(run, SHORT.endurance_us + Limits().silent_us - TICK)
+    assert run.ending is None
+    go_on(run, 3 * TICK)
+    assert run.ending is Ending.LINK_LOST
+    assert [record["detail"] for record in run.records if record.get("event") == "link-lost"] == [
+        "it is heard, but answers nothing"
+    ]
+    assert "stranded" not in run.events
+    assert_audited(run)
+
+
+def test_one_that_answers_again_is_brought_down_however_often_it_was_told_in_vain() -> None:
+    run = mute(returning(AfterSilence.CONTINUE))
+    run.vehicle.deaf, run.vehicle.fails = set(), {"return_home", "emergency_land"}
+    run.until(lambda run: run.flown.count("emergency_land") > 2 * Limits().tries + 4)
+    run.vehicle.fails = set()
+    run.tick(Answering(0, answers=True))
+    run.until_over()
+    assert run.ending is Ending.ABORTED
+    assert run.flown[-1] == "emergency_land"
+    assert_audited(run)
+
+
+def test_once_it_answers_again_it_is_waited_for_anew() -> None:
+    run = mute(running(AfterSilence.CONTINUE))
+    go_on(run, SHORT.endurance_us)
+    run.tick(Answering(0, answers=True), Answering(0, answers=True))
+    mute(run)
+    go_on(run, SHORT.endurance_us)
+    assert run.ending is None
+
+
+@pytest.mark.parametrize("situation", GROUND)
+def test_on_the_ground_one_that_answers_nothing_is_waited_for_as_a_silent_one(situation: Situation) -> None:
+    run = mute(situation(AfterSilence.CONTINUE))
+    go_on(run, Limits().silent_us - TICK)
+    assert run.ending is None
+    go_on(run, 3 * TICK)
+    assert run.ending is Ending.LINK_LOST
+    assert run.flown == []
+
+
+@pytest.mark.parametrize("silent", [False, True])
+def test_the_wait_is_one_whether_or_not_it_is_silent_too(silent: bool) -> None:
+    run = mute(running(AfterSilence.CONTINUE))
+    go_on(run, SHORT.endurance_us)
+    run.step(*([LinkLost(0)] if silent else []), Answering(0, answers=False))
+    pass_time(run, Limits().silent_us + TICK)
+    assert run.ending is Ending.LINK_LOST
+
+
+@pytest.mark.parametrize("situation", AIR)
+def test_one_that_answers_nothing_and_is_seen_to_land_or_flown_by_others_is_not_waited_for(
+    situation: Situation,
+) -> None:
+    run = mute(situation(AfterSilence.CONTINUE))
+    run.tick(TakenOver(0, "AUTO.RTL"))
+    assert run.ending is Ending.STOOD_DOWN
+    run = mute(situation(AfterSilence.CONTINUE))
+    run.tick(AirState(0, False, False))
+    assert run.ending is Ending.ABORTED
+
+
+def test_who_asks_for_the_end_of_one_that_answers_nothing_does_not_wait_for_hours() -> None:
+    run = mute(running(AfterSilence.CONTINUE))
+    go_on(run, 60 * S)
+    run.step(Interrupted(0))
+    go_on(run, Limits().silent_us)
+    assert run.ending is None
+    go_on(run, 2 * TICK)
+    assert run.ending is Ending.LINK_LOST
 
 
 # --------------------------------------------------------------------------------------- whatever comes at once

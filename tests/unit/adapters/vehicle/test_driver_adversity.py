@@ -7,12 +7,26 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.codec.frames import Codec
 from rtshcua.model.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss, LinkSilence, Mode, PilotMode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import AirState, Failed, LinkBack, LinkLost, Noted, Readings, Ready, Succeeded, TakenOver
+from rtshcua.onboard.ports import (
+    AirState,
+    Answering,
+    Failed,
+    LinkBack,
+    LinkLost,
+    Noted,
+    Readings,
+    Ready,
+    Succeeded,
+    TakenOver,
+)
 from rtshcua.simulation.kinematics import Body
 from rtshcua.simulation.place import Home
+from rtshcua.virtual.vehicle import SECOND
+from virtual.policy import BATTERY, FIX, HEIGHT, POLICY, POSITION_X
 from virtual.sampling import each_once
 
 Make = Callable[..., Any]
@@ -164,8 +178,38 @@ def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     happened = one.wait(30)
     assert "it is heard, but answers nothing" in [event.text for event in happened if isinstance(event, Noted)]
     assert not any(isinstance(event, (Succeeded, Failed, LinkLost)) for event in happened)
+    assert [event.answers for event in happened if isinstance(event, Answering)] == [False]
     one.vehicle.lose = lambda frame: False
     assert one.until((Succeeded, Failed), 60) == Succeeded(one.now_us, token)
+    assert [event.answers for event in one.events if isinstance(event, Answering)] == [False, True]
+
+
+def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(aloft: Make) -> None:
+    """What brings it home is chosen by what is known of it; while it answers nothing, nothing would arrive anyway."""
+    one = aloft()
+    one.vehicle.lose = lambda frame: True
+    one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
+    happened = one.wait(30)
+    assert [event.answers for event in happened if isinstance(event, Answering)] == [False]
+    assert not any(isinstance(event, (Ready, LinkLost)) for event in happened)
+    assert one.vehicle.driver.unready == "it answers nothing that it is asked"
+    one.vehicle.lose = lambda frame: False
+    before = len(one.events)
+    one.until(Ready, 10)
+    told = [event.values for event in one.events[before:] if isinstance(event, Readings)]
+    known = {slot for values in told for slot, value in values if value is not None}
+    assert known >= {BATTERY, HEIGHT, FIX, POSITION_X}, "one report of each kind"
+    token = one.begin(MotionKind.HOME)
+    assert one.until((Succeeded, Failed, TakenOver), 120) == Succeeded(one.now_us, token)
+
+
+def test_in_the_air_one_that_tells_no_time_is_ready_all_the_same(aloft: Make) -> None:
+    """It answers, so that it can be brought down: but what it says has no age."""
+    one = aloft()
+    one.vehicle.lose = lambda frame: Codec(1, 1).parse(frame)[0].name == "TIMESYNC"
+    one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
+    began_us = one.now_us
+    assert 5 * SECOND <= one.until(Ready, 20).at_us - began_us <= 11 * SECOND
 
 
 def test_a_heartbeat_that_a_newer_one_overtook_is_no_takeover(aloft: Make) -> None:
@@ -206,11 +250,14 @@ def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -
         noted = one.until(Noted, 10)
     one.vehicle.simulation.inject(LinkSilence(one.vehicle.simulation.now_us, 5_000_000))
     begun = one.now_us
+    answering = sum(isinstance(event, Answering) for event in one.events)
     lost = one.until(LinkLost, 3)
     assert 900_000 <= lost.at_us - begun <= 1_400_000
     one.vehicle.lose = lambda frame: False
-    said = one.until((LinkBack, Noted), 10)
+    said = one.until((LinkBack, Noted, Answering), 10)
     assert isinstance(said, LinkBack), "not that it answers again, before it was heard"
+    assert one.until(Answering, 3).answers, "it goes on to answer nothing until it is heard to answer"
+    assert sum(isinstance(event, Answering) for event in one.events) == answering + 1
 
 
 @OTHER_FLAVOUR

@@ -169,7 +169,7 @@ def test_begun_again_in_the_air_it_comes_home_and_lands_nothing_on_the_spot(flav
 @pytest.mark.parametrize(
     ("flavour", "stage"),
     [
-        pytest.param(flavour, stage, marks=() if (flavour, stage) == ("px4", "takeoff") else pytest.mark.soak)
+        pytest.param(flavour, stage, marks=() if (flavour, stage) == ("px4", "return") else pytest.mark.soak)
         for flavour, stage in product(FLAVOURS, STAGES)
     ],
 )

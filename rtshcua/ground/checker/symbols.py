@@ -10,6 +10,7 @@ from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Unit
+from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
@@ -39,7 +40,8 @@ WORDS: Mapping[type, str] = {
 class Symbols:
     """The declarations of a program by name, all kinds in one name space, and once more by kind.
 
-    `tests` are those of the file that was asked for, which has them run; they are called by texts, not by names.
+    `tests` and `scenarios` are those of the file that was asked for, which has them run; they are called by texts, not
+    by names.
     `broken` are the names whose declarations have a syntax error: nothing is known of them, and nothing is said.
     """
 
@@ -55,6 +57,7 @@ class Symbols:
     missions: dict[str, MissionDecl] = field(default_factory=dict)
     nominals: dict[str, NominalDecl] = field(default_factory=dict)
     tests: tuple[TestDecl, ...] = ()
+    scenarios: tuple[ScenarioDecl, ...] = ()
     broken: frozenset[str] = frozenset()
 
     def _declare(self, declarations: Sequence[Declaration], table: dict[str, Declaration]) -> None:
@@ -80,7 +83,7 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
     symbols = Symbols(broken=broken)
     for number, unit in enumerate(units):
         if not number:
-            symbols.tests = unit.tests
+            symbols.tests, symbols.scenarios = unit.tests, unit.scenarios
         for declarations, table in (
             (unit.enums, symbols.enums),
             (unit.signals, symbols.signals),

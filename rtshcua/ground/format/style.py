@@ -37,6 +37,7 @@ COLUMNS = {
     "policy": 7,
     "template": 7,
     "test": 6,
+    "scenario": 6,
 }
 
 _RULE = _style("by", "through", "when", "to")
@@ -57,6 +58,7 @@ ITEMS = {
     "mission": _PART,
     "nominal": _PART,
     "test": _PART,
+    "scenario": _PART,
     # of signals and zones
     "unknown": _PART,
     "stale": _PART,
@@ -131,11 +133,24 @@ ITEMS = {
     "expectation": _style("because", "<_AT_CLAUSE>"),
     "rows": _WITHOUT_COLUMN,
     "row": _style(cuts=("expect",)),
+    # of scenarios
+    "flown_mission": _PART,
+    "flavours": _PART,
+    "seeds": _PART,
+    "start": _PART,
+    "incident": _style("<FAULT>", aligned=False, cuts=("<FAULT>",)),
+    "demand": _style("because", "<_AT_CLAUSE>"),
+    "ends": _PART,
+    "flies": _PART,
+    "never": _PART,
+    "reaction": _PART,
+    "distance": _PART,
+    "lands": _PART,
 }
 
 #: what an opening bracket after it belongs to, and stands close to: the rest of a call, a shape or a list
 CALLS = frozenset(
-    {"<NAME>", "<LINK_NAME>", "<FUNCTION>", "<COMBINE>", "<_GROW>", "<_CIRCLE>", "<_POLYGON>", "<_CORRIDOR>"}
+    {"<NAME>", "<LINK_NAME>", "<FAULT>", "<FUNCTION>", "<COMBINE>", "<_GROW>", "<_CIRCLE>", "<_POLYGON>", "<_CORRIDOR>"}
 )
 #: other words before an opening bracket of a list
 LISTS = CALLS | {"hole"}

@@ -30,6 +30,7 @@ WORDS = {
     "<_AT_CLAUSE>": "`at` a clause",
     "<REASON>": "a reason",
     "<LINK_NAME>": "a name",
+    "<FAULT>": "a fault",
     END: "the end of the file",
 }
 

@@ -7,6 +7,7 @@ from rtshcua.diagnostics.diagnostic import Fix
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.automaton import Automaton, Failure
 from rtshcua.ground.language.expected import words
+from rtshcua.model.faults import KINDS
 
 #: Words of other policies and programs, and those that mean the same here.
 WORDS = {
@@ -22,10 +23,11 @@ DATUMS = {"agl": "above home", "ahl": "above home", "amsl": "above sea", "msl": 
 #: what the texts are that stand behind these words
 TEXTS = {
     "test": 'a test is called by a text, as in `test "low battery" { ... }`',
+    "scenario": 'a scenario is called by a text, as in `scenario "gust at the bridge" { ... }`',
     "at": 'a moment is written as in `at "2026-06-01T08:00:00Z"`',
 }
 _IS = re.compile(r"\bis\s+\Z")
-_TOLD = re.compile(r"\b(test|at)\s+\Z")
+_TOLD = re.compile(r"\b(test|scenario|at)\s+\Z")
 
 _EXPONENT = re.compile(r"(?<![A-Za-z0-9_.])[0-9][0-9_.]*[eE][0-9]*\s*\Z")
 _SIGNED = re.compile(r"-\s*([0-9][0-9_.]*)\s*([NSEW])\b")
@@ -58,6 +60,9 @@ def habit(automaton: Automaton, failure: Failure, symbols: set[str]) -> Habit | 
         return Habit("did you mean `==`? `is` stands before `known` alone", Fix(word, "==", "write `==`"))
     if found == "=" and before[-1:] == "=" and "<NUMBER>" in symbols:
         return Habit("a value is given with one `=`", Fix(span, "", "write one `=`"))
+    if "<FAULT>" in symbols and found.replace("_", "-") in KINDS:
+        end = Span(source.file, failure.end, failure.end)
+        return Habit(f"write `{found}(...)`, with what is to be said of it in the brackets", Fix(end, "()", "write `()`"))
     meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)
     if meant is not None and (
         meant in words(symbols) or meant in symbols or (meant == "==" and "<COMPARE>" in symbols)

@@ -18,6 +18,7 @@ from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Import, Unit
+from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
@@ -116,4 +117,5 @@ def _unit(source: Source, declarations: list[Node]) -> Unit:
         templates=of(TemplateDecl),
         nominals=of(NominalDecl),
         tests=of(TestDecl),
+        scenarios=of(ScenarioDecl),
     )

@@ -30,7 +30,8 @@ def mentioned_by(unit: Unit) -> frozenset[str]:
 
 def _declarations(unit: Unit) -> Iterator[Node]:
     yield from (*unit.enums, *unit.signals, *unit.zones, *unit.vehicles)
-    yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions, *unit.nominals, *unit.tests)
+    yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions)
+    yield from (*unit.nominals, *unit.tests, *unit.scenarios)
 
 
 def _mentioned(node: Any, found: set[str]) -> None:

@@ -4,6 +4,7 @@ from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
+from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
@@ -30,3 +31,4 @@ class Unit(Node):
     templates: tuple[TemplateDecl, ...] = ()
     nominals: tuple[NominalDecl, ...] = ()
     tests: tuple[TestDecl, ...] = ()
+    scenarios: tuple[ScenarioDecl, ...] = ()

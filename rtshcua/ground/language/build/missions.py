@@ -5,7 +5,7 @@ from typing import Any
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
-from rtshcua.ground.language.build.tests import Tests
+from rtshcua.ground.language.build.scenarios import Scenarios
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Item, MissionDecl, Overrides, Phase, Repeat, Step
 from rtshcua.model.ir.node import Name, Node
@@ -13,7 +13,7 @@ from rtshcua.model.ir.program import Import
 from rtshcua.model.ir.skills import ArgumentValue, Parameter
 
 
-class Builder(Tests):
+class Builder(Scenarios):
     """Every action of the grammar."""
 
     def file(self, span: Span, *declarations: None) -> None:

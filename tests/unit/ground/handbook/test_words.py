@@ -15,6 +15,7 @@ from rtshcua.ground.handbook.words.cases import told_nominal
 from rtshcua.ground.handbook.words.conditions import told_condition
 from rtshcua.ground.handbook.words.places import places_of, told_band, told_shape, told_times, told_vehicle
 from rtshcua.ground.handbook.words.rules import told_airspace, told_delegation, told_evidence, told_rule, told_silence
+from rtshcua.ground.handbook.words.scenarios import told_scenario
 from rtshcua.ground.handbook.words.signals import told_members, told_sources, told_type, told_unknown
 from rtshcua.ground.handbook.words.skills import (
     told_chain,
@@ -142,6 +143,8 @@ def tellers(unit: Any, names: Vocabulary) -> Iterator[tuple[Node, Callable[[Any]
         yield nominal, lambda one: (one.name.text, *told_nominal(one, names))
     for test in unit.tests:
         yield test, lambda one: tuple(told_test(one, "" if one.nominal is None else one.nominal.text, names))
+    for scenario in unit.scenarios:
+        yield scenario, lambda one: (one.name.text, *told_scenario(one, names))
 
 
 def tell_zone(zone: ZoneDecl) -> object:

@@ -288,3 +288,14 @@ NOT_MET = _code("E1411", "not-met", "the decision is not the one that a test exp
 # E15: how sources are laid out
 NOT_FORMATTED = _code("E1501", "not-formatted", "a source is not laid out in the one style", Severity.WARNING)
 UNSAFE_FORMAT = _code("E1502", "unsafe-format", "laying a source out anew would change what it says")
+
+# E16: scenarios
+UNKNOWN_FAULT = _code("E1601", "unknown-fault", "nothing that can go wrong has that name")
+UNKNOWN_ENDING = _code("E1602", "unknown-ending", "no run ends in that way")
+UNKNOWN_AUTOPILOT = _code("E1603", "unknown-autopilot", "there is no simulated autopilot of that kind")
+SAME_SCENARIO = _code("E1604", "same-scenario", "two scenarios of a file are called the same")
+NO_SUCH_STEP = _code("E1605", "no-such-step", "a fault waits for a step that the mission does not have")
+BAD_TRIGGER = _code("E1606", "bad-trigger", "a fault waits for a condition over time, or for a phase")
+UNREAD_TRIGGER = _code("E1607", "unread-trigger", "a fault waits for what the mission's policy does not read")
+BAD_START = _code("E1608", "bad-start", "a scenario starts with what no flight starts with")
+NO_SUCH_ROLE = _code("E1609", "no-such-role", "somebody answers for a role that the mission's policy does not know")

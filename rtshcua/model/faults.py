@@ -466,6 +466,8 @@ UNITS: tuple[Unit, ...] = (
 WORDS: Mapping[str, tuple[str, ...]] = {"mode": tuple(Mode), "way": tuple(Way), "held": ("yes", "no")}
 #: fields that are a plain number
 COUNTS = frozenset({"copies", "shuffle"})
+#: fields that may be below zero: south and west, down, and back in time
+SIGNED = frozenset({"north", "east", "up", "by"})
 #: fields that name something
 NAMES = frozenset({"message", "role"})
 

@@ -8,6 +8,23 @@ from dataclasses import dataclass
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.code import Clause
 
+#: the kinds of autopilot that there are to fly on
+FLAVOURS = ("px4", "ardupilot")
+#: the ways in which a run ends (`onboard.ports.Ending`); sources write `_` for `-`
+ENDINGS = (
+    "completed",
+    "aborted",
+    "refused",
+    "recalled",
+    "stood-down",
+    "crashed",
+    "link-lost",
+    "interrupted",
+    "evidence-lost",
+)
+#: how many seeds one scenario may have
+MAX_SEEDS = 100_000
+
 
 @dataclass(frozen=True, slots=True)
 class AtTime:

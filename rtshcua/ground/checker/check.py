@@ -10,6 +10,7 @@ from rtshcua.ground.checker.checks import (
     parameters,
     policies,
     records,
+    scenarios,
     signals,
     tests,
     times,
@@ -33,6 +34,7 @@ CHECKS = (
     durability,
     nominals,
     tests,
+    scenarios,
 )
 
 

@@ -52,6 +52,11 @@ def find_vehicle(context: Context, name: Name) -> VehicleDecl | None:
     return _find(context, name, context.symbols.vehicles, VehicleDecl)
 
 
+def find_flown(context: Context, name: Name) -> MissionDecl | None:
+    """The mission of that name, where a source names it."""
+    return _find(context, name, context.symbols.missions, MissionDecl)
+
+
 def find_mission(context: Context, name: str) -> MissionDecl | None:
     """The mission of that name, asked for on the command line: there is no place to point at."""
     found = context.symbols.missions.get(name)

@@ -26,6 +26,7 @@ from rtshcua.ground.elaborate.settings import Settings
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.testing.case import Case, Tested
 from rtshcua.ground.testing.cases import cases_of
+from rtshcua.ground.testing.scenarios import ScenarioFlight, UnderScenario, scenarios_of
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -103,6 +104,7 @@ def examine_program(program: Program, dialect: Dialect) -> Checked:
     run.check()
     run.lowered(None)
     run.cases()
+    run.scenarios()
     if run.report.failed():
         return Checked(run.diagnostics(), {})
     grounds = tuple(run.grounds())
@@ -137,6 +139,7 @@ class Compilation:
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], Ground | None] = {}
         self._tested: dict[tuple[str, str], Tested | None] = {}
+        self._flown: dict[str, UnderScenario] = {}
         data = DataFiles(program.data, program.data_names)
         self.context = Context(collect(program.units, program.broken), self.report, dialect, data=data)
         if self.whole:
@@ -213,6 +216,8 @@ class Compilation:
         prove_mission(under, mission, flat)
         bounds = bounds_of(under, mission, flat)
         self.bounds[mission.name.text] = most(bounds, self.bounds.get(mission.name.text))
+        tested = Tested(under.lowered, under.prepared)
+        self._flown.setdefault(mission.name.text, UnderScenario(tested, flat, mission))  # the first has the defaults
         return under.lowered.policy, flat
 
     def _unused(self, policy: PolicyDecl) -> None:
@@ -253,6 +258,12 @@ class Compilation:
         if self.report.failed() or not self.context.symbols.tests:
             return ()
         return tuple(cases_of(self.context, self._under_test, self.program.stable))
+
+    def scenarios(self) -> tuple[ScenarioFlight, ...]:
+        """The scenarios of the file that was asked for, if nothing is wrong with what was lowered before."""
+        if self.report.failed() or not self.context.symbols.scenarios:
+            return ()
+        return tuple(scenarios_of(self.context, self._flown, self.program.stable))
 
     def _under_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
         """A policy as tests need it; None where it has errors. It is not proved for them."""

@@ -1,0 +1,263 @@
+"""E1602 to E1608: a scenario flies a mission that there is, and speaks of faults and endings that there are.
+
+Only those of the file that was asked for are looked at: the scenarios of an imported file are its own business.
+"""
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.expectations import check_expectation
+from rtshcua.ground.checker.conditions import check_condition
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.faults import NAMED, fault_of
+from rtshcua.ground.checker.fields import one_of, quantity
+from rtshcua.ground.checker.lookup import find_flown, find_skill, find_zone
+from rtshcua.ground.checker.parts import walk
+from rtshcua.ground.checker.phases import is_about_phase
+from rtshcua.ground.checker.symbols import correction, suggestion
+from rtshcua.ground.language.wording import short
+from rtshcua.model.ir.expression import Condition, Edge, ForLast, Near, Quantity, WithinLast
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.scenarios import (
+    AfterStep,
+    AtTime,
+    Charge,
+    Decides,
+    Delay,
+    Demand,
+    Ends,
+    FaultCall,
+    Flies,
+    Keeps,
+    Lands,
+    OnCondition,
+    Reacts,
+    ScenarioDecl,
+    Seeds,
+)
+from rtshcua.model.quantity import Dimension
+from rtshcua.model.scenario import ENDINGS, FLAVOURS, MAX_SEEDS
+
+#: what stands around the vehicle, whichever it is, in `expect distance to obstacle`
+OBSTACLE = "obstacle"
+#: the endings as sources write them
+ENDS = tuple(each.replace("-", "_") for each in ENDINGS)
+#: what a flight starts with: the charge, and the air
+BATTERY, WIND = "battery", "wind"
+
+
+def check(context: Context) -> None:
+    """Report every scenario that cannot be flown, or that expects what cannot be."""
+    seen: dict[str, ScenarioDecl] = {}
+    for scenario in context.symbols.scenarios:
+        first = seen.setdefault(scenario.name.text, scenario)
+        if first is not scenario:
+            context.report.add(
+                codes.SAME_SCENARIO,
+                scenario.name.span,
+                f"two scenarios are called `{short(scenario.name.text)}`",
+                help="give it another name: reports tell scenarios by their names",
+                labels=[(first.name.span, "the first one")],
+            )
+        _check(context, scenario)
+
+
+def _check(context: Context, scenario: ScenarioDecl) -> None:
+    mission = find_flown(context, scenario.mission)
+    if mission is not None:
+        _values(context, scenario, mission)
+    _flavours(context, scenario)
+    if scenario.seeds is not None:
+        _seeds(context, scenario.seeds)
+    for beginning in scenario.start:
+        _beginning(context, beginning)
+    _once(context, scenario)
+    for incident in scenario.incidents:
+        moment = incident.moment
+        _delay(context, moment.delay)
+        match moment:
+            case AtTime():
+                pass
+            case AfterStep():
+                _step(context, moment, mission)
+            case OnCondition():
+                _condition(context, moment.condition)
+        fault_of(context, incident.fault)
+    for demand in scenario.demands:
+        _demand(context, demand)
+
+
+def _values(context: Context, scenario: ScenarioDecl, mission: MissionDecl) -> None:
+    """A mission with parameters is flown with their defaults."""
+    lacking = [each for each in mission.parameters if each.default is None]
+    if lacking:
+        context.report.add(
+            codes.MISSING_ARGUMENT,
+            scenario.mission.span,
+            f"`{mission.name.text}` is flown without a value for "
+            + " and ".join(f"`{each.name.text}`" for each in lacking),
+            help="a scenario flies a mission with the defaults of its parameters: declare them",
+            labels=[(each.span, f"`{each.name.text}` is declared here, without a default") for each in lacking],
+        )
+
+
+def _flavours(context: Context, scenario: ScenarioDecl) -> None:
+    seen: dict[str, Span] = {}
+    for name in scenario.flavours:
+        if one_of(context, codes.UNKNOWN_AUTOPILOT, name, FLAVOURS, "kind of autopilot"):
+            first = seen.setdefault(name.text, name.span)
+            if first is not name.span:
+                context.report.add(
+                    codes.DUPLICATE_NAME,
+                    name.span,
+                    f"`{name.text}` is named twice",
+                    labels=[(first, "first named here")],
+                )
+
+
+def _seeds(context: Context, seeds: Seeds) -> None:
+    first, last = seeds.first, seeds.last
+    if _ascending(context, first, last) and last.value - first.value >= MAX_SEEDS:
+        context.report.add(
+            codes.TOO_MANY,
+            seeds.span,
+            f"these are {last.value - first.value + 1} seeds, and a scenario has at most {MAX_SEEDS}",
+        )
+
+
+def _ascending(context: Context, low: Quantity, high: Quantity) -> bool:
+    if low.value <= high.value:
+        return True
+    span = low.span.to(high.span)
+    swapped = f"{context.report.text(high.span)} .. {context.report.text(low.span)}"
+    context.report.add(
+        codes.EMPTY_RANGE,
+        span,
+        f"the range `{context.report.text(span)}` is empty: its first end is above its second",
+        help=f"write `{swapped}`",
+        fix=(span, swapped, "swap the ends"),
+    )
+    return False
+
+
+def _beginning(context: Context, beginning: Charge | FaultCall) -> None:
+    name = beginning.name
+    written = context.report.text(beginning.span)
+    if isinstance(beginning, Charge) and name.text == BATTERY:
+        quantity(context, beginning.value, Dimension.RATIO, positive=False, most=10_000)
+    elif isinstance(beginning, FaultCall) and name.text == WIND:
+        fault_of(context, beginning)
+    elif isinstance(beginning, FaultCall) and name.text in NAMED and name.text != BATTERY:
+        context.report.add(
+            codes.BAD_START,
+            beginning.span,
+            f"a flight does not start with `{name.text}`",
+            help=f"write `at 0 s {written}`, outside of `start`",
+        )
+    else:
+        known = (BATTERY, WIND)
+        misspelt = name.text not in known
+        context.report.add(
+            codes.BAD_START,
+            beginning.span,
+            f"`{written}` is nothing that a flight starts with",
+            help=(suggestion(name.text, known) if misspelt else None)
+            or "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, or both with a comma",
+            fix=correction(context.report, name.span, name.text, known) if misspelt else None,
+        )
+
+
+def _once(context: Context, scenario: ScenarioDecl) -> None:
+    seen: dict[str, Span] = {}
+    for beginning in scenario.start:
+        first = seen.setdefault(beginning.name.text, beginning.span)
+        if first is not beginning.span:
+            context.report.add(
+                codes.GIVEN_TWICE,
+                beginning.span,
+                f"`{beginning.name.text}` is given twice",
+                help="keep one of them",
+                labels=[(first, "first given here")],
+            )
+
+
+def _delay(context: Context, delay: Delay | None) -> None:
+    if delay is None:
+        return
+    before = len(context.report.found)
+    quantity(context, delay.low, Dimension.DURATION, positive=False)
+    if delay.high is not delay.low:
+        quantity(context, delay.high, Dimension.DURATION, positive=False)
+        if len(context.report.found) == before:
+            _ascending(context, delay.low, delay.high)
+
+
+def _step(context: Context, moment: AfterStep, mission: MissionDecl | None) -> None:
+    skill = find_skill(context, moment.skill)
+    if skill is None or mission is None:
+        return
+    name, number = moment.skill.text, 1 if moment.number is None else moment.number.value
+    steps = [step.skill.text for phase in mission.phases for step in phase.steps]
+    count = steps.count(name)
+    if 1 <= number <= count:
+        return
+    if count == 0:
+        message = f"`{mission.name.text}` has no step `{name}`"
+        help = suggestion(name, steps) or "its steps are " + ", ".join(f"`{each}`" for each in dict.fromkeys(steps))
+        fix = correction(context.report, moment.skill.span, name, steps)
+    else:
+        message = f"`{mission.name.text}` has no step `{name}` number {number}"
+        help = f"it has {count} of `{name}`, counted from 1"
+        fix = None
+    context.report.add(
+        codes.NO_SUCH_STEP,
+        moment.skill.span if count == 0 or moment.number is None else moment.number.span,
+        message,
+        help=help,
+        labels=[(mission.name.span, "the mission is declared here")],
+        fix=fix,
+    )
+
+
+def _condition(context: Context, condition: Condition) -> None:
+    before = len(context.report.found)
+    check_condition(context.scope(), condition)
+    if len(context.report.found) > before:
+        return
+    for part in walk(condition):
+        if isinstance(part, ForLast | WithinLast | Near | Edge):
+            context.report.add(
+                codes.BAD_TRIGGER,
+                part.span,
+                "a fault cannot wait for a condition over time",
+                help="leave `for the last`, `within the last`, `rising` and `falling` out: `when` waits until its "
+                "condition is true for the first time, and `2 s after when ...` is later",
+            )
+        elif is_about_phase(part):
+            context.report.add(
+                codes.BAD_TRIGGER,
+                part.span,
+                "a fault cannot wait for a phase of the mission",
+                help="write `after` and the first step of that phase",
+            )
+
+
+def _demand(context: Context, demand: Demand) -> None:
+    match demand:
+        case Decides():
+            expected = demand.decision
+            check_expectation(context, expected, None, None)
+            if expected.target is not None:
+                find_skill(context, expected.target)
+        case Ends():
+            for name in demand.endings:
+                one_of(context, codes.UNKNOWN_ENDING, name, ENDS, "ending")
+        case Flies():
+            find_skill(context, demand.skill)
+        case Reacts():
+            quantity(context, demand.most, Dimension.DURATION)
+        case Keeps():
+            if demand.place.text != OBSTACLE:
+                find_zone(context, demand.place)
+            quantity(context, demand.least, Dimension.LENGTH)
+        case Lands():
+            find_zone(context, demand.zone)

@@ -1,0 +1,189 @@
+"""E1601: a fault as a source writes it, against the kinds of faults that there are."""
+
+from typing import Any
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.fields import one_of, size
+from rtshcua.ground.checker.fitting import stored
+from rtshcua.ground.checker.symbols import correction, suggestion
+from rtshcua.ground.checker.types import COUNT, EXAMPLES, number
+from rtshcua.ground.checker.values import typed
+from rtshcua.model.faults import KINDS, SIGNED, Fault, Mode, Parameter, Way, parameters
+from rtshcua.model.ir.expression import Reference, Value
+from rtshcua.model.ir.scenarios import FaultCall
+from rtshcua.model.ir.skills import ArgumentValue
+from rtshcua.model.quantity import Dimension, display
+
+#: the kinds by the name that sources write
+NAMED = {name.replace("-", "_"): kind for name, kind in KINDS.items()}
+WHOLE = 10_000  # 100 %
+FULL_TURN = 360
+#: how often a document comes at most
+MAX_COPIES = 1_000
+
+
+def fault_of(context: Context, call: FaultCall) -> Fault | None:
+    """The fault that a source describes, at the time 0; None after a finding."""
+    if not one_of(context, codes.UNKNOWN_FAULT, call.name, NAMED, "fault"):
+        return None
+    kind = NAMED[call.name.text]
+    before = len(context.report.found)
+    known = {each.name: each for each in parameters(kind)}
+    given = _given(context, call, known)
+    values = {known[name].field: _value(context, call, known[name], one.value) for name, one in given.items()}
+    missing = [name for name, each in known.items() if each.needed and name not in given]
+    if missing and len(context.report.found) == before:
+        context.report.add(
+            codes.MISSING_ARGUMENT,
+            call.span,
+            f"`{call.name.text}` is written without {' and '.join(f'`{name}`' for name in missing)}",
+            help=f"add {', '.join(f'`{name} = {example(known[name])}`' for name in missing)}",
+        )
+    return kind(at_us=0, **values) if len(context.report.found) == before else None
+
+
+def example(parameter: Parameter) -> str:
+    """What would be accepted for a parameter."""
+    if parameter.words:
+        return parameter.words[0]
+    if parameter.is_name:
+        return "..."
+    dimension = Dimension.COUNT if parameter.unit is None else parameter.unit.dimension or Dimension.COUNT
+    return EXAMPLES[dimension]
+
+
+def _given(context: Context, call: FaultCall, known: dict[str, Parameter]) -> dict[str, ArgumentValue]:
+    """The arguments that have the name of a parameter, each once."""
+    report, given = context.report, dict[str, ArgumentValue]()
+    takes = f"it takes {listed(known)}" if known else "it takes nothing"
+    for argument in call.arguments:
+        if argument.name is None:
+            only = next(iter(known)) if len(known) == 1 else None
+            report.add(
+                codes.TOO_MANY_ARGUMENTS,
+                argument.span,
+                f"what is said of `{call.name.text}` has no name before it",
+                help=takes if only is None else f"write `{only} = {report.text(argument.span)}`",
+                fix=None if only is None else (argument.span, f"{only} = {report.raw(argument.span)}", "name it"),
+            )
+            continue
+        name = argument.name.text
+        if name not in known:
+            report.add(
+                codes.UNKNOWN_ARGUMENT,
+                argument.name.span,
+                f"`{call.name.text}` has no `{name}`",
+                help=suggestion(name, known) or takes,
+                fix=correction(report, argument.name.span, name, known),
+            )
+            continue
+        first = given.setdefault(name, argument)
+        if first is not argument:
+            report.add(
+                codes.DUPLICATE_ARGUMENT,
+                argument.span,
+                f"`{name}` is given twice",
+                labels=[(first.span, "first given here")],
+            )
+    return given
+
+
+def _value(context: Context, call: FaultCall, parameter: Parameter, value: Value) -> Any:
+    """The value as the kind has it; anything after a finding."""
+    if parameter.words:
+        return _word(context, call, parameter, value)
+    if parameter.is_name:
+        return _name(context, parameter, value)
+    return _number(context, parameter, value)
+
+
+def _word(context: Context, call: FaultCall, parameter: Parameter, value: Value) -> Mode | Way | bool | None:
+    word = value.name if isinstance(value, Reference) else None
+    if word not in parameter.words:
+        words = parameter.words
+        context.report.add(
+            codes.WRONG_TYPE if word is None else codes.UNKNOWN_MEMBER,
+            value.span,
+            f"`{context.report.text(value.span)}` is no `{parameter.name}` of `{call.name.text}`",
+            help=(None if word is None else suggestion(word, words)) or f"there are {listed(words)}",
+            fix=None if word is None else correction(context.report, value.span, word, words),
+        )
+        return None
+    if parameter.name == "held":
+        return word == "yes"
+    return Mode(word) if parameter.name == "mode" else Way(word)
+
+
+def _name(context: Context, parameter: Parameter, value: Value) -> str | None:
+    if not isinstance(value, Reference):
+        context.report.add(
+            codes.WRONG_TYPE,
+            value.span,
+            f"`{context.report.text(value.span)}` is no name, and `{parameter.name}` is one",
+        )
+        return None
+    known = context.dialect.messages
+    if parameter.name == "message" and value.name not in known:
+        context.report.add(
+            codes.UNKNOWN_MESSAGE,
+            value.span,
+            f"the dialect has no message `{value.name}`",
+            help=suggestion(value.name, known),
+            fix=correction(context.report, value.span, value.name, known),
+        )
+        return None
+    return value.name
+
+
+def _number(context: Context, parameter: Parameter, value: Value) -> int | None:
+    """A number in the unit of its field."""
+    unit = parameter.unit
+    dimension = Dimension.COUNT if unit is None else unit.dimension or Dimension.COUNT
+    type = COUNT if dimension is Dimension.COUNT else number(dimension)
+    found = typed(context.scope(), value, type)
+    if found is None:
+        return None
+    if found.constant is None:
+        context.report.add(
+            codes.NOT_CONSTANT,
+            value.span,
+            f"`{context.report.text(value.span)}` is not known before the flight",
+            help="write a number with its unit",
+        )
+        return None
+    whole = stored(context.scope(), value, type, found.constant)
+    if whole is None or not size(context, value, dimension, whole):
+        return None
+    written, canonical = context.report.text(value.span), 1 if unit is None else unit.canonical
+    if whole % canonical:
+        near = display(whole // canonical * canonical, dimension)
+        context.report.add(
+            codes.NOT_EXACT,
+            value.span,
+            f"`{written}` is finer than `{parameter.name}` can be",
+            help=f"the nearest below is `{near}`",
+        )
+        return None
+    return whole // canonical if _fits(context, parameter, value, whole // canonical, dimension) else None
+
+
+def _fits(context: Context, parameter: Parameter, value: Value, least: int, dimension: Dimension) -> bool:
+    """Whether a number is one that such a fault can have; reports it where it is not."""
+    written = context.report.text(value.span)
+    if least < 0 and parameter.name not in SIGNED:
+        context.report.add(codes.NOT_POSITIVE, value.span, f"`{written}` must not be negative")
+        return False
+    most = {Dimension.RATIO: WHOLE, Dimension.ANGLE: FULL_TURN}.get(dimension)
+    most = MAX_COPIES if parameter.name == "copies" else most
+    if most is not None and least > most:
+        canonical = 1 if parameter.unit is None else parameter.unit.canonical
+        context.report.add(
+            codes.NUMBER_SIZE,
+            value.span,
+            f"`{written}` is more than `{parameter.name}` can be",
+            help=f"at most {display(most * canonical, dimension)}",
+        )
+        return False
+    return True

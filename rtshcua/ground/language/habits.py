@@ -62,9 +62,7 @@ def habit(automaton: Automaton, failure: Failure, symbols: set[str]) -> Habit | 
         return Habit("a value is given with one `=`", Fix(span, "", "write one `=`"))
     if "<FAULT>" in symbols and found.replace("_", "-") in KINDS:
         end = Span(source.file, failure.end, failure.end)
-        return Habit(
-            f"write `{found}(...)`, with what is to be said of it in the brackets", Fix(end, "()", "write `()`")
-        )
+        return Habit(f"a fault is written with brackets, as in `{found}(...)`", Fix(end, "()", "write `()`"))
     meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)
     if meant is not None and (
         meant in words(symbols) or meant in symbols or (meant == "==" and "<COMPARE>" in symbols)

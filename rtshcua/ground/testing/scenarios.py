@@ -189,8 +189,8 @@ class _Lowering:
             self._context.report.add(
                 codes.UNREAD_TRIGGER,
                 each.span,
-                f"this {each.what} of this mission",
-                help=f"wait for what `{self._lowered.policy.name}` uses; {each.has}",
+                f"the condition {each.what}",
+                help=f"wait for what the policy of the mission uses; {each.has}",
                 labels=[(self._lowered.declaration.name.span, "the policy is declared here")],
             )
         return None

@@ -159,7 +159,7 @@ def _beginning(context: Context, beginning: Charge | FaultCall) -> None:
         context.report.add(
             codes.BAD_START,
             beginning.span,
-            f"`{written}` is nothing that a flight starts with",
+            f"a flight does not start with `{written}`",
             help=(suggestion(name.text, known) if misspelt else None)
             or "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, or both with a comma",
             fix=correction(context.report, name.span, name.text, known) if misspelt else None,

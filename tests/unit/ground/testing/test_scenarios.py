@@ -1,0 +1,362 @@
+"""Scenarios are held against what there is, and lowered with the mission and the policy that they fly."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from reference.deciding import program
+from rtshcua.ground.checker.faults import NAMED, example
+from rtshcua.ground.compiler.program import check_program, compile_program
+from rtshcua.ground.testing.scenarios import ScenarioFlight, Scenarios
+from rtshcua.ground.testing.suite import scenarios
+from rtshcua.mavlink import dialect
+from rtshcua.model.faults import KINDS, GpsJump, LinkSilence, Mode, PilotMode, Way, WindStep, parameters
+from rtshcua.model.flat.code import Op
+from rtshcua.model.scenario import (
+    ENDINGS,
+    AfterStep,
+    AtTime,
+    Decides,
+    EndsInside,
+    EndsWith,
+    Flies,
+    KeepsAway,
+    OnCondition,
+    ReactsWithin,
+    Start,
+    When,
+)
+from rtshcua.onboard.ports import Ending
+
+IMPORT = 'import "lib:missions/standard.rts"\n'
+S = 1_000_000
+
+
+def made(text: str, before: str = IMPORT) -> Scenarios:
+    return scenarios(program(before + text), dialect.load(), 5)
+
+
+def found(body: str, before: str = IMPORT) -> list[tuple[str, str, str | None]]:
+    """The codes, messages and helps of what is found in a scenario of the standard mission."""
+    diagnostics = made(f'scenario "it" {{ flies standard {body} }}', before).diagnostics
+    return [(each.code.id, each.message, each.help) for each in diagnostics]
+
+
+def flown(body: str, before: str = IMPORT) -> ScenarioFlight:
+    """A scenario of the standard mission in which nothing is found."""
+    made_of = made(f'scenario "it" {{ flies standard {body} }}', before)
+    assert made_of.diagnostics == ()
+    (one,) = made_of.found
+    return one
+
+
+def test_the_endings_are_those_of_a_run() -> None:
+    assert list(ENDINGS) == [str(ending) for ending in Ending]
+
+
+def test_what_is_not_said_is_as_the_simulated_vehicle_comes() -> None:
+    scenario = flown("").scenario
+    assert (scenario.name, scenario.flavours) == ("it", ("px4", "ardupilot"))
+    assert (scenario.first_seed, scenario.last_seed, scenario.start) == (1, 1, Start())
+    assert (scenario.incidents, scenario.expectations) == ((), ())
+
+
+def test_a_start() -> None:
+    scenario = flown("aboard px4 seeds 3 .. 9 start wind(speed = 3 m/s, from = 270 deg, gust = 1 m/s), battery = 80 %")
+    assert scenario.scenario.flavours == ("px4",)
+    assert (scenario.scenario.first_seed, scenario.scenario.last_seed) == (3, 9)
+    assert scenario.scenario.start == Start(battery=8000, wind_mm_s=3000, wind_from_deg=270, gust_mm_s=1000)
+
+
+MOMENTS: list[tuple[str, When]] = [
+    ("at 20 s", AtTime(20 * S, 20 * S)),
+    ("at 0 s .. 1 min", AtTime(0, 60 * S)),
+    ("after takeoff", AfterStep(0, 0, 0)),
+    ("after inspect_area", AfterStep(2, 0, 0)),
+    ("after inspect_area 2", AfterStep(3, 0, 0)),
+    ("2 s .. 4 s after return_home 1", AfterStep(5, 2 * S, 4 * S)),
+]
+
+
+@pytest.mark.parametrize(("text", "when"), MOMENTS)
+def test_a_moment(text: str, when: When) -> None:
+    (incident,) = flown(f"{text} kill()").scenario.incidents
+    assert incident.when == when
+    assert incident.text == f"{text} kill()"
+
+
+def test_a_condition_has_the_slots_of_the_policy() -> None:
+    one = flown("3 s after when height > 10 m and battery < 50 % kill()")
+    (incident,) = one.scenario.incidents
+    assert isinstance(incident.when, OnCondition)
+    assert (incident.when.from_us, incident.when.to_us) == (3 * S, 3 * S)
+    assert incident.when.condition.text == "height > 10 m and battery < 50 %"
+    code = incident.when.condition.code
+    read = {code[at + 1] for at in range(0, len(code), 3) if code[at] == Op.SIGNAL}
+    assert read == {one.policy.vehicle.height, one.policy.vehicle.battery}
+
+
+def test_a_grown_zone_that_the_policy_has_is_read_on_whichever_side() -> None:
+    zones = [zone.name for zone in flown("").policy.zones]
+    assert "grow(school, 20 m)" in zones
+    flown("when not position outside grow(school, 20 m) kill()")
+    flown("when position outside grow(school, 20 m) kill()")
+
+
+FAULTS = [
+    ("link_silence(for = 5 s, way = up, held = yes)", LinkSilence(0, 5 * S, Way.UP, held=True)),
+    ("link_silence()", LinkSilence(0, None, Way.BOTH, held=False)),
+    ("wind(speed = 2 * 6 m/s, from = 270 deg)", WindStep(0, 12_000, 270, 0)),
+    ("gps_jump(east = -3 m, north = 20 cm)", GpsJump(0, 200, -3000)),
+    ("pilot_mode(mode = manual)", PilotMode(0, Mode.MANUAL)),
+    ("pilot()", PilotMode(0, Mode.POSITION)),
+]
+
+
+@pytest.mark.parametrize(("text", "fault"), FAULTS)
+def test_a_fault(text: str, fault: object) -> None:
+    (incident,) = flown(f"at 2 s {text}").scenario.incidents
+    assert incident.fault == fault
+
+
+def test_every_kind_of_fault_can_be_written() -> None:
+    names = {"message": "HEARTBEAT", "role": "supervisor"}
+    body = ""
+    for name, kind in NAMED.items():
+        said = [f"{each.name} = {names.get(each.name, example(each))}" for each in parameters(kind)]
+        body += f"\n  at 2 s {name}({', '.join(said)})"
+    incidents = flown(body).scenario.incidents
+    assert [type(each.fault) for each in incidents] == list(KINDS.values())
+    assert {each.fault.at_us for each in incidents} == {0}
+
+
+def test_what_is_expected() -> None:
+    one = flown("""
+  expect ends completed, stood_down
+  expect fallback return_home because state/violated at "wind.speed < 10 ..."
+  expect deny
+  expect flies hover
+  expect never emergency_land
+  expect reaction <= 200 ms
+  expect distance to school >= 20 m
+  expect distance to obstacle >= 3 m
+  expect lands in city
+""")
+    names = [zone.name for zone in one.policy.zones]
+    assert [each.what for each in one.scenario.expectations] == [
+        EndsWith(("completed", "stood-down")),
+        Decides("fallback", "return_home", "state/violated", "wind.speed < 10 m/s"),
+        Decides("deny"),
+        Flies("hover"),
+        Flies("emergency_land", never=True),
+        ReactsWithin(200_000),
+        KeepsAway(names.index("school"), 20_000),
+        KeepsAway(None, 3000),
+        EndsInside(names.index("city")),
+    ]
+    first = one.scenario.expectations[0]
+    assert (first.text, first.source) == ("expect ends completed, stood_down", "probe.rts")
+    text = IMPORT + 'scenario "it" { flies standard '
+    assert first.start == len(text) + 3
+    assert first.end == first.start + len(first.text)
+
+
+def test_the_mission_is_what_compile_makes_of_it() -> None:
+    one = flown("")
+    compiled = compile_program(program(IMPORT), dialect.load(), mission="standard", issued_at_us=5)
+    assert (one.policy, one.mission) == (compiled.policy, compiled.mission)
+
+
+def test_a_mission_with_parameters_flies_with_their_defaults() -> None:
+    mission = """import "lib:policies/bridge_inspection.rts"
+mission lift(top: altitude in 10 m .. 30 m = 20 m) under bridge_inspection@7 on quad {
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = top) }  phase recovery { return_home() }
+}
+scenario "it" { flies lift after takeoff kill() }
+"""
+    (one,) = made(mission, "").found
+    compiled = compile_program(program(mission), dialect.load(), mission="lift", issued_at_us=5)
+    assert one.mission == compiled.mission
+    without = made(mission.replace(" = 20 m)", ")"), "")
+    assert ("E0603", "`lift` is flown without a value for `top`") in [
+        (each.code.id, each.message) for each in without.diagnostics
+    ]
+    assert without.found == ()
+
+
+def test_scenarios_of_an_imported_file_are_its_own_business() -> None:
+    files = {"other": IMPORT + 'scenario "theirs" { flies nothing }'}
+    made_of = scenarios(
+        program('import "other.rts"\n' + 'scenario "ours" { flies standard }', **files), dialect.load(), 0
+    )
+    assert [each.scenario.name for each in made_of.found] == ["ours"]
+    assert made_of.diagnostics == ()
+
+
+def test_what_is_wrong_elsewhere_is_found_and_nothing_flies() -> None:
+    made_of = made('zone z = circle(47 N, 8 E, 3 s)\nscenario "it" { flies standard }')
+    assert made_of.found == ()
+    assert [each.code.id for each in made_of.diagnostics] == ["E0310"]
+
+
+OTHERS = """import "lib:missions/standard.rts"
+signal satellites : count = GPS_RAW_INT.satellites_visible stale after 2 s
+zone elsewhere = circle(47.3970 N, 8.5446 E, 15 m)
+skill dance() {
+  motion land  class tactical  deadline 5 s  valid for 40 min  lasts at most 1 min
+  fallback emergency_land  energy at most 5 %
+}
+"""
+
+WRONG: Sequence[tuple[str, str, str, str | None]] = [
+    ("aboard px5", "E1603", "there is no kind of autopilot `px5`", "did you mean `px4`?"),
+    ("aboard px4, px4", "E0202", "`px4` is named twice", None),
+    ("seeds 9 .. 1", "E0316", "the range `9 .. 1` is empty: its first end is above its second", "write `1 .. 9`"),
+    ("seeds 0 .. 100_000", "E1001", "these are 100001 seeds, and a scenario has at most 100000", None),
+    ("start batery = 8 %", "E1608", "a flight does not start with `batery = 8 %`", "did you mean `battery`?"),
+    ("start battery = 101 %", "E1003", "`101 %` is larger than what fits on board", "at most 100 %"),
+    ("start battery = 8 m", "E0310", "a ratio is asked, and `8 m` is a length", None),
+    ("start kill()", "E1608", "a flight does not start with `kill`", "write `at 0 s kill()`, outside of `start`"),
+    ("start battery = 8 %, battery = 9 %", "E1406", "`battery` is given twice", "keep one of them"),
+    ("at -1 s kill()", "E0319", "`-1 s` must not be negative", None),
+    ("at 3 m kill()", "E0310", "a duration is asked, and `3 m` is a length", None),
+    ("at 3 s .. 2 s kill()", "E0316", "the range `3 s .. 2 s` is empty: its first end is above its second", None),
+    ("after gotto kill()", "E0201", "nothing declares a skill `gotto`", "did you mean `goto`?"),
+    ("after city kill()", "E0204", "`city` is a zone, where a skill is asked", None),
+    ("after emergency_land kill()", "E1605", "`standard` has no step `emergency_land`", None),
+    ("after hover 2 kill()", "E1605", "`standard` has no step `hover` number 2", "it has 1 of `hover`, counted from 1"),
+    ("after hover 0 kill()", "E1605", "`standard` has no step `hover` number 0", None),
+    ("when heigt > 3 m kill()", "E0201", "nothing declares `heigt`", "did you mean `height`?"),
+    ("when height > 3 s kill()", "E0310", "", None),
+    ("when rising height > 3 m kill()", "E1606", "a fault cannot wait for a condition over time", None),
+    ("when not height > 3 m for the last 2 s kill()", "E1606", "a fault cannot wait for a condition over time", None),
+    ("when phase == inspection kill()", "E1606", "a fault cannot wait for a phase of the mission", None),
+    (
+        "when satellites > 3 kill()",
+        "E1607",
+        "the condition reads the signal `satellites`, which the policy does not",
+        None,
+    ),
+    (
+        "when position inside grow(city, 3 m) kill()",
+        "E1607",
+        "the condition needs a grown zone that the policy does not have",
+        None,
+    ),
+    (
+        "when position inside elsewhere kill()",
+        "E0207",
+        "the zone `elsewhere` is not one that the policy `bridge_inspection` imports",
+        None,
+    ),
+    ("at 2 s kil()", "E1601", "there is no fault `kil`", "did you mean `kill`?"),
+    ("at 2 s kill(for = 3 s)", "E0601", "`kill` has no `for`", "it takes nothing"),
+    ("at 2 s wind(spead = 3 m/s)", "E0601", "`wind` has no `spead`", "did you mean `speed`?"),
+    ("at 2 s wind(from = 3 deg)", "E0603", "`wind` is written without `speed`", "add `speed = 5 m/s`"),
+    ("at 2 s gps_loss(4 s)", "E0604", "what is said of `gps_loss` has no name before it", "write `for = 4 s`"),
+    ("at 2 s gps_loss(for = 4 s, for = 4 s)", "E0602", "`for` is given twice", None),
+    ("at 2 s gps_loss(for = 4 m)", "E0310", "a duration is asked, and `4 m` is a length", None),
+    ("at 2 s gps_loss(for = -4 s)", "E0319", "`-4 s` must not be negative", None),
+    ("at 2 s link_loss(loss = link.quality)", "E0318", "`link.quality` is not known before the flight", None),
+    ("at 2 s link_loss(loss = 101 %)", "E1003", "`101 %` is more than `loss` can be", "at most 100 %"),
+    ("at 2 s wind(speed = 3 m/s, from = 361 deg)", "E1003", "`361 deg` is more than `from` can be", "at most 360 deg"),
+    (
+        "at 2 s wind(speed = 3 m/s, from = 1.5 deg)",
+        "E0302",
+        "`1.5 deg` is finer than `from` can be",
+        "the nearest below is `1 deg`",
+    ),
+    ("at 2 s babble(copies = 1001)", "E1003", "`1001` is more than `copies` can be", "at most 1000"),
+    ("at 2 s link_silence(way = upp)", "E0313", "`upp` is no `way` of `link_silence`", "did you mean `up`?"),
+    ("at 2 s link_silence(way = 3 s)", "E0312", "`3 s` is no `way` of `link_silence`", None),
+    ("at 2 s mute(message = HEARTBEET)", "E0401", "the dialect has no message `HEARTBEET`", None),
+    ("at 2 s mute(message = 3)", "E0312", "`3` is no name, and `message` is one", None),
+    (
+        "at 2 s approve(role = supervisr)",
+        "E1609",
+        "no rule of `bridge_inspection` is about the role `supervisr`",
+        "did you mean `supervisor`?",
+    ),
+    ("expect ends complete", "E1602", "there is no ending `complete`", "did you mean `completed`?"),
+    ("expect fallback hoover", "E0201", "nothing declares a skill `hoover`", "did you mean `hover`?"),
+    (
+        "expect deny because state/violated",
+        "E1404",
+        "`state/violated` is a reason of `fallback`, never of `deny`",
+        "write `expect fallback`, or another reason",
+    ),
+    ("expect deny because nothing", "E1403", "there is no reason `nothing`", None),
+    (
+        'expect deny at "permit ..."',
+        "E1410",
+        "`permit ...` quotes the beginning of several clauses",
+        None,
+    ),
+    (
+        'expect fallback at "wind.sped < 10 m/s"',
+        "E1410",
+        "no decision on this mission is made by a clause `wind.sped < 10 m/s`",
+        "did you mean `wind.speed < 10 m/s`?",
+    ),
+    (
+        "expect flies dance",
+        "E1404",
+        "`dance` never flies: no rule and no chain of `bridge_inspection` names it",
+        None,
+    ),
+    (
+        "expect fallback dance",
+        "E1404",
+        "`dance` never flies: no rule and no chain of `bridge_inspection` names it",
+        None,
+    ),
+    ("expect never dence", "E0201", "nothing declares a skill `dence`", "did you mean `dance`?"),
+    ("expect reaction <= 0 s", "E0319", "`0 s` must be above zero", None),
+    ("expect distance to schol >= 3 m", "E0201", "nothing declares a zone `schol`", "did you mean `school`?"),
+    ("expect distance to school >= 3 s", "E0310", "a length is asked, and `3 s` is a duration", None),
+    ("expect lands in hover", "E0204", "`hover` is a skill, where a zone is asked", None),
+    (
+        "expect lands in elsewhere",
+        "E0207",
+        "the zone `elsewhere` is not one that the policy `bridge_inspection` imports",
+        None,
+    ),
+]
+
+
+@pytest.mark.parametrize(("body", "code", "message", "help"), WRONG)
+def test_what_is_wrong_is_said(body: str, code: str, message: str, help: str | None) -> None:
+    ((has, said, more),) = found(body, OTHERS)
+    assert has == code
+    assert message in ("", said)
+    assert help in (None, more)
+
+
+def test_that_nothing_bad_flies_is_no_finding() -> None:
+    assert found("expect never dance", OTHERS) == []
+
+
+def test_a_mission_that_there_is_not() -> None:
+    diagnostics = made('scenario "it" { flies standrd after takeoff 9 kill() }').diagnostics
+    assert [(each.code.id, each.message) for each in diagnostics] == [("E0201", "nothing declares a mission `standrd`")]
+
+
+def test_two_scenarios_are_called_differently() -> None:
+    diagnostics = made('scenario "it" { flies standard }\nscenario "it" { flies standard }').diagnostics
+    assert [(each.code.id, each.message) for each in diagnostics] == [("E1604", "two scenarios are called `it`")]
+
+
+def test_check_finds_what_lowering_finds() -> None:
+    body = 'scenario "it" { flies standard when satellites > 3 kill() expect lands in elsewhere }'
+    diagnostics = check_program(program(OTHERS + body), dialect.load())
+    assert [each.code.id for each in diagnostics] == ["E1607", "E0207"]
+
+
+def test_a_fix_is_what_was_meant() -> None:
+    for body in ("at 2 s gps_loss(4 s)", "at 2 s kil()", "seeds 9 .. 1", "at 2 s link_silence(way = upp)"):
+        text = IMPORT + f'scenario "it" {{ flies standard {body} }}'
+        (diagnostic,) = made(text, "").diagnostics
+        (fix,) = diagnostic.fixes
+        changed = text[: fix.span.start] + fix.replacement + text[fix.span.end :]
+        assert made(changed, "").diagnostics == (), changed

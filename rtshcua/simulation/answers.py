@@ -1,7 +1,7 @@
 """How long an autopilot takes until it gets to what it was sent: drawn from what was recorded of the real ones.
 
-From a command of ours, or a parameter that was asked for, to its answer, by the clock of who recorded it: 207 of them
-in `tests/traces`, all on one machine each. `docs/flying/simulated-vehicle.md` has the figures.
+From a command of ours, or a parameter that was asked for, to its answer, by the clock of who recorded it: 217 of them
+are in `tests/traces`. `docs/flying/simulated-vehicle.md` has the figures.
 """
 
 from bisect import bisect_right

@@ -1,9 +1,11 @@
 """From places to velocities: what the autopilot asks of the body. Metres, seconds, radians."""
 
 from math import atan2, copysign, cos, hypot, inf, sin, sqrt
+from typing import NamedTuple
 
 from rtshcua.simulation.handling import Agility, Handling
 from rtshcua.simulation.kinematics import Approach, Body
+from rtshcua.simulation.place import Point
 
 LEAD_S = 0.4
 """How much earlier it begins to slow down than the plan says: what leaning back takes."""
@@ -30,6 +32,37 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
     closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
     speed = min(speed, approach.speed(max(distance - closing * LEAD_S, 0.0)))
     return north / distance * speed, east / distance * speed
+
+
+_LEAST_PAST_M = 0.25
+"""What it flies past a target less than this is not told from none."""
+_TURNED_M_S, _TURNED_M = 0.15, 0.15
+"""So slow behind the target, or so near the furthest place, it comes back."""
+
+
+class Past(NamedTuple):
+    """How far, in metres, and in which direction it flies past a target before it comes back to it."""
+
+    north: float
+    east: float
+
+    def is_over(self, body: Body, north: float, east: float) -> bool:
+        """Whether it has flown past the target (north, east) and comes back."""
+        far = hypot(self.north, self.east)
+        north, east = body.north - north, body.east - east
+        along = (north * self.north + east * self.east) / far
+        if along <= 0:
+            return False
+        speed = (body.v_north * self.north + body.v_east * self.east) / far
+        return speed < _TURNED_M_S or far - along < _TURNED_M
+
+
+def past(here: Point, target: Point, speed: float, agility: Agility) -> Past | None:
+    """How it will fly past a target on its way from here at up to `speed`; None if it will not."""
+    north, east = target.north - here.north, target.east - here.east
+    away = hypot(north, east)
+    far = agility.overshoot_s * min(speed, agility.approach.speed(away / 2))
+    return Past(north / away * far, east / away * far) if far >= _LEAST_PAST_M else None
 
 
 def hardest(agility: Agility) -> float:

@@ -64,6 +64,8 @@ class Agility:
     """How long it stands before it knows that it has landed."""
     land_braking: float
     """How it slows down above the height where the last part of a landing begins."""
+    overshoot_s: float = 0.0
+    """How far it flies past a target before it comes back, by the speed that it flew there with."""
     home_within: float = 0.5
     """So near home, in metres, a return has come home."""
     return_wait_s: float = 0.0

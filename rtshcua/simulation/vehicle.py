@@ -95,6 +95,7 @@ class Vehicle:
         self._waiting_s = 0.0
         self._nose: float | None = None
         self._radius = 0.0
+        self._past: guidance.Past | None = None
         self._steer_to_target()
 
     @property
@@ -277,6 +278,8 @@ class Vehicle:
             self.destination, self.sent = target, True
             if self.paused:
                 return
+            if target != self.target or self._activity is not Activity.TRACK:
+                self._past = self._past_of(target)
             self.target = target
             self._nose = None
             self._steer_to_target()
@@ -294,6 +297,7 @@ class Vehicle:
         """Flies around a place, clockwise seen from above if the radius is positive, until told otherwise."""
         if self.flies:
             self.target, self._radius = centre, radius
+            self._past = None
             self._activity = Activity.CIRCLE
             self.landed = Landed.IN_AIR
 
@@ -342,8 +346,14 @@ class Vehicle:
         self.target = self._believed(*stop.place(body), up)
         self.destination = self._believed(*stop.told_place(body), up)
         self.sent = False
+        self._past = None
         self._activity = activity
         self.landed = Landed.IN_AIR
+
+    def _past_of(self, target: Point) -> guidance.Past | None:
+        """How it will fly past a place that it flies to from here."""
+        here = self._believed(self.body.north, self.body.east, self.body.up)
+        return guidance.past(here, target, self.speed, self.handling.agility)
 
     def _steer_to_target(self) -> None:
         agility = self.handling.agility
@@ -359,6 +369,11 @@ class Vehicle:
         if self.blind:
             body.drift(dt, self._climb_rate(north, east), most, wind)
             return
+        if self._past is not None:
+            if self._past.is_over(body, north, east):
+                self._past = None
+            else:
+                north, east = north + self._past.north, east + self._past.east
         if self._activity is Activity.CIRCLE:
             want = guidance.around(body, north, east, self._radius, self.speed)
         else:
@@ -386,6 +401,7 @@ class Vehicle:
         elif activity is Activity.RETURN_CLIMB:
             if away < guidance.ARRIVED_M and abs(body.v_up) < guidance.ARRIVED_M_S:
                 self.target = self.destination = Point(0.0, 0.0, self.target.up)
+                self._past = self._past_of(self.target)
                 self._steer_to_target()
                 self._activity = Activity.RETURN_CROSS
         elif activity is Activity.RETURN_CROSS:
@@ -445,6 +461,7 @@ class Vehicle:
 
     def _touch_down(self) -> None:
         self.touched_m_s = -self.body.v_up
+        self._past = None
         self.crashed = self.crashed or self.touched_m_s > _HARD_M_S
         self.body.stop(upright=not self.crashed)
         self.events += [Event.TOUCHED, Event.TIPPED] if self.crashed and self.armed else [Event.TOUCHED]

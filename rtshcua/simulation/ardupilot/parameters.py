@@ -71,6 +71,7 @@ _AGILITY = Agility(
     spool_s=2.2,
     ramp_s=1.3,
     land_detect_s=1.8,
+    overshoot_s=0.09,
     land_braking=0.55,
     return_wait_s=5.0,
 )

@@ -1,0 +1,106 @@
+"""Every kind of fault that a simulated vehicle can have changes something that can be seen."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Mode
+from rtshcua.simulation.autopilot import Autopilot
+from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.effects import Affected, effects
+from rtshcua.simulation.faults import OF_VEHICLE
+from rtshcua.simulation.world import FLAVOURS
+from virtual.copying import copied
+
+S = 1_000_000
+POSITION = "GLOBAL_POSITION_INT"
+#: by its name, a fault of each kind
+EXAMPLES: dict[str, Callable[[int], Fault]] = {
+    "battery": lambda at: faults.BatteryLevel(at, 5_000),
+    "battery-cell": lambda at: faults.BatteryCell(at),
+    "battery-voltage": lambda at: faults.BatteryVoltage(at, 10_200),
+    "gps-loss": lambda at: faults.GpsLoss(at),
+    "gps-jump": lambda at: faults.GpsJump(at, 3_000, 0),
+    "gps-drift": lambda at: faults.GpsDrift(at, 0, 500),
+    "gps-glitch": lambda at: faults.GpsGlitch(at, 0, 9_000),
+    "estimator": lambda at: faults.EstimatorUnhealthy(at),
+    "wind": lambda at: faults.WindStep(at, 6_000, 90),
+    "link-delay": lambda at: faults.LinkDelay(at, 300_000),
+    "link-jitter": lambda at: faults.LinkJitter(at, 300_000),
+    "link-reorder": lambda at: faults.LinkReorder(at, 2_000),
+    "link-loss": lambda at: faults.LinkLoss(at, 5_000),
+    "link-silence": lambda at: faults.LinkSilence(at),
+    "link-quality": lambda at: faults.LinkQuality(at, 4_000),
+    "obstacle": lambda at: faults.Obstacle(at, 9_000),
+    "pillar": lambda at: faults.Pillar(at, 60_000, 30_000, 1_000, 60_000, None, 4_000, 270),
+    "pilot": lambda at: faults.PilotMode(at, Mode.LOITER),
+    "pilot-mode": lambda at: faults.PilotMode(at, Mode.LAND),
+    "pilot-pause": lambda at: faults.PilotPause(at),
+    "pilot-goto": lambda at: faults.PilotGoto(at, 0, 90_000, 20_000),
+    "pilot-sticks": lambda at: faults.PilotSticks(at),
+    "kill": lambda at: faults.Kill(at),
+    "reboot": lambda at: faults.Reboot(at),
+    "stall": lambda at: faults.Stall(at, 2 * S),
+    "freeze": lambda at: faults.Freeze(at),
+    "stale": lambda at: faults.StaleSource(at, 500_000),
+    "stuck": lambda at: faults.MessageStuck(at, POSITION),
+    "mute": lambda at: faults.MessageSilence(at, POSITION),
+}
+#: what ArduCopter does not mind on its way to a target
+LANDING = {"pilot-sticks"}
+#: what PX4 does not mind while it is in Hold
+STAYS = {"pilot"}
+
+
+@pytest.fixture(scope="module")
+def on_its_way() -> dict[str, Any]:
+    return {}
+
+
+def flying(pilot: Callable[..., Any], flavour: str) -> Any:
+    p = pilot(flavour)
+    for number in (1, 24, 30, 33, 132, 147, 193, 230):
+        p.long(511, number, 100_000)
+    p.take_off(20)
+    p.go_to(300, 0, 20)
+    p.wait(5)
+    return p
+
+
+def test_there_is_an_example_of_each() -> None:
+    assert set(EXAMPLES) == set(OF_VEHICLE)
+    assert all(type(EXAMPLES[name](0)) is kind for name, kind in OF_VEHICLE.items())
+
+
+@pytest.mark.parametrize("name", list(EXAMPLES))
+def test_it_changes_what_is_seen(name: str, pilot: Callable[..., Any], flavour: str, on_its_way: dict[str, Any]) -> None:
+    if flavour not in on_its_way:
+        on_its_way[flavour] = flying(pilot, flavour)
+    p = on_its_way[flavour]
+    with_it, without = copied(p.simulation), copied(p.simulation)
+    now_us = with_it.now_us
+    if not p.px4 and name in LANDING:
+        for each in (with_it, without):
+            each.inject(faults.PilotMode(now_us, Mode.LAND))
+    if p.px4 and name in STAYS:
+        for each in (with_it, without):
+            each.inject(faults.PilotMode(now_us, Mode.POSITION))
+    with_it.inject(EXAMPLES[name](now_us + 200_000))
+    for at_us in range(now_us + 100_000, now_us + 6 * S, 100_000):
+        seen, expected = with_it.advance(at_us), without.advance(at_us)
+        if seen != expected or with_it.truth() != without.truth():
+            assert at_us > now_us + 100_000, "not before its time"
+            return
+    raise AssertionError("nothing changed")
+
+
+def test_what_is_not_of_the_vehicle_has_no_effect_on_it_and_an_unknown_kind_is_refused() -> None:
+    on = Affected(Autopilot(FLAVOURS[Kind.PX4], SimulationConfig()), None, None, None, None)  # type: ignore[arg-type]
+    assert not list(effects(faults.DiskFull(0), on))
+    assert not list(effects(faults.Recall(0), on))
+    bases = (Fault, faults.LinkFault, faults.ReceiverFault, faults.AutopilotFault, faults.PilotFault)
+    for base in bases:
+        with pytest.raises(TypeError, match=base.__name__):
+            list(effects(base(0), on))

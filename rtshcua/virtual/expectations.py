@@ -1,10 +1,33 @@
-"""Whether what a scenario expects has come of a flight of it."""
+"""Whether what a scenario expects has come of a flight of it.
 
-from typing import NamedTuple
+Endings, decisions and what flew are read from the logs of the flight, distances from where the vehicle really was,
+reactions from the frames that left.
+"""
 
-from rtshcua.model.scenario import Expectation
+import re
+from collections.abc import Iterable
+from math import inf
+from typing import Any, NamedTuple, assert_never
+
+import msgspec
+
+from rtshcua.model.scenario import (
+    Decides,
+    EndsInside,
+    EndsWith,
+    Expectation,
+    Expected,
+    Flies,
+    KeepsAway,
+    ReactsWithin,
+)
 from rtshcua.virtual.flown import ScenarioFlown
-from rtshcua.virtual.judge import Judgement
+from rtshcua.virtual.judge import Judgement, inside_mm, local_mm
+from rtshcua.wire.request import CONTINGENCY_LINK, STEP
+
+#: the reading of expectations shows so many decisions at most
+_SHOWN = 6
+_WORD = re.compile(r"\w+")
 
 
 class Met(NamedTuple):
@@ -17,4 +40,112 @@ class Met(NamedTuple):
 
 def expectations(flown: ScenarioFlown, judgement: Judgement) -> tuple[Met, ...]:
     """One for each expectation of the scenario, in their order."""
-    return ()
+    records = [record for life in flown.lives for record in _records(life.lines)]
+    return tuple(
+        Met(expectation, *_found(expectation.what, flown, judgement, records))
+        for expectation in flown.scenario.expectations
+    )
+
+
+def _found(
+    what: Expected, flown: ScenarioFlown, judgement: Judgement, records: list[dict[str, Any]]
+) -> tuple[bool, str]:  # fmt: skip
+    match what:
+        case EndsWith(endings):
+            ending = flown.ending or ("fault" if flown.fault else "killed")
+            return ending in endings, f"it ended with `{ending}`"
+        case Decides():
+            return _decided(what, flown, records)
+        case Flies(skill, never):
+            flew = [record["detail"] for record in records if record.get("event") == "dispatched"]
+            return (skill in flew) is not never, f"it flew {_listed(flew) if flew else 'nothing'}"
+        case ReactsWithin(most_us):
+            took_us = judgement.margins.stop_us
+            if took_us is None:
+                return True, "it never had to fall back"
+            return took_us <= most_us, f"the latest fallback took {took_us / 1e6:.3f} s"
+        case KeepsAway(zone, least_mm):
+            return _away(flown, judgement, zone, least_mm)
+        case EndsInside(zone):
+            last = flown.samples[-1]
+            level = inside_mm(_flat(flown, zone), *local_mm(flown.policy, last.latitude, last.longitude), 0.0)
+            where = f"{abs(level) / 1000:.1f} m {'inside' if level > 0 else 'outside'}"
+            return level > 0, f"it ended {where} `{flown.policy.zones[zone].name}`"
+        case _:
+            assert_never(what)
+
+
+def _decided(what: Decides, flown: ScenarioFlown, records: list[dict[str, Any]]) -> tuple[bool, str]:
+    decisions = [record for record in records if record["type"] == "decision"]
+    for record in decisions:
+        if _is(what, flown, record):
+            return True, _shown(flown, record)
+    alike = [record for record in decisions if record["outcome"] == what.outcome] or decisions
+    return False, f"it decided {_listed(_shown(flown, each) for each in alike) if alike else 'nothing'}"
+
+
+def _is(what: Decides, flown: ScenarioFlown, record: dict[str, Any]) -> bool:
+    return (
+        record["outcome"] == what.outcome
+        and (what.target is None or _skill(flown, record) == what.target)
+        and (what.reason is None or record["reason"] == what.reason)
+        and (what.clause is None or record["clause"] == what.clause)
+    )
+
+
+def _skill(flown: ScenarioFlown, record: dict[str, Any]) -> str:
+    """The skill that a decision lets fly: that of its target, of the link that it is about, or of the step."""
+    policy, step, link = flown.policy, record["step"], record["link"]
+    if record["target"] is not None:
+        return _first_word(record["target"])
+    if record["kind"] == CONTINGENCY_LINK:
+        return policy.contracts[policy.contingency[link].skill].name
+    contract = flown.mission.invocations[step].contract
+    if record["kind"] == STEP:
+        return contract.name
+    return policy.contracts[contract.fallback[link].skill].name if link >= 0 else ""
+
+
+def _first_word(text: str) -> str:
+    found = _WORD.match(text)
+    return "" if found is None else found[0]
+
+
+def _shown(flown: ScenarioFlown, record: dict[str, Any]) -> str:
+    return f"{record['outcome']} of {_skill(flown, record) or 'a link'} ({record['reason']})"
+
+
+def _listed(words: Iterable[str]) -> str:
+    """Each once, in their order."""
+    different = list(dict.fromkeys(words))
+    more = f", and {len(different) - _SHOWN} more" if len(different) > _SHOWN else ""
+    return ", ".join(different[:_SHOWN]) + more
+
+
+def _away(flown: ScenarioFlown, judgement: Judgement, zone: int | None, least_mm: int) -> tuple[bool, str]:
+    if zone is None:
+        nearest = judgement.margins.obstacle_mm
+        if nearest is None:
+            return True, "nothing stood around"
+        return nearest >= least_mm, f"it came as near as {nearest / 1000:.1f} m"
+    flat = flown.policy.zones[zone]
+    away = min(
+        (
+            -inside_mm(flat, *local_mm(flown.policy, sample.latitude, sample.longitude), sample.up_mm)
+            for sample in flown.samples
+            if sample.in_air
+        ),
+        default=inf,
+    )
+    if away == inf:
+        return True, "it never flew"
+    return away >= least_mm, f"it came as near as {away / 1000:.1f} m to `{flat.name}`"
+
+
+def _flat(flown: ScenarioFlown, zone: int) -> Any:
+    """The zone as it is seen from above."""
+    return msgspec.structs.replace(flown.policy.zones[zone], floor=-(1 << 30), ceiling=1 << 30)
+
+
+def _records(lines: Iterable[bytes]) -> list[dict[str, Any]]:
+    return [msgspec.json.decode(line) for line in lines if line.endswith(b"\n")]

@@ -45,6 +45,7 @@ SLUGS: Final = (
 MODE_WITHIN_US: Final[Mapping[str, int]] = {"px4": 300_000, "ardupilot": 200_000}
 #: mm/s: what noise and gusts make of a vehicle that stands still, and us: for how long it must, at the end
 STILL_MM_S: Final = 700
+LEVEL_MM_S: Final = 300
 STILL_US: Final = 3_000_000
 
 
@@ -236,7 +237,7 @@ def _end(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
 
 
 def _is_still(sample: Sample) -> bool:
-    return sample.speed_mm_s <= STILL_MM_S and abs(sample.climb_mm_s) <= STILL_MM_S
+    return sample.speed_mm_s <= STILL_MM_S and abs(sample.climb_mm_s) <= LEVEL_MM_S
 
 
 def _faults(flown: ScenarioFlown) -> list[Failure]:

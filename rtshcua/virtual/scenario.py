@@ -59,8 +59,9 @@ _AIR_US: Final = 5 * SECOND
 #: After the last process, the vehicle is watched until it rests or stood still for so long, and at most this long.
 STILL_US: Final = 5 * SECOND
 SETTLE_US: Final = 240 * SECOND
-#: mm/s: what noise and gusts make of a vehicle that stands still
+#: mm/s: what noise and gusts make of a vehicle that stands still, level and upwards
 STILL_MM_S: Final = 700
+LEVEL_MM_S: Final = 300
 #: how long a document speaks that is handed in
 _SPEAKS_US: Final = 300 * SECOND
 _LONGEST_BABBLE: Final = 400
@@ -474,7 +475,7 @@ class _Flight:
             truth = world.truth()
             if not truth.in_air and not truth.climb_mm_s:
                 break
-            if truth.speed_mm_s > STILL_MM_S or abs(truth.climb_mm_s) > STILL_MM_S:
+            if truth.speed_mm_s > STILL_MM_S or abs(truth.climb_mm_s) > LEVEL_MM_S:
                 still_us = world.now_us
             elif world.now_us - still_us >= STILL_US:
                 break

@@ -1,0 +1,389 @@
+"""The judge of flights: hand-made truths, and a real flight of which something was changed; one for each failure."""
+
+import pickle
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace as with_fields
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.zone import AREA, Zone, unproject
+from rtshcua.model.scenario import Start
+from rtshcua.virtual.flown import Arrived, Happened, Reaction, Sample, ScenarioFlown
+from rtshcua.virtual.judge import SLUGS, Judgement, inside_mm, judge, moves
+from virtual import case
+from virtual.once import once
+from virtual.scenarios import flown, scenario
+
+S, M = case.S, case.M
+
+
+@pytest.fixture(scope="module")
+def good() -> ScenarioFlown:
+    return once("judged-flight", lambda: flown(scenario()))
+
+
+def sample(at_s: float, east_m: float = 0, north_m: float = 0, up_m: float = 10, **fields: Any) -> Sample:
+    latitude, longitude = unproject(case.policy().projection, round(east_m * M), round(north_m * M))
+    plain = Sample(
+        round(at_s * S),
+        latitude,
+        longitude,
+        round(up_m * M),
+        0,
+        0,
+        True,
+        True,
+        False,
+        Mode.GUIDED,
+        9_000,
+        None,
+        None,
+        None,
+    )
+    return plain._replace(**fields)
+
+
+def judged(good: ScenarioFlown, samples: Sequence[Sample], *happened: Fault, **fields: Any) -> Judgement:
+    """What is said of these truths, of a flight whose logs and frames are good."""
+    incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
+    given: dict[str, Any] = {"arrived": (), "lives": (replace(good.lives[0], ending="aborted"),), **fields}
+    return judge(replace(good, samples=tuple(samples), happened=incidents, **given))
+
+
+def slugs(judgement: Judgement) -> list[str]:
+    return [failure.slug for failure in judgement.failures]
+
+
+def causes(judgement: Judgement) -> list[tuple[str, str | None]]:
+    return [(failure.slug, failure.cause) for failure in judgement.exceptions]
+
+
+# ---------------------------------------------------------------- nothing, and plain values
+
+
+def test_nothing_is_wrong_with_a_good_flight(good: ScenarioFlown) -> None:
+    found = judge(good)
+    assert (found.failures, found.exceptions) == ((), ())
+    assert found.margins.fence_mm is not None
+    assert found.margins.fence_mm > 0
+    assert found.margins.ended_us == 0
+    assert pickle.loads(pickle.dumps(good)) == good
+
+
+# ---------------------------------------------------------------- outside-fence
+
+SQUARE = (0, 0, 10, 0, 10, 10, 0, 10)
+
+
+@pytest.mark.parametrize(
+    ("zone", "place", "inside"),
+    [
+        (Zone("box", 1, -100, 100, SQUARE), (5, 5, 0), 5),
+        (Zone("box", 1, -100, 100, SQUARE), (13, 14, 0), -5),
+        (Zone("box", 1, -2, 100, SQUARE), (5, 5, 0), 2),
+        (Zone("box", 1, -100, 4, SQUARE), (5, 5, 7), -3),
+        (Zone("box", 1, -100, 4, SQUARE), (13, 5, 8), -5),
+        (Zone("round", 0, -100, 100, (0, 0, 100)), (3, 4, 0), 5),
+        (Zone("round", 0, -100, 100, (0, 0, 100)), (0, 12, 0), -2),
+        (Zone("ring", AREA, -100, 100, (2, 4, 4, *SQUARE, 4, 4, 4, 6, 6, 6, 6, 4)), (5, 5, 0), -1),
+        (Zone("ring", AREA, -100, 100, (2, 4, 4, *SQUARE, 4, 4, 4, 6, 6, 6, 6, 4)), (2, 5, 0), 2),
+    ],
+)
+def test_how_far_inside_a_zone(zone: Zone, place: tuple[int, int, int], inside: float) -> None:
+    assert inside_mm(zone, *place) == pytest.approx(inside)
+
+
+def test_outside_the_airspace(good: ScenarioFlown) -> None:
+    found = judged(good, [sample(10, 490), sample(11, 503), sample(12, 507), sample(13, 480)])
+    first, worst = found.failures
+    assert (first.slug, first.at_us, worst.at_us) == ("outside-fence", 11 * S, 12 * S)
+    assert found.margins.fence_mm == worst.amount * -1 == pytest.approx(-7_000, abs=20)
+    assert slugs(judged(good, [sample(10, 499)])) == []
+    assert slugs(judged(good, [sample(10, up_m=119)])) == []
+    assert slugs(judged(good, [sample(10, up_m=121)])) == ["outside-fence"]
+    assert slugs(judged(good, [sample(10, north_m=250)])) == ["outside-fence"]  # over the school
+    assert slugs(judged(good, [sample(10, 700, in_air=False)])) == []
+
+
+def test_a_zone_that_is_only_there_at_times_is_left_out(good: ScenarioFlown) -> None:
+    zones = list(good.policy.zones)
+    zones[case.flat.SCHOOL] = with_fields(zones[case.flat.SCHOOL], daily=(0, 1))
+    policy = with_fields(good.policy, zones=tuple(zones))
+    assert slugs(judged(good, [sample(10, north_m=250)], policy=policy)) == []
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause"),
+    [
+        (faults.GpsJump(5 * S, 0, 10 * M), "position"),
+        (faults.GpsJump(5 * S, 0, 5 * M), None),
+        (faults.GpsDrift(5 * S, 0, 2 * M), "position"),
+        (faults.GpsDrift(5 * S, 0, 2 * M, S), None),
+        (faults.GpsGlitch(5 * S, 0, 10 * M, 10 * S), "position"),
+        (faults.GpsLoss(3 * S), "position"),
+        (faults.GpsLoss(10 * S), None),
+        (faults.WindStep(5 * S, 13 * M), "wind"),
+        (faults.WindStep(5 * S, 8 * M), None),
+        (faults.PilotSticks(5 * S, 8 * S), "pilot"),
+        (faults.PilotSticks(5 * S, S), None),
+        (faults.LinkSilence(5 * S), None),
+        (faults.Kill(5 * S), "motors"),
+    ],
+)  # fmt: skip
+def test_what_excuses_being_outside(good: ScenarioFlown, fault: Fault, cause: str | None) -> None:
+    found = judged(good, [sample(5), sample(11, 508), sample(12, 480)], fault)
+    assert slugs(found) == ([] if cause else ["outside-fence"])
+    assert causes(found) == ([("outside-fence", cause)] if cause else [])
+
+
+def test_who_took_over_flies_where_he_wants(good: ScenarioFlown) -> None:
+    taken: dict[str, Any] = {"taken_over_us": 10 * S, "taken_over_by": "pilot"}
+    samples = [sample(9), sample(12, 508, **taken), sample(13, 480, **taken)]
+    assert causes(judged(good, samples)) == [("outside-fence", "pilot")]
+    before = [sample(9, 508), sample(12, 480, **taken)]
+    assert slugs(judged(good, before)) == ["outside-fence"]
+
+
+def test_a_wind_at_the_start_excuses_too(good: ScenarioFlown) -> None:
+    windy = replace(good.scenario, start=Start(wind_mm_s=9 * M, gust_mm_s=2 * M))
+    assert causes(judged(good, [sample(12, 508)], scenario=windy)) == [("outside-fence", "wind")]
+
+
+# ---------------------------------------------------------------- collision
+
+
+def crash(speed_mm_s: int = 3 * M, near_mm: int | None = 0) -> list[Sample]:
+    near = {"obstacle_mm": near_mm}
+    return [
+        sample(5, **near), sample(9, speed_mm_s=speed_mm_s, **near),
+        sample(10, speed_mm_s=speed_mm_s, crashed=True, in_air=False, **near),
+    ]  # fmt: skip
+
+
+def pillar(at_us: int, speed_mm_s: int = 0) -> faults.Pillar:
+    return faults.Pillar(at_us, 0, 20 * M, 3 * M, 30 * M, speed_mm_s=speed_mm_s)
+
+
+def test_a_collision(good: ScenarioFlown) -> None:
+    assert slugs(judged(good, crash())) == ["collision"]
+    assert "flew into something" in judged(good, crash()).failures[0].text
+    assert "too hard" in judged(good, crash(near_mm=None)).failures[0].text
+    assert judged(good, crash()).margins.obstacle_mm == 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause"),
+    [
+        (faults.Kill(5 * S), "motors"),
+        (faults.Reboot(5 * S), "motors"),
+        (faults.WindStep(5 * S, 15 * M), "wind"),
+        (faults.LinkSilence(8 * S, 5 * S), "link"),
+        (faults.LinkSilence(S, S), None),
+        (faults.HostStall(8 * S, 3 * S), "process"),
+        (faults.HostStall(2 * S, S), None),
+        (faults.Obstacle(5 * S, 3 * M), None),
+    ],
+)
+def test_what_excuses_a_collision(good: ScenarioFlown, fault: Fault, cause: str | None) -> None:
+    found = judged(good, crash(), fault)
+    assert causes(found) == ([("collision", cause)] if cause else [])
+    assert slugs(found) == ([] if cause else ["collision"])
+
+
+def test_a_pillar_that_could_be_seen_in_time_is_no_excuse(good: ScenarioFlown) -> None:
+    far = [sample(5, obstacle_mm=60 * M), *crash()[1:]]
+    assert slugs(judged(good, far, pillar(5 * S))) == ["collision"]
+    assert causes(judged(good, crash(), pillar(5 * S))) == [("collision", "obstacle")]  # there at once
+    assert causes(judged(good, far, pillar(5 * S, speed_mm_s=M))) == [("collision", "obstacle")]
+    standing = [far[0], *crash(speed_mm_s=0)[1:]]
+    assert causes(judged(good, standing, pillar(5 * S))) == [("collision", "obstacle")]
+    stuck = faults.MessageStuck(2 * S, "DISTANCE_SENSOR")
+    assert causes(judged(good, far, pillar(5 * S), stuck)) == [("collision", "obstacle")]
+    other = faults.MessageStuck(2 * S, "ATTITUDE")
+    assert slugs(judged(good, far, pillar(5 * S), other)) == ["collision"]
+
+
+def test_an_empty_battery_excuses_only_who_was_given_one(good: ScenarioFlown) -> None:
+    empty = [each._replace(battery=0) for each in crash(near_mm=None)]
+    assert slugs(judged(good, empty)) == ["collision"]
+    assert causes(judged(good, empty, faults.BatteryLevel(5 * S, 0))) == [("collision", "battery")]
+
+
+# ---------------------------------------------------------------- not-ended
+
+
+def after(good: ScenarioFlown, **fields: Any) -> list[Sample]:
+    end_s = good.ended_us / S
+    return [sample(end_s + tenths / 10, **fields) for tenths in range(1, 60)]
+
+
+def test_it_rests_or_holds_at_the_end(good: ScenarioFlown) -> None:
+    lives = (replace(good.lives[0], ending="aborted"),)
+    assert slugs(judged(good, after(good, speed_mm_s=300), lives=lives)) == []
+    assert slugs(judged(good, after(good, speed_mm_s=3 * M), lives=lives)) == ["not-ended"]
+    assert slugs(judged(good, after(good, climb_mm_s=-M), lives=lives)) == ["not-ended"]
+    assert slugs(judged(good, after(good, speed_mm_s=3 * M, in_air=False), lives=lives)) == []
+    assert slugs(judged(good, after(good), lives=good.lives)) == [
+        "not-ended"
+    ]  # it says that it completed the mission, and flies
+
+
+def test_what_excuses_flying_on(good: ScenarioFlown) -> None:
+    lives = (replace(good.lives[0], ending="stood-down"),)
+    taken = after(good, speed_mm_s=3 * M, taken_over_us=S, taken_over_by="pilot")
+    assert causes(judged(good, taken, lives=lives)) == [("not-ended", "pilot")]
+    moving = after(good, speed_mm_s=3 * M)
+    assert causes(judged(good, moving, lives=lives, left="replayed")) == [("not-ended", "process")]
+
+
+# ---------------------------------------------------------------- frames
+
+SYSTEM, OURS = 1, 191
+
+
+def packed(message: Any) -> bytes:
+    sender = dialect.MAVLink(None, SYSTEM, OURS)
+    octets: bytes = message.pack(sender)
+    return octets
+
+
+def long(number: int, *parameters: float) -> bytes:
+    filled = (*parameters, *(0.0,) * (7 - len(parameters)))
+    return packed(dialect.MAVLink_command_long_message(1, 1, number, 0, *filled))
+
+
+def reposition(x: int, y: int) -> bytes:
+    return packed(dialect.MAVLink_command_int_message(1, 1, 0, 192, 0, 0, -1, 1, 0, float("nan"), x, y, 10))
+
+
+@pytest.mark.parametrize(
+    ("frame", "flavour", "kinds"),
+    [
+        (long(512, 0), "px4", None),
+        (long(511, 33, 1e5), "px4", None),
+        (packed(dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)), "px4", None),
+        (packed(dialect.MAVLink_mission_count_message(1, 1, 5, 1)), "px4", None),
+        (packed(dialect.MAVLink_mission_count_message(1, 1, 5, 0)), "px4", set()),
+        (packed(dialect.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0)), "px4", set()),
+        (long(400, 1), "px4", {MotionKind.CLIMB}),
+        (long(400, 0), "px4", set()),
+        (long(400, 1, 21196), "px4", set()),
+        (long(176, 1, 4, 5), "px4", {MotionKind.HOME}),
+        (long(176, 1, 6), "ardupilot", {MotionKind.HOME}),
+        (long(176, 1, 9), "ardupilot", {MotionKind.LAND}),
+        (long(22), "px4", {MotionKind.CLIMB}),
+        (long(185, 1), "px4", set()),
+        (reposition(473_977_400, 85_455_900), "px4", {MotionKind.FLY, MotionKind.COVER}),
+        (reposition(0x7FFFFFFF, 0x7FFFFFFF), "px4", {MotionKind.HOLD}),
+        (b"\xfd\x00garbage is nothing", "px4", None),
+    ],
+)
+def test_what_a_frame_moves(frame: bytes, flavour: str, kinds: set[MotionKind] | None) -> None:
+    assert moves(frame, flavour) == kinds
+
+
+def motion(good: ScenarioFlown) -> list[Arrived]:
+    return [frame for frame in good.arrived if moves(frame.octets, good.flavour) is not None]
+
+
+def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
+    frame = motion(good)[-1]
+
+    def taken(before_us: int, *happened: Fault, sent_us: int = frame.sent_us) -> Judgement:
+        since_us = frame.at_us - before_us
+        samples = [
+            each._replace(taken_over_us=since_us if each.at_us >= since_us else None, taken_over_by="pilot")
+            for each in good.samples
+        ]
+        frames = [each if each is not frame else frame._replace(sent_us=sent_us) for each in good.arrived]
+        return judged(good, samples, *happened, arrived=tuple(frames))
+
+    assert slugs(taken(2 * S)) == ["motion-after-takeover"]
+    assert taken(2 * S).margins.takeover_us == 2 * S
+    assert slugs(taken(200_000)) == []
+    assert slugs(taken(2 * S, sent_us=frame.sent_us - 2 * S - 1)) != ["motion-after-takeover"]  # it was on its way
+    assert slugs(taken(2 * S, faults.LinkDelay(S, 2 * S))) == []
+    assert slugs(taken(2 * S, faults.PilotPause(S))) == ["motion-after-takeover"]  # that shows on PX4
+
+
+def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:
+    frame = motion(good)[0]
+    early = Arrived(S // 10, S // 10, frame.octets)
+    assert slugs(judge(replace(good, arrived=(early,)))) == ["unlogged-effect"]
+    land = long(176, 1, 4, 6)
+    other = [*good.arrived, Arrived(frame.at_us + S, frame.at_us + S, land)]
+    assert "the last command was" in judge(replace(good, arrived=tuple(other))).failures[0].text
+    over = [*good.arrived, Arrived(good.ended_us + S, good.ended_us + S, land)]
+    assert slugs(judge(replace(good, arrived=tuple(over)))) == ["unlogged-effect"]
+    full = (Happened(0, S, faults.DiskFull(S), ""),)
+    assert causes(judge(replace(good, arrived=(early,), happened=full))) == [("unlogged-effect", "disk")]
+
+
+def test_a_late_fallback(good: ScenarioFlown) -> None:
+    frame = motion(good)[-1]
+
+    def reacts(in_us: int, *happened: Fault) -> Judgement:
+        reaction = Reaction(frame.sent_us - in_us, frame.sent_us)
+        life = replace(good.lives[0], reactions=(reaction,))
+        incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
+        return judge(replace(good, lives=(life,), happened=incidents))
+
+    assert slugs(reacts(100_000)) == []
+    assert reacts(100_000).margins.stop_us == 100_000
+    assert slugs(reacts(S)) == ["late"]
+    assert causes(reacts(S, faults.LinkSilence(2 * S))) == [] == slugs(reacts(S, faults.LinkDelay(2 * S, S)))
+
+
+def test_a_frame_after_its_permit_and_a_step_after_its_deadline(good: ScenarioFlown) -> None:
+    takes_off = motion(good)[0]
+    late = [
+        each._replace(sent_us=each.sent_us + 20 * S, at_us=each.at_us + 20 * S)
+        if each.octets == takes_off.octets
+        else each
+        for each in good.arrived
+        if each is takes_off or moves(each.octets, good.flavour) is None
+    ]
+    found = judge(replace(good, arrived=tuple(late)))
+    assert "late" in slugs(found)
+    assert any("deadline" in each.text or "permit" in each.text for each in found.failures)
+
+
+# ---------------------------------------------------------------- logs
+
+
+def test_a_log_that_does_not_verify(good: ScenarioFlown) -> None:
+    lines = list(good.lives[0].lines)
+
+    def logged(changed: Sequence[bytes], *happened: Fault) -> Judgement:
+        incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
+        return judge(replace(good, lives=(replace(good.lives[0], lines=tuple(changed)),), happened=incidents))
+
+    assert "log" in slugs(logged(lines[:3] + lines[4:]))
+    assert slugs(logged(lines[:-1])) == ["log"]
+    assert causes(logged(lines[:-1], faults.DiskFull(S))) == [("log", "disk")]
+    assert "log" in slugs(logged(lines[:3] + lines[4:], faults.DiskFull(S)))
+
+
+def test_a_decision_that_is_not_derived(good: ScenarioFlown, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rtshcua.evidence.finding import Flaw
+    from rtshcua.ground.auditor.meaning import Meaning
+
+    flaw = Flaw("decision/differs", "it decides otherwise")
+    monkeypatch.setattr(Meaning, "check", lambda self, record: flaw if record.seq == 4 else None)
+    assert slugs(judge(good)) == ["derive"]
+
+
+def test_a_fault_of_the_runtime(good: ScenarioFlown) -> None:
+    assert slugs(judge(replace(good, fault="ZeroDivisionError"))) == ["fault"]
+
+
+def test_every_slug_has_a_test() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert all(f'"{slug}"' in text for slug in SLUGS)

@@ -1,0 +1,40 @@
+"""Flights of scenarios with the keys of the tests."""
+
+from rtshcua.model.faults import Fault
+from rtshcua.model.scenario import AtTime, Expectation, Expected, Incident, Scenario, Start, When
+from rtshcua.simulation.config import SimulationConfig
+from rtshcua.virtual.fitting import fitting
+from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.scenario import Keys, fly
+from rtshcua.wire.keys import Duty
+from virtual import case
+
+CALM = Start()
+KEYS = Keys(case.KEYS[Duty.LOG], case.KEYS[Duty.APPROVAL], case.KEYS[Duty.MISSION])
+
+
+def incident(at_s: float, fault: Fault) -> Incident:
+    """A fault at a time."""
+    return when(AtTime(int(at_s * case.S), int(at_s * case.S)), fault)
+
+
+def when(time: When, fault: Fault) -> Incident:
+    """A fault at whatever time."""
+    return Incident(time, fault, repr(fault))
+
+
+def scenario(*incidents: Incident, start: Start = CALM, expects: tuple[Expected, ...] = ()) -> Scenario:
+    """A scenario of these incidents."""
+    expectations = tuple(Expectation(what, repr(what), "test.rts", 0, 0) for what in expects)
+    return Scenario("tried", ("px4", "ardupilot"), 1, 1, start, incidents, expectations)
+
+
+def fast(*arguments: object, **fields: object) -> SimulationConfig:
+    """A vehicle that fits, and soon is down."""
+    return fitting(*arguments, return_mm=16 * case.M, land_mm_s=case.LAND_MM_S, **fields)  # type: ignore[arg-type]
+
+
+def flown(of: Scenario, flavour: str = "px4", *, bundle: bytes | None = None, seed: int = 1) -> ScenarioFlown:
+    """A flight of it: up, a leg, and home, unless another bundle is given."""
+    flies = case.seal(case.mission(case.low_steps())) if bundle is None else bundle
+    return fly(flies, case.root()[1], KEYS, of, flavour, seed, chosen=fast)

@@ -19,6 +19,8 @@ from collections.abc import Callable, Iterator
 from math import hypot
 from typing import Final, NamedTuple
 
+import msgspec
+
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Way
 from rtshcua.virtual.flown import Happened, Sample, ScenarioFlown
@@ -84,23 +86,23 @@ class Excuses:
                 return failure._replace(cause=cause)
         return failure
 
-    def delay_us(self, from_us: int, to_us: int) -> int:
+    def delay_us(self, from_us: int, to_us: int, *, silences: bool = False) -> int:
         """How much later than on a good link something may have come between two moments, in one direction: what the
-        link adds, or holds back, and how long nobody read.
+        link adds, or holds back, and how long nobody read. With `silences` also how long nothing came at all.
         """
         total = 0
         for fault in self._during(from_us, to_us):
             match fault:
-                case faults.LinkDelay(_, delay_us):
-                    total += delay_us
-                case faults.LinkJitter(_, jitter_us):
-                    total += jitter_us
+                case faults.LinkDelay(delay_us=added_us) | faults.LinkJitter(jitter_us=added_us):
+                    total += added_us
+                case faults.StaleSource(delay_us=added_us):
+                    total += added_us
                 case faults.LinkReorder():
                     total += _REORDER_US
+                case faults.LinkSilence(held=held) if not held and not silences:
+                    pass
                 case faults.LinkSilence(at_us, for_us) | faults.Stall(at_us, for_us) | faults.HostStall(at_us, for_us):
                     total += min(for_us or _FOREVER, to_us - at_us)
-                case faults.StaleSource(_, delay_us):
-                    total += delay_us
         return total
 
     # -------------------------------------------------------- what happened before
@@ -240,9 +242,7 @@ class Excuses:
         pillars = [fault for fault in self._before(failure.at_us, faults.Pillar) if isinstance(fault, faults.Pillar)]
         if not pillars:
             return None
-        policy = self._flown.policy
-        ranged = any(source.message in _RANGES for signal in policy.signals for source in signal.sources)
-        if not ranged or failure.amount < _STANDS_MM_S:
+        if not self._looks_out(failure.at_us) or failure.amount < _STANDS_MM_S:
             return "obstacle"
         if any(fault.message in _RANGES for fault in self._before(failure.at_us, faults.MessageStuck)):  # type: ignore[attr-defined]
             return "obstacle"
@@ -253,6 +253,22 @@ class Excuses:
         if newest.speed_mm_s or (away is not None and away <= self._stop_mm(newest.at_us, failure.at_us) + 2_000):
             return "obstacle"
         return None
+
+    def _looks_out(self, at_us: int) -> bool:
+        """Whether the skill that flew read a signal of what is ahead: where none does, nothing could be done."""
+        policy = self._flown.policy
+        slots = {
+            slot for signal in policy.signals for slot in signal.slots
+            if any(source.message in _RANGES for source in signal.sources)
+        }  # fmt: skip
+        skill = None
+        for life in self._flown.lives:
+            for line in life.lines:
+                if b'"event":"dispatched"' in line:
+                    record = msgspec.json.decode(line)
+                    if record["at_us"] - self._flown.start_us <= at_us:
+                        skill = record["detail"]
+        return any(contract.name == skill and slots & set(contract.reads) for contract in policy.contracts)
 
     def _next_distance(self, at_us: int) -> int | None:
         for sample in self._flown.samples:

@@ -34,11 +34,13 @@ class Sample(NamedTuple):
     """`pilot` or `failsafe`."""
 
 
-class Arrived(NamedTuple):
-    """A frame of ours that the vehicle received, and when it was sent."""
+class Frame(NamedTuple):
+    """A frame of ours: when it was sent, and when the vehicle obeyed or refused it. None: it never got there, or it was
+    nothing to obey.
+    """
 
-    at_us: int
     sent_us: int
+    heard_us: int | None
     octets: bytes
 
 
@@ -88,7 +90,8 @@ class ScenarioFlown:
     lives: tuple[Life, ...]
     happened: tuple[Happened, ...]
     samples: tuple[Sample, ...]
-    arrived: tuple[Arrived, ...]
+    frames: tuple[Frame, ...]
+    """All that were sent, in their order."""
     ended_us: int
     """When the last process ended; what came after it, the vehicle did alone."""
     left: str | None

@@ -19,7 +19,7 @@ whether their decisions are derived again; what the logs say is then held agains
 A failure that physics does not allow to prevent is an *exception* instead, with its `cause` (`excuses`).
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -35,7 +35,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
 from rtshcua.virtual.excuses import Excuses, Failure
-from rtshcua.virtual.flown import Arrived, Life, Sample, ScenarioFlown
+from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
 
 SLUGS: Final = (
     "outside-fence", "collision", "motion-after-takeover", "not-ended", "late", "log", "derive", "unlogged-effect",
@@ -60,7 +60,7 @@ class Margins:
     stop_us: int | None = None
     """The longest time from what caused a fallback to the first frame of it."""
     takeover_us: int | None = None
-    """The longest time from a takeover to a frame that moves the vehicle; it may have been sent before."""
+    """The longest time from a takeover to a frame that was sent and moves the vehicle."""
     ended_us: int | None = None
     """How long the vehicle went on after the last process had ended."""
 
@@ -306,12 +306,12 @@ def _moves(message: Any, name: str, flavour: str) -> frozenset[MotionKind] | Non
     return None if message.command in _ASKS else frozenset()
 
 
-Motion = Sequence[tuple[Arrived, frozenset[MotionKind]]]
+Motion = Sequence[tuple[Frame, frozenset[MotionKind]]]
 """Frames that move the vehicle, in the order in which they were sent, and what each can be a part of."""
 
 
 def _motion(flown: ScenarioFlown) -> Motion:
-    read = ((frame, moves(frame.octets, flown.flavour)) for frame in flown.arrived)
+    read = ((frame, moves(frame.octets, flown.flavour)) for frame in flown.frames)
     return sorted(((frame, kinds) for frame, kinds in read if kinds is not None), key=lambda each: each[0].sent_us)
 
 
@@ -324,19 +324,19 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     found, latest = list[Failure](), None
     within_us = MODE_WITHIN_US[flown.flavour] + flown.tick_us + flown.wait_us
     for frame, _ in motion:
-        at = bisect_right(times, frame.at_us) - 1
-        since_us = flown.samples[at].taken_over_us if at >= 0 else None
-        if since_us is None or frame.at_us <= since_us:
+        at = bisect_left(times, frame.sent_us)
+        since_us = flown.samples[at].taken_over_us if at < len(times) else None
+        if since_us is None or frame.sent_us <= since_us:
             continue
-        latest = max(latest or 0, frame.at_us - since_us)
         after_us = frame.sent_us - since_us
+        latest = max(latest or 0, after_us)
         if after_us > within_us + excuses.delay_us(since_us, frame.sent_us):
             text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
-            found.append(Failure("motion-after-takeover", frame.at_us, text, after_us))
+            found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us))
     return found, latest
 
 
-def _name(frame: Arrived) -> str:
+def _name(frame: Frame) -> str:
     message = dialect.MAVLink(None).decode(bytearray(frame.octets))
     number = getattr(message, "command", None)
     known = dialect.enums["MAV_CMD"].get(number) if number is not None else None
@@ -359,7 +359,7 @@ def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
                 continue  # nothing had to be sent, or could be
             took_us = first_us - reaction.heard_us
             latest = max(latest or 0, took_us)
-            if took_us > within_us + 2 * excuses.delay_us(reaction.heard_us, first_us):
+            if took_us > within_us + 2 * excuses.delay_us(reaction.heard_us, first_us, silences=True):
                 text = (
                     f"a fallback took {took_us / 1e6:.3f} s to its first frame; {within_us / 1e6:.3f} s are the bound"
                 )
@@ -382,7 +382,7 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
                     yield from _in_time(flown, first, decided[ref])
 
 
-def _in_time(flown: ScenarioFlown, first: Arrived, decision: dict[str, Any]) -> Iterator[Failure]:
+def _in_time(flown: ScenarioFlown, first: Frame, decision: dict[str, Any]) -> Iterator[Failure]:
     if decision["at_us"] > first.sent_us + flown.start_us:
         return
     after_us = first.sent_us - (decision["valid_until_us"] - flown.start_us)

@@ -38,7 +38,7 @@ from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.flight import MemorySink, VirtualFlight
-from rtshcua.virtual.flown import Arrived, Happened, Life, Reaction, Sample, ScenarioFlown
+from rtshcua.virtual.flown import Frame, Happened, Life, Reaction, Sample, ScenarioFlown
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire import cose
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
@@ -112,13 +112,21 @@ class _Watched(Simulation):
     def __init__(self, config: SimulationConfig) -> None:
         super().__init__(config)
         self.samples: list[Sample] = []
-        self.arrived: list[Arrived] = []
-        self.sent: dict[bytes, int] = {}
+        self.frames: list[Frame] = []
+        self._sent: dict[bytes, int] = {}  # the number of the last frame of these octets
         self._due_us = 0
-        self.heard = self._note
+        self.heard = self._hear
 
-    def _note(self, at_us: int, frame: bytes) -> None:
-        self.arrived.append(Arrived(at_us, self.sent.get(frame, at_us), frame))
+    def send(self, frame: bytes) -> bool:
+        """Note that a frame is sent; that none is lost by us."""
+        self._sent[frame] = len(self.frames)
+        self.frames.append(Frame(self._now_us, None, frame))
+        return False
+
+    def _hear(self, at_us: int, frame: bytes) -> None:
+        number = self._sent.pop(frame, None)
+        if number is not None:
+            self.frames[number] = self.frames[number]._replace(heard_us=at_us)
 
     def advance(self, to_us: int) -> list[bytes]:
         """As the simulation does it, and no sample is left out."""
@@ -201,12 +209,7 @@ class _Flight:
 
     def _connect(self, vehicle: VirtualVehicle, world: _Watched) -> None:
         vehicle.simulation = world
-
-        def note(frame: bytes) -> bool:
-            world.sent[frame] = vehicle.clock.elapsed_us
-            return False
-
-        vehicle.lose = note
+        vehicle.lose = world.send
 
     # -------------------------------------------------------- what happens when
 
@@ -497,7 +500,7 @@ class _Flight:
             lives=tuple(self._lives),
             happened=tuple(sorted((each for each in self._happened if each.at_us <= last_us), key=lambda h: h.at_us)),
             samples=tuple(self._world.samples),
-            arrived=tuple(self._world.arrived),
+            frames=tuple(self._world.frames),
             ended_us=ended_us,
             left=left,
             fault=fault,

@@ -4,29 +4,18 @@ Flights of a round are drawn by what all rounds before it found, and by nothing 
 however many workers fly it, in whatever order they come back, and wherever it was interrupted.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from rtshcua.campaign.drawing import Drawn, Space, draw
 from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.results import Result, tally
+from rtshcua.campaign.workers import Workers
 
 #: flights of a round; the first is small, for it knows nothing of the mission
 FIRST: Final = 20
 ROUND: Final = 100
-
-
-class Workers(Protocol):
-    """Whoever flies; the results come as they are there."""
-
-    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
-        """Flies these."""
-        ...
-
-    def close(self) -> None:
-        """Lets them go."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,14 +18,7 @@ from rtshcua.wire.keys import Duty
 
 #: a flight in which a process died
 LOST: Final = "process-died"
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """What all flights of a campaign share: the bundle, and the trust root that it is signed under (`development`)."""
-
-    bundle: bytes
-    root: bytes
+DIED: Final = "the process that flew it died, and the next one too"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,58 +30,52 @@ class Flight:
     tries: tuple[tuple[str, str], ...] = ()
 
 
-def flown(field: Field, scenario: Scenario) -> ScenarioFlown:
-    """The first flight of a scenario: of its first flavour and seed."""
-    made = development.keys()
-    keys = Keys(log=made[Duty.LOG], approval=made[Duty.APPROVAL], mission=made[Duty.MISSION])
-    return fly(field.bundle, field.root, keys, scenario, scenario.flavours[0], scenario.first_seed)
+@dataclass(frozen=True, slots=True)
+class Field:
+    """What all flights of a campaign share: the bundle, and the trust root that it is signed under (`development`)."""
 
+    bundle: bytes
+    root: bytes
 
-def fly_one(field: Field, flight: Flight) -> Result:
-    """The flight, judged."""
-    began = process_time_ns()
-    was = flown(field, flight.scenario)
-    verdict = judge(was)
-    log = sha256()
-    for life in was.lives:
-        for line in life.lines:
-            log.update(line)
-    return Result(
-        flight.number,
-        was.flavour,
-        was.seed,
-        tuple(incident.text for incident in flight.scenario.incidents),
-        flight.tries,
-        was.ending or "none",
-        tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
-        tuple(Failed(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
-        {name: value for name, value in asdict(verdict.margins).items() if value is not None},
-        tuple(moments(was)),
-        was.samples[-1].at_us,
-        log.hexdigest(),
-        (process_time_ns() - began) // 1_000,
-    )
+    def flown(self, scenario: Scenario, flavour: str, seed: int) -> ScenarioFlown:
+        """A flight of a scenario, as it was."""
+        made = development.keys()
+        keys = Keys(log=made[Duty.LOG], approval=made[Duty.APPROVAL], mission=made[Duty.MISSION])
+        return fly(self.bundle, self.root, keys, scenario, flavour, seed)
 
+    def fly(self, flight: Flight) -> Result:
+        """The flight, judged."""
+        began = process_time_ns()
+        scenario = flight.scenario
+        was = self.flown(scenario, scenario.flavours[0], scenario.first_seed)
+        verdict = judge(was)
+        log = sha256()
+        for life in was.lives:
+            for line in life.lines:
+                log.update(line)
+        return Result(
+            flight.number,
+            was.flavour,
+            was.seed,
+            tuple(incident.text for incident in scenario.incidents),
+            flight.tries,
+            was.ending or "none",
+            tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
+            tuple(Failed(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
+            {name: value for name, value in asdict(verdict.margins).items() if value is not None},
+            tuple(moments(was)),
+            was.samples[-1].at_us,
+            log.hexdigest(),
+            (process_time_ns() - began) // 1_000,
+        )
 
-def lost(flight: Flight) -> Result:
-    """The flight, when the process that flew it died, more than once."""
-    scenario = flight.scenario
-    failed = Failed(LOST, "the process that flew it died, and the next one too")
-    texts = tuple(incident.text for incident in scenario.incidents)
-    return Result(
-        flight.number,
-        scenario.flavours[0],
-        scenario.first_seed,
-        texts,
-        flight.tries,
-        "none",
-        (failed,),
-        (),
-        {},
-        (),
-        0,
-        "",
-    )
+    def lost(self, flight: Flight) -> Result:
+        """The flight, when the process that flew it died, more than once."""
+        scenario = flight.scenario
+        flavour, seed = scenario.flavours[0], scenario.first_seed
+        failed = Failed(LOST, DIED)
+        texts = tuple(incident.text for incident in scenario.incidents)
+        return Result(flight.number, flavour, seed, texts, flight.tries, "none", (failed,), (), {}, (), 0, "")
 
 
 def moments(was: ScenarioFlown) -> Iterator[tuple[str, int]]:

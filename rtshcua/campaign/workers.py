@@ -1,4 +1,4 @@
-"""Who flies a campaign's flights: the cores of this machine, or (extra `cluster`) the workers of a Dask scheduler.
+"""Who flies many flights: the cores of this machine, or (extra `cluster`) the workers of a Dask scheduler.
 
 A worker that dies takes no flight with it: it is flown again, by another. Only a flight that a process died of twice is
 given up, and counts as a failure.
@@ -11,10 +11,46 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing import get_context
-from typing import Any, Final
+from typing import Any, Final, Protocol, TypeVar
 
-from rtshcua.campaign.flights import Field, Flight, fly_one, lost
-from rtshcua.campaign.results import Result
+F = TypeVar("F", bound="Numbered")
+R = TypeVar("R", bound="Numbered")
+F_contra = TypeVar("F_contra", bound="Numbered", contravariant=True)
+R_co = TypeVar("R_co", bound="Numbered", covariant=True)
+
+
+class Numbered(Protocol):
+    """A flight, or what came of it."""
+
+    @property
+    def number(self) -> int:
+        """Which one of those that are to be flown."""
+        ...
+
+
+class Work(Protocol[F_contra, R_co]):
+    """How flights are flown; it goes to another process, or another machine, with each of them."""
+
+    def fly(self, flight: F_contra) -> R_co:
+        """Fly one."""
+        ...
+
+    def lost(self, flight: F_contra) -> R_co:
+        """What is to be said of one whose process died, more than once."""
+        ...
+
+
+class Workers(Protocol):
+    """Whoever flies; what comes of flights comes as it is there."""
+
+    def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
+        """Flies these."""
+        ...
+
+    def close(self) -> None:
+        """Lets them go."""
+        ...
+
 
 #: how often a process may die while it flies a flight
 _MOST_DEATHS: Final = 2
@@ -23,9 +59,9 @@ _MOST_DEATHS: Final = 2
 class Here:
     """This process alone."""
 
-    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+    def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
         """Flies these, one after the other."""
-        return (fly_one(field, flight) for flight in flights)
+        return (work.fly(flight) for flight in flights)
 
     def close(self) -> None:
         """There is nobody to let go."""
@@ -38,7 +74,7 @@ class Processes:
         self._jobs = jobs or cores()
         self._pool: ProcessPoolExecutor | None = None
 
-    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+    def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
         """Flies these, all at once."""
         left = {flight.number: flight for flight in flights}
         deaths = 0
@@ -46,7 +82,7 @@ class Processes:
             # After a death nobody knows which flight it was: they are flown one by one until it dies again.
             together = list(left.values()) if not deaths else list(left.values())[:1]
             try:
-                for result in self._all(field, together):
+                for result in self._all(work, together):
                     del left[result.number]
                     yield result
                 deaths = 0 if len(together) > 1 else deaths
@@ -55,13 +91,13 @@ class Processes:
                 deaths += 1
                 if deaths > _MOST_DEATHS and len(together) == 1:
                     del left[together[0].number]
-                    yield lost(together[0])
+                    yield work.lost(together[0])
                     deaths = 0
 
-    def _all(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+    def _all(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(self._jobs, mp_context=get_context("spawn"), initializer=_quiet)
-        futures = [self._pool.submit(fly_one, field, flight) for flight in flights]
+        futures = [self._pool.submit(work.fly, flight) for flight in flights]
         try:
             for future in as_completed(futures):
                 yield future.result()
@@ -93,14 +129,14 @@ class Cluster:
         except (OSError, ValueError):
             raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
 
-    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+    def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
         """Flies these; one whose worker is lost is given to another."""
         from distributed import KilledWorker, as_completed  # noqa: PLC0415
 
         by_key = {}
         futures = []
         for flight in flights:
-            future = self._client.submit(fly_one, field, flight, pure=False, retries=_MOST_DEATHS)
+            future = self._client.submit(work.fly, flight, pure=False, retries=_MOST_DEATHS)
             by_key[future.key] = flight
             futures.append(future)
         try:
@@ -108,7 +144,7 @@ class Cluster:
                 try:
                     yield future.result()
                 except KilledWorker:
-                    yield lost(by_key[future.key])
+                    yield work.lost(by_key[future.key])
         finally:
             self._client.cancel(futures)
 

@@ -14,14 +14,14 @@ import typer
 
 from rtshcua import __version__, library
 from rtshcua.campaign import campaign as flying
-from rtshcua.campaign.campaign import Order, Workers
+from rtshcua.campaign.campaign import Order
 from rtshcua.campaign.drawing import FLAVOURS, Space
-from rtshcua.campaign.flights import Field, Flight, fly_one
+from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.folder import Folder, Identity
 from rtshcua.campaign.results import Result
 from rtshcua.campaign.shrinking import shrink
 from rtshcua.campaign.summary import Summary, as_json, summarise
-from rtshcua.campaign.workers import Cluster, Here, Processes, cores
+from rtshcua.campaign.workers import Cluster, Here, Processes, Workers, cores
 from rtshcua.campaign.written import scenario_text
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
@@ -158,7 +158,7 @@ def _space(
     """What is drawn from: how long the mission takes where nothing goes wrong, on each kind of autopilot."""
     lasts = {}
     for each in flavours:
-        calm = fly_one(field, Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), (), ())))
+        calm = field.fly(Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), (), ())))
         if calm.failures:
             first = calm.failures[0]
             help = "see it with `rtshcua run`; a campaign looks for what faults do to a flight that is good without"
@@ -194,7 +194,7 @@ def _shrink(
 
         def still(candidate: Scenario, slug: str = slug, number: int = number) -> bool:
             progress.shrinks(slug)
-            return any(each.slug == slug for each in fly_one(field, Flight(number, candidate)).failures)
+            return any(each.slug == slug for each in field.fly(Flight(number, candidate)).failures)
 
         small, _ = shrink(scenario, order.space.skills, still)
         failed = next(each for each in wanted[number].failures if each.slug == slug)

@@ -10,6 +10,7 @@ from rtshcua.adapters.store.writing import write_out
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import SPECIFICATION, unfolded
+from rtshcua.cli.testing.flown import flown_json, flown_suites
 from rtshcua.cli.testing.generating import Wanted, generate
 from rtshcua.cli.testing.running import Results, run_all
 from rtshcua.cli.testing.told import Told
@@ -55,7 +56,7 @@ def run_tests(
     config: Annotated[Path | None, typer.Option(help="the configuration, in place of the nearest")] = None,
     isolated: Annotated[bool, typer.Option("--isolated", help="without any configuration")] = False,
 ) -> ExitCode:
-    """Run the `test` blocks of sources, and say what of their policies they cover.
+    """Run the `test` blocks of sources, fly their scenarios in virtual time, and say what of their policies they cover.
 
     A file's tests run where the file itself is asked for, not where it is imported. What fails is shown with the clause
     that decided, and the nearest value that would have met what was expected. Coverage counts clauses and outcomes,
@@ -80,7 +81,7 @@ def run_tests(
     if refused is not None:
         return findings.end(refused)
     least = fail_under if fail_under is not None else _least(paths or [Path()], projects)
-    results = run_all(files, chosen, with_coverage=coverage or least is not None)
+    results = run_all(files, chosen, with_coverage=coverage or least is not None, quiet=as_json)
     return _finish(results, findings, least, junit_file, verbose=verbose, quiet=as_json)
 
 
@@ -113,32 +114,36 @@ def _finish(
     results: Results, findings: Findings, least: int | None, junit_file: Path | None, *, verbose: bool, quiet: bool
 ) -> ExitCode:
     """Say what was found, write the report, and end."""
-    ran, covered = results.ran, results.covered
+    ran, flown, covered = results.ran, results.flown, results.covered
     refused = None if junit_file is None else refusal(junit_file, results.sources, _REPORT)
     if refused is not None:
         return findings.end(refused)
     told = Told(results.sources)
     if not quiet:
-        for line in told.tests(ran, verbose=verbose):
+        for line in (*told.tests(ran, verbose=verbose), *told.scenarios(flown, verbose=verbose)):
             print(line)
     failed = tuple(each.finding for each in ran if each.finding is not None)
+    failed += tuple(finding for each in flown for finding in each.findings)
     findings.report((*results.diagnostics, *failed), results.sources)
     if junit_file is not None:
-        write_out(junit_file, junit(suites(ran, results.sources, covered)).encode())
+        write_out(
+            junit_file, junit((*suites(ran, results.sources, covered), *flown_suites(flown, results.sources))).encode()
+        )
     code = exit_code(results.diagnostics) if has_errors(results.diagnostics) else ExitCode.OK
     short = covered is not None and least is not None and not enough([one.coverage for one in covered], least)
-    if code is ExitCode.OK and (failed or not ran or short):
+    if code is ExitCode.OK and (failed or not (ran or flown) or short):
         code = ExitCode.TESTS
     if not quiet:
         for line in told.coverage(covered or (), verbose=verbose):
             print(line)
-        print(told.summary(ran, results.left_out) if ran else _none(results))
+        print(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
         if short:
             print(f"less than {least} % is covered")
     shares = None if covered is None else coverage_json(covered, results.sources)
     return findings.finish(
         code,
         tests=tests_json(ran, results.sources),
+        scenarios=flown_json(flown, results.sources),
         summary=summary_json(ran) | {"left_out": results.left_out},
         coverage=None if shares is None else shares | {"least": least, "enough": not short},
     )

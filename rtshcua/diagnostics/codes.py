@@ -298,4 +298,5 @@ NO_SUCH_STEP = _code("E1605", "no-such-step", "a fault waits for a step that the
 BAD_TRIGGER = _code("E1606", "bad-trigger", "a fault waits for a condition over time, or for a phase")
 UNREAD_TRIGGER = _code("E1607", "unread-trigger", "a fault waits for what the mission's policy does not read")
 BAD_START = _code("E1608", "bad-start", "a scenario starts with what no flight starts with")
+FLIGHT_FAILED = _code("E1610", "flight-failed", "a flight of a scenario fails, or is not what was expected")
 NO_SUCH_ROLE = _code("E1609", "no-such-role", "somebody answers for a role that the mission's policy does not know")

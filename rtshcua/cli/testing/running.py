@@ -1,8 +1,8 @@
-"""Runs the tests of files: each file is a program of its own with what it imports, and its own tests run."""
+"""Runs the tests and flies the scenarios of files: each file is a program of its own with what it imports."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from rtshcua.cli.progress import watched
 from rtshcua.cli.sources import Reading, examine, read_sources
@@ -13,16 +13,25 @@ from rtshcua.ground.language.paths import shown
 from rtshcua.ground.testing.case import Case, Suite, Tested
 from rtshcua.ground.testing.coverage.tally import Covered, Tally
 from rtshcua.ground.testing.run import Ran, run_case
+from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.suite import scenarios as scenarios_of
 from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 
+if TYPE_CHECKING:
+    from rtshcua.cli.testing.flying import Flown
+
+#: when missions of scenarios are issued, unless they say it: a Monday in June, 10:00 UTC
+ISSUED_AT_US: Final = 1_780_308_000_000_000
+
 
 class Results(NamedTuple):
-    """What was run, in the order of the files and their text; what is wrong with sources, each finding once; the texts;
-    the coverage, where it was asked for; and how many cases there are that were not chosen.
+    """What was run and flown, in the order of the files and their text; what is wrong with sources, each finding once;
+    the texts; the coverage, where it was asked for; and how many cases and scenarios there are that were not chosen.
     """
 
     ran: tuple[Ran, ...]
+    flown: tuple["Flown", ...]
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
     covered: tuple[Covered, ...] | None
@@ -36,14 +45,17 @@ class _Work(NamedTuple):
     reading: Reading
 
 
-def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool) -> Results:
-    """Run the cases whose name has `chosen` in it, in whatever case; empty: all."""
+def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: bool) -> Results:
+    """Run the cases and fly the scenarios whose name has `chosen` in it, in whatever case; empty: all. `quiet`: nothing
+    is shown meanwhile.
+    """
     work = [_Work(shown(str(path)), read_sources([path])) for path in files]
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
     ran: list[Ran] = []
     tally = Tally() if with_coverage else None
     left_out = 0
+    scenarios: list[ScenarioFlight] = []
     tested: set[tuple[str, int]] = set()  # where policies are declared that some test is under
     for each in watched(work):
         made = _suite(each.reading)
@@ -55,6 +67,13 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool) -> Resul
         tested |= {_declared(one) for one in made.policies}
         _count_policies(tally, made.policies, each.reading)
         ran += [_run(case, tally) for case in cases]
+        of_file = _scenarios(each.reading, found, sources)
+        named = [one for one in of_file if chosen.casefold() in one.scenario.name.casefold()]
+        left_out += len(of_file) - len(named)
+        tested |= {_declared(one.policy) for one in of_file}
+        _count_policies(tally, [one.policy for one in of_file], each.reading)
+        scenarios += named
+    flown = tuple(_fly(scenarios, tally, quiet=quiet)) if scenarios else ()
     if tally is not None:
         for each in work:
             policies, wrong = _untested(each, tested)
@@ -63,7 +82,7 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool) -> Resul
                 found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
         sources |= tally.sources
     covered = None if tally is None else tally.all()
-    return Results(tuple(ran), tuple(found.values()), sources, covered, left_out)
+    return Results(tuple(ran), flown, tuple(found.values()), sources, covered, left_out)
 
 
 def _suite(reading: Reading) -> Suite:
@@ -74,6 +93,29 @@ def _suite(reading: Reading) -> Suite:
     if not program.units or not program.units[0].tests:
         return Suite((), program.diagnostics if has_errors(program.diagnostics) else (), sources=program.sources)
     return suite(program, dialect.load())
+
+
+def _scenarios(
+    reading: Reading, found: dict[tuple[object, ...], Diagnostic], sources: dict[str, Source]
+) -> tuple[ScenarioFlight, ...]:
+    """The scenarios of a program's first file; what is wrong with the program is added to `found`."""
+    program = reading.program
+    if not program.units or not program.units[0].scenarios:
+        return ()
+    made = scenarios_of(program, dialect.load(), ISSUED_AT_US)
+    sources |= {**program.sources, **made.sources}
+    for diagnostic in made.diagnostics:
+        found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+    return made.found
+
+
+def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: bool) -> Iterator["Flown"]:
+    from rtshcua.cli.testing.flying import Flying  # the simulated vehicle is behind it
+
+    for flown in Flying(with_coverage=tally is not None, quiet=quiet).fly(scenarios):
+        if tally is not None:
+            tally.flights(flown.scenario.policy, [one for flight in flown.flights for one in flight.reached])
+        yield flown
 
 
 def _run(case: Case, tally: Tally | None) -> Ran:

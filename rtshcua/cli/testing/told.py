@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from rtshcua.cli.shown import many, plain, shorten
 from rtshcua.diagnostics.span import Source, Span
@@ -12,6 +13,9 @@ from rtshcua.ground.testing.coverage.tally import Covered
 from rtshcua.ground.testing.coverage.universe import Goal
 from rtshcua.ground.testing.report import named, summary_json, told
 from rtshcua.ground.testing.run import Ran
+
+if TYPE_CHECKING:
+    from rtshcua.cli.testing.flying import Flown
 
 _GREEN, _RED, _BOLD, _END = "\033[32m", "\033[1;31m", "\033[1m", "\033[0m"
 _WIDTH = 100
@@ -35,6 +39,19 @@ class Told:
                 if verbose and cases[0].case.row is not None:
                     yield from (f"      {self._word(each.met)}  {plain(_row(each))}" for each in cases)
 
+    def scenarios(self, flown: Sequence["Flown"], *, verbose: bool) -> Iterator[str]:
+        """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
+        for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
+            yield self._painted(plain(file), _BOLD)
+            for each in of_file:
+                flights = many(len(each.flights), "flight")
+                counted = f"{each.failed} of {flights}" if each.failed else flights
+                yield f"  {self._word(not each.failed)}  {plain(each.scenario.scenario.name)} ({counted})"
+                if verbose:
+                    yield "      " + ", ".join(f"{count} {ending}" for ending, count in each.endings.items())
+                    excused = sorted({text for flight in each.flights for text in flight.excused})
+                    yield from (f"      excused: {text}" for text in excused)
+
     def coverage(self, covered: Sequence[Covered], *, verbose: bool) -> Iterator[str]:
         """What is missing, clause by clause; with `verbose` also what is not."""
         for one in covered:
@@ -43,15 +60,20 @@ class Told:
             reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
             yield f"\ncoverage of all: {share(reached, total)}, {reached} of {total}"
 
-    def summary(self, ran: Sequence[Ran], left_out: int) -> str:
+    def summary(self, ran: Sequence[Ran], flown: Sequence["Flown"], left_out: int) -> str:
         """How many there were, and how they ended."""
         found = summary_json(ran)
-        counted = many(found["tests"], "test")
+        counts = [many(found["tests"], "test")] if ran or not flown else []
         if found["cases"] != found["tests"]:
-            counted += f", {many(found['cases'], 'case')}"
-        ended = f"{found['failed']} failed" if found["failed"] else "all passed"
+            counts.append(many(found["cases"], "case"))
+        if flown:
+            counts.append(many(len(flown), "scenario"))
+            counts.append(many(sum(len(each.flights) for each in flown), "flight"))
+        counted = ", ".join(counts)
+        failed = found["failed"] + sum(bool(each.failed) for each in flown)
+        ended = f"{failed} failed" if failed else "all passed"
         others = f"; {many(left_out, 'case')} not chosen" if left_out else ""
-        return self._painted(f"{counted}: {ended}", _RED if found["failed"] else _GREEN) + others
+        return self._painted(f"{counted}: {ended}", _RED if failed else _GREEN) + others
 
     def _line(self, cases: Sequence[Ran]) -> str:
         failed = sum(not each.met for each in cases)

@@ -23,7 +23,7 @@ from rtshcua.ground.testing.clauses import quotes
 from rtshcua.model.faults import Approval, Disapproval, Fault, WindStep
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
-from rtshcua.model.flat.policy import Airspace, Policy, Rule
+from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.scenarios import (
@@ -82,7 +82,7 @@ class ScenarioFlight:
 
     declaration: ScenarioDecl
     scenario: Scenario
-    policy: Policy
+    policy: Tested
     mission: Mission
 
 
@@ -110,7 +110,7 @@ def scenarios_of(
         if under is not None:
             scenario = _Lowering(context, under, names).scenario(declaration)
             if scenario is not None:
-                yield ScenarioFlight(declaration, scenario, under.policy.lowered.policy, under.mission)
+                yield ScenarioFlight(declaration, scenario, under.policy, under.mission)
 
 
 class _Lowering:

@@ -8,10 +8,10 @@ from random import Random
 
 import pytest
 
-from rtshcua.campaign import campaign, workers
+from rtshcua.campaign import campaign
 from rtshcua.campaign.campaign import FIRST, ROUND, Order, drawn, fly, rounds
 from rtshcua.campaign.drawing import Space
-from rtshcua.campaign.flights import LOST, Field, Flight, lost
+from rtshcua.campaign.flights import LOST, Field, Flight
 from rtshcua.campaign.results import Failed, Result, line, read, tally
 from rtshcua.campaign.workers import Here, Processes
 
@@ -112,15 +112,41 @@ def test_what_was_seen_is_counted_by_kind_and_moment() -> None:
 # ------------------------------------------------------------------------------ processes
 
 
-def _dies_once(field: Field, flight: Flight) -> Result:
-    mark = Path(field.root.decode())
+class Nothing(Field):
+    """Flies nothing."""
+
+    __slots__ = ()
+
+    def fly(self, flight: Flight) -> Result:
+        return result(flight)
+
+
+class DiesOnce(Nothing):
+    """Flight 3 kills its process, unless there is a file of that name."""
+
+    __slots__ = ()
+
+    def fly(self, flight: Flight) -> Result:
+        return _dies_once(Path(self.root.decode()), flight)
+
+
+class DiesAlways(Nothing):
+    """Flight 3 kills its process."""
+
+    __slots__ = ()
+
+    def fly(self, flight: Flight) -> Result:
+        return _dies_always(flight)
+
+
+def _dies_once(mark: Path, flight: Flight) -> Result:
     if flight.number == 3 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return result(flight)
 
 
-def _dies_always(field: Field, flight: Flight) -> Result:
+def _dies_always(flight: Flight) -> Result:
     if flight.number == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return result(flight)
@@ -130,26 +156,21 @@ def few() -> list[Flight]:
     return [Flight(number, drawn(ORDER, number, {}).scenario) for number in range(5)]
 
 
-def test_a_flight_whose_process_died_is_flown_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(workers, "fly_one", _dies_once)
+def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
     processes = Processes(1)
-    flown = list(processes.fly(Field(b"", str(tmp_path / "died").encode()), few()))
+    flown = list(processes.fly(DiesOnce(b"", str(tmp_path / "died").encode()), few()))
     processes.close()
     assert sorted(flown, key=lambda each: each.number) == [result(flight) for flight in few()]
 
 
-def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(workers, "fly_one", _dies_always)
+def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown() -> None:
     processes = Processes(1)
-    flown = sorted(processes.fly(FIELD, few()), key=lambda each: each.number)
+    flown = sorted(processes.fly(DiesAlways(b"", b""), few()), key=lambda each: each.number)
     processes.close()
-    assert flown == [lost(flight) if flight.number == 3 else result(flight) for flight in few()]
+    assert flown == [FIELD.lost(flight) if flight.number == 3 else result(flight) for flight in few()]
     assert flown[3].failures[0].slug == LOST
 
 
-def test_one_process_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "fly_one", lambda _, flight: result(flight))
-    assert list(Here().fly(FIELD, few())) == [result(flight) for flight in few()]
+def test_one_process_is_enough() -> None:
+    assert list(Here().fly(Nothing(b"", b""), few())) == [result(flight) for flight in few()]
     assert campaign.FIRST < campaign.ROUND

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from rtshcua import library
-from rtshcua.campaign import workers
-from rtshcua.campaign.flights import Field, Flight, fly_one
+from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.results import Failed, Result
-from rtshcua.cli import app, campaign
+from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.faults import GpsLoss
 
@@ -32,8 +31,7 @@ def flies(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Field, Flight]
     """Lets flights be flown in another way."""
 
     def put(fly: Callable[[Field, Flight], Result]) -> None:
-        monkeypatch.setattr(workers, "fly_one", fly)
-        monkeypatch.setattr(campaign, "fly_one", fly)
+        monkeypatch.setattr(Field, "fly", fly)
 
     return put
 
@@ -95,7 +93,7 @@ def fly_one_again(line: dict[str, Any]) -> Result:
     space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds)
     assert not hasattr(space, "slug")
     made = drawn(Order(begun["seed"], 4, space), line["number"], {})
-    return fly_one(field, Flight(line["number"], made.scenario, made.tries))
+    return field.fly(Flight(line["number"], made.scenario, made.tries))
 
 
 def test_it_goes_on_where_it_stopped(

@@ -52,6 +52,10 @@ class Tally:
         kept = self._kept[ran.case.policy.lowered.policy]
         kept.reached.append(reached(kept.universe, ran.case.invocation, ran.trace))
 
+    def flights(self, tested: Tested, reached: Iterable[Reached]) -> None:
+        """Count what the decisions of flights reached; their policy is counted."""
+        self._kept[tested.lowered.policy].reached.extend(reached)
+
     def all(self) -> tuple[Covered, ...]:
         """The coverage of each policy, in the order in which they came."""
         return tuple(Covered(coverage(kept.universe, kept.reached), kept.spans) for kept in self._kept.values())

@@ -1,0 +1,119 @@
+"""A scenario tried: each flight of it, judged, held against what it expects, and counted for what it covers."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from rtshcua.campaign.flights import DIED, LOST, Field
+from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import Decision
+from rtshcua.ground.testing.coverage.reached import reached
+from rtshcua.ground.testing.coverage.universe import Goal, universe
+from rtshcua.ground.why.recorded import context_of, now_of, state_of
+from rtshcua.ground.why.trace import trace
+from rtshcua.model.scenario import Scenario
+from rtshcua.virtual.expectations import expectations
+from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.judge import judge
+from rtshcua.wire.request import STEP
+
+#: of a failure that is no expectation's: its number among them
+JUDGED: Final = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Try:
+    """A flight of a scenario that is to be flown: on this kind of autopilot, with this seed."""
+
+    number: int
+    scenario: Scenario
+    flavour: str
+    seed: int
+
+
+class Wrong(NamedTuple):
+    """What is wrong with a flight: the number of an expectation, or `JUDGED` with the judge's slug; and in words."""
+
+    expectation: int
+    slug: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on."""
+
+    number: int
+    flavour: str
+    seed: int
+    ending: str
+    wrong: tuple[Wrong, ...]
+    excused: tuple[str, ...]
+    happened: tuple[str, ...]
+    reached: tuple[frozenset[tuple[int, Goal]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """How flights of scenarios of one mission are flown."""
+
+    field: Field
+    with_coverage: bool = False
+
+    def fly(self, flight: Try) -> Tried:
+        """One of them."""
+        was = self.field.flown(flight.scenario, flight.flavour, flight.seed)
+        verdict = judge(was)
+        wrong = [Wrong(JUDGED, each.slug, each.text) for each in verdict.failures]
+        wrong += [
+            Wrong(number, "expectation", each.found)
+            for number, each in enumerate(expectations(was, verdict))
+            if not each.met
+        ]
+        return Tried(
+            flight.number,
+            flight.flavour,
+            flight.seed,
+            was.ending or "none",
+            tuple(wrong),
+            tuple(f"{each.slug}: {each.cause}" for each in verdict.exceptions),
+            tuple(f"{each.at_us / 1_000_000:.2f} s {each.text}" for each in was.happened),
+            tuple(_reached(was)) if self.with_coverage else (),
+        )
+
+    def lost(self, flight: Try) -> Tried:
+        """One that no process survived."""
+        wrong = (Wrong(JUDGED, LOST, DIED),)
+        return Tried(flight.number, flight.flavour, flight.seed, "none", wrong, (), (), ())
+
+
+def tries(scenario: Scenario) -> Iterator[Try]:
+    """All flights of a scenario: each seed on each kind of autopilot."""
+    number = 0
+    for seed in range(scenario.first_seed, scenario.last_seed + 1):
+        for flavour in scenario.flavours:
+            yield Try(number, scenario, flavour, seed)
+            number += 1
+
+
+def _reached(was: ScenarioFlown) -> Iterator[frozenset[tuple[int, Goal]]]:
+    """What each decision on a step covers, as `rtshcua why` explains it from its record."""
+    policy = prepare(was.policy)
+    if isinstance(policy, Refusal):  # it was flown
+        return
+    invocations = prepare_mission(was.mission, policy)
+    if isinstance(invocations, Refusal):
+        return
+    goals = universe(policy)
+    for life in was.lives:
+        for line in life.lines:
+            record = read(line)
+            if isinstance(record, Flaw) or not isinstance(record, Decision) or record.kind != STEP:
+                continue
+            if record.step < len(invocations):
+                invocation = invocations[record.step]
+                found = trace(invocation, state_of(record), policy, context_of(record), now_of(record))
+                yield reached(goals, invocation, found)

@@ -19,31 +19,31 @@ POSITION = "GLOBAL_POSITION_INT"
 #: by its name, a fault of each kind
 EXAMPLES: dict[str, Callable[[int], Fault]] = {
     "battery": lambda at: faults.BatteryLevel(at, 5_000),
-    "battery-cell": lambda at: faults.BatteryCell(at),
+    "battery-cell": faults.BatteryCell,
     "battery-voltage": lambda at: faults.BatteryVoltage(at, 10_200),
-    "gps-loss": lambda at: faults.GpsLoss(at),
+    "gps-loss": faults.GpsLoss,
     "gps-jump": lambda at: faults.GpsJump(at, 3_000, 0),
     "gps-drift": lambda at: faults.GpsDrift(at, 0, 500),
     "gps-glitch": lambda at: faults.GpsGlitch(at, 0, 9_000),
-    "estimator": lambda at: faults.EstimatorUnhealthy(at),
+    "estimator": faults.EstimatorUnhealthy,
     "wind": lambda at: faults.WindStep(at, 6_000, 90),
     "link-delay": lambda at: faults.LinkDelay(at, 300_000),
     "link-jitter": lambda at: faults.LinkJitter(at, 300_000),
     "link-reorder": lambda at: faults.LinkReorder(at, 2_000),
     "link-loss": lambda at: faults.LinkLoss(at, 5_000),
-    "link-silence": lambda at: faults.LinkSilence(at),
+    "link-silence": faults.LinkSilence,
     "link-quality": lambda at: faults.LinkQuality(at, 4_000),
     "obstacle": lambda at: faults.Obstacle(at, 9_000),
     "pillar": lambda at: faults.Pillar(at, 60_000, 30_000, 1_000, 60_000, None, 4_000, 270),
     "pilot": lambda at: faults.PilotMode(at, Mode.LOITER),
     "pilot-mode": lambda at: faults.PilotMode(at, Mode.LAND),
-    "pilot-pause": lambda at: faults.PilotPause(at),
+    "pilot-pause": faults.PilotPause,
     "pilot-goto": lambda at: faults.PilotGoto(at, 0, 90_000, 20_000),
-    "pilot-sticks": lambda at: faults.PilotSticks(at),
-    "kill": lambda at: faults.Kill(at),
-    "reboot": lambda at: faults.Reboot(at),
+    "pilot-sticks": faults.PilotSticks,
+    "kill": faults.Kill,
+    "reboot": faults.Reboot,
     "stall": lambda at: faults.Stall(at, 2 * S),
-    "freeze": lambda at: faults.Freeze(at),
+    "freeze": faults.Freeze,
     "stale": lambda at: faults.StaleSource(at, 500_000),
     "stuck": lambda at: faults.MessageStuck(at, POSITION),
     "mute": lambda at: faults.MessageSilence(at, POSITION),
@@ -75,7 +75,9 @@ def test_there_is_an_example_of_each() -> None:
 
 
 @pytest.mark.parametrize("name", list(EXAMPLES))
-def test_it_changes_what_is_seen(name: str, pilot: Callable[..., Any], flavour: str, on_its_way: dict[str, Any]) -> None:
+def test_it_changes_what_is_seen(
+    name: str, pilot: Callable[..., Any], flavour: str, on_its_way: dict[str, Any]
+) -> None:
     if flavour not in on_its_way:
         on_its_way[flavour] = flying(pilot, flavour)
     p = on_its_way[flavour]

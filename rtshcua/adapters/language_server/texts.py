@@ -37,10 +37,11 @@ SYMBOLS = {
     "vehicle": lsp.SymbolKind.Struct, "skill": lsp.SymbolKind.Function, "template": lsp.SymbolKind.Interface,
     "policy": lsp.SymbolKind.Class, "mission": lsp.SymbolKind.Module, "nominal": lsp.SymbolKind.Constant,
     "test": lsp.SymbolKind.Method, "member": lsp.SymbolKind.EnumMember, "phase": lsp.SymbolKind.Namespace,
-    "parameter": lsp.SymbolKind.Field,
+    "scenario": lsp.SymbolKind.Method, "parameter": lsp.SymbolKind.Field,
 }  # fmt: skip
 ITEMS = {
     "keyword": lsp.CompletionItemKind.Keyword, "skill": lsp.CompletionItemKind.Function,
+    "fault": lsp.CompletionItemKind.Event,
     "signal": lsp.CompletionItemKind.Variable, "zone": lsp.CompletionItemKind.Class,
     "parameter": lsp.CompletionItemKind.Property, "member": lsp.CompletionItemKind.EnumMember,
     "unit": lsp.CompletionItemKind.Unit, "file": lsp.CompletionItemKind.File, "field": lsp.CompletionItemKind.Field,

@@ -22,7 +22,7 @@ _SORTS: Final = {
     Sort.PARAMETER: "parameter", Sort.MEMBER: "enumMember", Sort.CHOICE: "enumMember", Sort.PHASE: "property",
     Sort.ROLE: "type", Sort.SOURCE: "enumMember", Sort.CLASS: "enumMember", Sort.RECORD: "enumMember",
     Sort.TYPE: "type", Sort.MESSAGE: "struct", Sort.FIELD: "property", Sort.DIALECT_ENUM: "enum",
-    Sort.REASON: "enumMember", Sort.WORD: "keyword",
+    Sort.REASON: "enumMember", Sort.WORD: "keyword", Sort.FAULT: "function",
 }  # fmt: skip
 
 

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 from rtshcua.ground.checker.checks.contracts import CLASSES, RECORDS
 from rtshcua.ground.checker.checks.policies import SOURCES
+from rtshcua.ground.checker.checks.scenarios import ENDS
+from rtshcua.ground.checker.faults import NAMED as NAMED_FAULTS
 from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, parameter_type, signal_type
 from rtshcua.ground.checker.types import NAMED, Type
 from rtshcua.ground.editor.desk import Desk, View
@@ -15,8 +17,11 @@ from rtshcua.ground.editor.places import Asked, Call, Wanted, asked, before, cal
 from rtshcua.ground.editor.syntax import Token, inside_comment_or_text
 from rtshcua.ground.editor.targets import Sort
 from rtshcua.mavlink.dialect import Dialect
+from rtshcua.model.faults import Parameter as FaultParameter
+from rtshcua.model.faults import parameters
 from rtshcua.model.ir.skills import Parameter, SkillDecl
 from rtshcua.model.quantity import UNITS, Dimension
+from rtshcua.model.scenario import FLAVOURS
 
 _WORD = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_."
 _NAMES = {"<NAME>", "<LINK_NAME>", "<REASON>"}
@@ -84,6 +89,9 @@ class _Proposals:
         call = call_of(self.written)
         if self.here.symbols & _NAMES:
             yield from self._named(wanted(self.written), call)
+        if "<FAULT>" in self.here.symbols:
+            for name, fault in NAMED_FAULTS.items():
+                yield Item(f"{name}(", "fault", ", ".join(each.name for each in parameters(fault)))
         if "<UNIT>" in self.here.symbols:
             yield from self._units(call)
         for word in self.here.words:
@@ -106,6 +114,7 @@ class _Proposals:
             Wanted.CLASS: CLASSES, Wanted.RECORD: RECORDS, Wanted.SOURCE: SOURCES, Wanted.REASON: REASONS,
             Wanted.ROLE: self._all(Sort.ROLE), Wanted.PHASE: self._all(Sort.PHASE), Wanted.MESSAGE:
             self.dialect.messages, Wanted.DIALECT_ENUM: self.dialect.enums, Wanted.TYPE: (*TYPES, *symbols.enums),
+            Wanted.MISSION: symbols.missions, Wanted.AUTOPILOT: FLAVOURS, Wanted.ENDING: ENDS,
             Wanted.NOMINAL: [each.name.text for unit in self.view.units.values() for each in unit.nominals],
         }  # fmt: skip
         match what:
@@ -149,8 +158,20 @@ class _Proposals:
             for name, value in type.enumeration.members.items():
                 yield Item(name, "member", f"{type.enumeration.name} = {value}")
 
+    def _of_fault(self, call: Call | None) -> Mapping[str, FaultParameter] | None:
+        """What may be said of the fault that a place is among the arguments of; None where it is in none."""
+        fault = None if call is None or self.written[0].text != "scenario" else NAMED_FAULTS.get(call.name)
+        return None if fault is None else {each.name: each for each in parameters(fault)}
+
     def _arguments(self, call: Call | None) -> Iterator[Item]:
-        symbols = self.symbols
+        symbols, of_fault = self.symbols, self._of_fault(call)
+        if call is not None and of_fault is not None:
+            if self.written[-1].text in ("(", ","):
+                yield from (Item(f"{name} = ", "parameter") for name in of_fault if name not in call.named)
+            else:
+                said = of_fault.get(call.argument or "")
+                yield from (Item(word, "member") for word in (() if said is None else said.words))
+            return
         owner = None if call is None else symbols.skills.get(call.name) or symbols.templates.get(call.name)
         if owner is not None and call is not None:
             if self.written[-1].text in ("(", ","):
@@ -181,6 +202,9 @@ class _Proposals:
     def _units(self, call: Call | None) -> Iterator[Item]:
         type = self._type_of(self._subject())
         dimension = None if type is None else type.dimension
+        said = (self._of_fault(call) or {}).get("" if call is None else call.argument or "")
+        if said is not None and said.unit is not None:
+            dimension = said.unit.dimension
         asked_for = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
         for name, unit in UNITS.items():
             if asked_for in (None, unit.dimension):

@@ -1,9 +1,10 @@
-"""The names in conditions, values, arguments and tests, with what they mean where they stand."""
+"""The names in conditions, values, arguments, tests and scenarios, with what they mean where they stand."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.scenarios import OBSTACLE
 from rtshcua.ground.checker.scope import ENTRY, LOCAL_TIME, PHASE
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.editor.moved import parts
@@ -12,9 +13,12 @@ from rtshcua.model.ir.expression import Comparison, OneOf, Reference
 from rtshcua.model.ir.missions import Overrides
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.policies import TemplateDecl
+from rtshcua.model.ir.scenarios import AfterStep, Decides, FaultCall, Flies, Keeps, Lands, OnCondition, ScenarioDecl
 from rtshcua.model.ir.skills import ArgumentValue, Parameter, SkillDecl
 from rtshcua.model.ir.tests import Asker, Assignment, Expectation, InPhase, Named, NominalDecl, Request, Table, TestDecl
 
+#: what the values of a fault's parameters name
+_OF_FAULTS = {"message": Sort.MESSAGE, "role": Sort.ROLE}
 #: what the names of parameters mean at a place; several where a rule is about several skills
 Scope = Mapping[str, tuple[Target, ...]]
 
@@ -113,6 +117,36 @@ class Conditions:
         else:
             yield from self.names((node.policy, node.vehicle), Sort.DECLARED)
         yield from self._case(tuple(value for value in parts(node) if value is not node.name), scope)
+
+    def scenario(self, node: ScenarioDecl) -> Iterator[Occurrence]:
+        """A scenario."""
+        yield from self.names((node.mission,), Sort.DECLARED)
+        faults = [each for each in node.start if isinstance(each, FaultCall)]
+        for incident in node.incidents:
+            match incident.moment:
+                case AfterStep(skill=skill):
+                    yield from self.names((skill,), Sort.DECLARED)
+                case OnCondition(condition=condition):
+                    yield from self.within(condition, {})
+            faults.append(incident.fault)
+        for fault in faults:
+            yield from self._fault(fault)
+        for demand in node.demands:
+            match demand:
+                case Decides():
+                    yield from self._case(demand.decision, {})
+                case Flies(skill=name) | Lands(zone=name):
+                    yield from self.names((name,), Sort.DECLARED)
+                case Keeps(place=name) if name.text != OBSTACLE:
+                    yield from self.names((name,), Sort.DECLARED)
+
+    def _fault(self, fault: FaultCall) -> Iterator[Occurrence]:
+        """A fault, and what its values name: messages, roles; the words of others belong to the fault."""
+        yield from self.names((fault.name,), Sort.FAULT)
+        for each in fault.arguments:
+            sort = None if each.name is None else _OF_FAULTS.get(each.name.text)
+            if sort is not None and isinstance(each.value, Reference):
+                yield Occurrence(each.value.span, Target(sort, each.value.name))
 
     def _case(self, node: Any, scope: Scope) -> Iterator[Occurrence]:
         match node:

@@ -1,9 +1,11 @@
 """What a person sees who points at something: what it is, in Markdown."""
 
 from collections.abc import Iterator
+from inspect import getdoc
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.faults import NAMED, example
 from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.meanings import KEYWORDS, REASONS, TYPES
@@ -13,6 +15,7 @@ from rtshcua.ground.editor.sizes import size_of
 from rtshcua.ground.editor.syntax import note_before, path_to, token_at
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.mavlink.dialect import DATUM, Dialect
+from rtshcua.model.faults import parameters
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
@@ -85,6 +88,8 @@ def told(view: View, target: Target, dialect: Dialect) -> str | None:
         case Sort.SOURCE | Sort.CLASS | Sort.RECORD | Sort.WORD:
             meaning = KEYWORDS.get(target.name)
             return f"{target.sort.value} `{target.name}`" + ("" if meaning is None else f": {meaning}")
+        case Sort.FAULT:
+            return _fault(target.name)
         case Sort.IMPORT:
             return _import(view, target)
         case _:
@@ -189,6 +194,14 @@ def _dialect(target: Target, dialect: Dialect) -> str:
     unit = f", in `{field.unit}`" if field.unit else ""
     values_of = f", values of `{field.enum}`" if field.enum else ""
     return f"MAVLink field `{target.owner}.{target.name}`: `{field.type}`{unit}{values_of}"
+
+
+def _fault(name: str) -> str | None:
+    kind = NAMED.get(name)
+    if kind is None:
+        return None
+    takes = [f"`{each.name} = {example(each)}`" + ("" if each.needed else " (optional)") for each in parameters(kind)]
+    return f"fault `{name}`: {getdoc(kind)}\n\ntakes {', '.join(takes) or 'nothing'}"
 
 
 def _import(view: View, target: Target) -> str | None:

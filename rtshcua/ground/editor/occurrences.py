@@ -13,6 +13,7 @@ from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule, TemplateDecl, Use
 from rtshcua.model.ir.program import Import, Unit
+from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import LinkDecl, Parameter, SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
@@ -25,11 +26,11 @@ def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda each: (each.span.start, each.span.end)))
 
 
-def declarations(unit: Unit) -> tuple[Declaration | Import | NominalDecl | TestDecl, ...]:
+def declarations(unit: Unit) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl, ...]:
     """All declarations of a file, in the order of the text."""
     every: tuple[Any, ...] = (
         *unit.imports, *unit.enums, *unit.signals, *unit.zones, *unit.vehicles, *unit.skills, *unit.templates,
-        *unit.policies, *unit.missions, *unit.nominals, *unit.tests,
+        *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios,
     )  # fmt: skip
     return tuple(sorted(every, key=lambda each: each.span.start))
 
@@ -43,7 +44,7 @@ class _Walk(Conditions):
             yield Occurrence(node.span, Target(Sort.IMPORT, node.path, node.span.file))
             return
         name = getattr(node, "name", None)
-        if isinstance(name, Name) and not isinstance(node, TestDecl):
+        if isinstance(name, Name) and not isinstance(node, TestDecl | ScenarioDecl):
             yield Occurrence(name.span, Target(Sort.DECLARED, name.text), True)
         match node:
             case EnumDecl():
@@ -65,6 +66,8 @@ class _Walk(Conditions):
                 yield from self._mission(node)
             case NominalDecl() | TestDecl():
                 yield from self.case(node)
+            case ScenarioDecl():
+                yield from self.scenario(node)
             case VehicleDecl():
                 yield from self.names(node.without, Sort.DECLARED)
 

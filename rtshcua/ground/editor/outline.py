@@ -11,11 +11,12 @@ from rtshcua.ground.editor.syntax import tokens
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.program import Import
+from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl
 from rtshcua.model.ir.tests import TestDecl
 
 #: what a declaration is, by its first word
-KINDS = ("enum", "signal", "zone", "vehicle", "skill", "template", "policy", "mission", "nominal", "test")
+KINDS = ("enum", "signal", "zone", "vehicle", "skill", "template", "policy", "mission", "nominal", "test", "scenario")
 
 
 class Symbol(NamedTuple):
@@ -41,7 +42,7 @@ def outline(cut: Cut) -> tuple[Symbol, ...]:
     return tuple(_symbol(cut, each) for each in declarations(cut.parsed.unit) if not isinstance(each, Import))
 
 
-def _symbol(cut: Cut, node: Declaration | TestDecl) -> Symbol:
+def _symbol(cut: Cut, node: Declaration | TestDecl | ScenarioDecl) -> Symbol:
     name = node.name
     kind = next((kind for kind in KINDS if cut.source.text.startswith(kind, node.span.start)), "")
     return Symbol(name.text or kind, kind, node.span, name.span, tuple(_inner(node)))

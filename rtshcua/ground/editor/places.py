@@ -43,6 +43,9 @@ class Wanted(Enum):
     SIGNAL = "signal"
     REASON = "reason"
     DIALECT_ENUM = "dialect enum"
+    MISSION = "mission"
+    AUTOPILOT = "autopilot"
+    ENDING = "ending"
 
 
 class Asked(NamedTuple):
@@ -76,6 +79,8 @@ _BEHIND = {
     "policy": Wanted.NOTHING, "mission": Wanted.NOTHING, "skill": Wanted.NOTHING, "zone": Wanted.NOTHING,
     "signal": Wanted.NOTHING, "enum": Wanted.NOTHING, "vehicle": Wanted.NOTHING, "template": Wanted.NOTHING,
     "nominal": Wanted.NOTHING, "phase": Wanted.NOTHING,
+    "flies": Wanted.MISSION, "aboard": Wanted.AUTOPILOT, "ends": Wanted.ENDING, "after": Wanted.SKILL,
+    "never": Wanted.SKILL, "lands": Wanted.ZONE, "distance": Wanted.ZONE,
 }  # fmt: skip
 
 
@@ -134,8 +139,16 @@ def wanted(written: list[Token]) -> Wanted:
             follows = written[len(written) - number : len(written) - number + 1]
             if token.text == "phase" and follows and follows[0].text == "in":
                 return Wanted.PHASE
-            return _BEHIND[token.text]
+            return _behind(written, len(written) - 1 - number)
     return Wanted.VALUE
+
+
+def _behind(written: list[Token], at: int) -> Wanted:
+    """What stands behind a word, which may depend on the word before it."""
+    word, before_it = written[at].text, written[at - 1].text if at else ""
+    if word == "flies" and before_it == "expect":
+        return Wanted.SKILL
+    return Wanted.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]
 
 
 def _of_signal(written: list[Token], head: str) -> Wanted:

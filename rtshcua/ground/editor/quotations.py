@@ -13,6 +13,7 @@ from rtshcua.ground.editor.desk import View
 from rtshcua.ground.testing.case import Case
 from rtshcua.ground.testing.clauses import REST
 from rtshcua.model.flat.policy import Rule
+from rtshcua.model.ir.scenarios import Decides
 from rtshcua.model.ir.tests import Expectation, Quoted, TestDecl
 
 #: where the characters of a text stand, blanks left out; None: the text has one there that no source has
@@ -31,7 +32,7 @@ def quoted(view: View, cases: Iterable[Case], places: Collection[Span]) -> tuple
 
 def unread(view: View, cases: Iterable[Case], name: str) -> Span | None:
     """A quotation with `name` in it whose test has an error, so that nobody knows what it quotes; None if none."""
-    word = re.compile(rf"(?<![A-Za-z0-9_.]){re.escape(name)}(?![A-Za-z0-9_])")
+    word = _word(name)
     known = {case.expected.span for case in cases}
     for test in view.symbols.tests:
         for expectation in _expectations(test):
@@ -39,6 +40,20 @@ def unread(view: View, cases: Iterable[Case], name: str) -> Span | None:
             if clause is not None and word.search(clause.text) and expectation.span not in known:
                 return clause.span
     return None
+
+
+def flown_quotation(view: View, name: str) -> Span | None:
+    """A quotation with `name` in it in a scenario, of which no case tells what it quotes; None if none."""
+    for scenario in view.symbols.scenarios:
+        for demand in scenario.demands:
+            clause = demand.decision.clause if isinstance(demand, Decides) else None
+            if clause is not None and _word(name).search(clause.text):
+                return clause.span
+    return None
+
+
+def _word(name: str) -> re.Pattern[str]:
+    return re.compile(rf"(?<![A-Za-z0-9_.]){re.escape(name)}(?![A-Za-z0-9_])")
 
 
 def _expectations(test: TestDecl) -> Sequence[Expectation]:

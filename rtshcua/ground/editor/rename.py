@@ -13,7 +13,7 @@ from rtshcua.ground.editor.consequences import Judged, Renamed, consequence, jud
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.navigation import declared_at, references, targets
 from rtshcua.ground.editor.occurrences import at
-from rtshcua.ground.editor.quotations import quoted, unread
+from rtshcua.ground.editor.quotations import flown_quotation, quoted, unread
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.ground.language.table import table
 from rtshcua.mavlink.dialect import Dialect
@@ -91,6 +91,10 @@ def rename(
         if span is not None:
             why = f"a test of `{span.file}` has errors, so nobody knows what it quotes: correct these first"
             return Refusal("rename", why)
+        span = flown_quotation(each, target.name)
+        if span is not None:
+            why = f"a scenario of `{span.file}` quotes a clause with `{target.name}` in it: quote less of it first"
+            return Refusal("rename", why)
         places = (*places, *quoted(each, before[each.name].cases, places))
     return _checked(desk, affected, before, Renamed(target, name, _by_file(places)), dialect, steps)
 
@@ -129,7 +133,7 @@ def _by_file(places: Iterable[Span]) -> dict[str, tuple[Span, ...]]:
 def _tested(desk: Desk, concerned: Iterable[View], target: Target) -> Iterator[View]:
     """The programs of files whose tests may quote the name: tests are run where their file itself is asked for."""
     files = {file for each in concerned for file, unit in each.units.items()
-             if unit.tests and target.name in each.text(file)}  # fmt: skip
+             if (unit.tests or unit.scenarios) and target.name in each.text(file)}  # fmt: skip
     return (desk.view(file) for file in sorted(files))
 
 

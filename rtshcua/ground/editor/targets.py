@@ -24,6 +24,7 @@ class Sort(Enum):
     FIELD = "field of the dialect"
     DIALECT_ENUM = "enumeration of the dialect"
     REASON = "reason"
+    FAULT = "fault"
     WORD = "word of the language"
     IMPORT = "import"
 

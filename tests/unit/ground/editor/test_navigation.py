@@ -117,6 +117,39 @@ def test_hover(desk: Desk, file: str, around: str, said: list[str]) -> None:
     assert [each for each in said if each not in found.text] == []
 
 
+@pytest.mark.parametrize(
+    ("around", "said"),
+    [
+        ("link_si|lence", ["fault `link_silence`: Nothing gets through", "`for = 10 s` (optional)"]),
+        ("flies  d|ip", ["mission dip("]),
+        ("after lo|ok", ["skill look("]),
+        ("when hei|ght", ["signal height"]),
+        ("mute(message = HEART|BEAT", ["MAVLink message `HEARTBEAT`"]),
+        ("approve(role = oper|ator", ["role `operator`"]),
+        ("distance to po|nd", ["zone pond"]),
+        ("expect rea|ction", ["to the first frame of the fallback"]),
+        ("because state/vio|lated", ["does not hold"]),
+        ("f|lies  dip", ["the mission"]),
+    ],
+)
+def test_hover_over_a_scenario(desk: Desk, around: str, said: list[str]) -> None:
+    text = """import "dip.rts"
+scenario "it" {
+  flies  dip
+  after look       link_silence(for = 2 s)
+  when height > 3 m mute(message = HEARTBEAT)
+  at 20 s          approve(role = operator)
+  expect distance to pond >= 2 m
+  expect reaction <= 200 ms
+  expect fallback hover because state/violated
+}
+"""
+    desk.put("/w/s.rts", text)
+    found = hover(desk.view("/w/s.rts"), "/w/s.rts", place(desk, "/w/s.rts", around), dialect.load())
+    assert found is not None
+    assert [each for each in said if each not in found.text] == []
+
+
 def test_hover_says_nothing_of_nothing(desk: Desk) -> None:
     text = desk.text(DIP) or ""
     assert hover(desk.view(DIP), DIP, text.index("\n\n") + 1, dialect.load()) is None

@@ -1,5 +1,6 @@
 """A renaming that would change more than a name is refused, or spares what means something else."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -71,6 +72,37 @@ def test_no_signal_gets_a_name_that_is_read(make: Make) -> None:
     charge = "signal charge : ratio = BATTERY_STATUS.battery_remaining stale after 2 s\n"
     desk = make({S: charge})
     assert "read by this very name" in refused(asked(desk, S, "signal |charge", "battery", (S,)))
+
+
+FLOWN = """import "m.rts"
+scenario "it" {
+  flies one after up gps_loss(for = 4 s) expect flies up expect distance to field >= 3 m expect never fly
+}
+"""
+M = """import "s.rts"
+zone field = circle(47.39774 N, 8.54559 E, 40 m)
+mission one under p@1 on quad {
+  proposed by operator chief for role operator
+  phase flight { up(20 m) return_home() }
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("file", "around"), [(S, "skill |up("), ("/w/m.rts", "zone |field"), ("/w/m.rts", "mission |one")]
+)
+def test_what_a_scenario_names_is_renamed_in_it(make: Make, file: str, around: str) -> None:
+    old = around.split("|")[1].rstrip("(").split()[-1]
+    desk = make({S: SITE[S], "/w/m.rts": M, "/w/f.rts": FLOWN})
+    made = asked(desk, file, around, "other", ("/w/f.rts", "/w/m.rts", S))
+    assert isinstance(made, Renaming)
+    assert made.applied("/w/f.rts", FLOWN) == re.sub(rf"\b{old}\b", "other", FLOWN)
+
+
+def test_what_a_scenario_quotes_is_not_changed_unseen(make: Make) -> None:
+    flown = FLOWN.replace("expect flies up", 'expect deny at "permit up by role operator ..."')
+    desk = make({S: SITE[S], "/w/m.rts": M, "/w/f.rts": flown})
+    assert "quote less of it" in refused(asked(desk, S, "skill |up(", "other", ("/w/f.rts", "/w/m.rts", S)))
 
 
 def test_the_type_of_a_signal_is_not_the_signal_of_that_name(make: Make) -> None:

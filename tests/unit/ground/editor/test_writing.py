@@ -21,6 +21,7 @@ FILE = "/w/new.rts"
 HEAD = 'import "lake.rts"\n'
 POLICY = HEAD + "policy p version 1 {\n  "
 VEHICLE = HEAD + "vehicle v {\n  "
+SCENARIO = 'import "dip.rts"\nscenario "s" {\n  '
 MISSION = HEAD + "mission m under lake@1 on quad {\n  "
 SKILL = HEAD + "skill s(far: length in 1 m .. 5 m, area: zone) {\n  "
 
@@ -63,6 +64,23 @@ def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
         (MISSION + "phase a { look(", ["target = ", "pond.entry"], ["battery", "city.entry"]),
         (MISSION + "phase a { look(pond.entry, manner = ", ["slow", "fast"], ["pond"]),
         (MISSION + "phase a { takeoff(altitude = 20 m) look(pond.entry) on inadmissible ", ["abort", "skip"], []),
+        (SCENARIO, ["flies", "aboard", "seeds", "start", "at", "after", "when", "expect"], ["permit", "dip"]),
+        (SCENARIO + "flies ", ["dip"], ["look", "lake"]),
+        (SCENARIO + "aboard px4, ", ["ardupilot"], ["dip"]),
+        (SCENARIO + "start ", ["wind("], ["dip"]),
+        (SCENARIO + "at 20 s ", ["gps_loss(", "link_silence("], ["dip", "look", "m"]),
+        (SCENARIO + "at 20 ", ["s", "min"], []),
+        (SCENARIO + "after ", ["look"], ["dip"]),
+        (SCENARIO + "when ", ["height", "not"], ["dip"]),
+        (SCENARIO + "at 20 s link_silence(", ["for = ", "way = ", "held = "], ["look"]),
+        (SCENARIO + "at 20 s link_silence(for = 2 s, ", ["way = ", "held = "], ["for = "]),
+        (SCENARIO + "at 20 s link_silence(way = ", ["both", "up", "down"], ["look"]),
+        (SCENARIO + "at 20 s wind(speed = 3 ", ["m/s", "km/h"], ["s", "%", "m"]),
+        (SCENARIO + "expect ", ["ends", "flies", "never", "reaction", "distance to", "lands in", "deny"], ["dip"]),
+        (SCENARIO + "expect ends completed, ", ["aborted", "stood_down"], ["dip"]),
+        (SCENARIO + "expect flies ", ["look"], ["dip"]),
+        (SCENARIO + "expect distance to ", ["pond"], ["look"]),
+        (SCENARIO + "expect lands in ", ["pond"], ["look"]),
         (SKILL, ["motion", "deadline", "lasts at most", "require", "record"], ["permit"]),
         (SKILL + "class ", ["tactical", "semantic", "reflex"], ["decision"]),
         (SKILL + "record intent, ", ["decision", "synced_first"], ["tactical"]),

@@ -154,7 +154,8 @@ def test_the_change_that_is_meant(text: str, help: str, fixed: str | None) -> No
 def test_reading_goes_on_after_a_part_that_is_wrong() -> None:
     parsed = parse(Source("x.rts", 'scenario "it" {\n  flies m\n  at at at\n  seeds  1\n  expect lands on z\n}\n'))
     assert [each.span.start for each in parsed.diagnostics if each.span] == [31, 63]
-    assert parse(Source("x.rts", 'scenario "it" {\n  flies\nscenario "next" { flies m }')).unit.scenarios != ()
+    unclosed = parse(Source("x.rts", 'scenario "it" {\n  flies m\nscenario "next" { flies m }'))
+    assert [each.name.text for each in unclosed.unit.scenarios] == ["next"]
 
 
 def test_its_words_are_names_elsewhere(unit: Read) -> None:

@@ -81,13 +81,13 @@ def test_the_kinds_of_tokens_that_may_hold_blanks_are_known() -> None:
     assert found - {"<SPACE>"} == SPACED
 
 
-@pytest.mark.parametrize("start", ["declaration", "skill_item", "policy_item", "mission_item", "test_item", "zone"])
+@pytest.mark.parametrize("start", ["declaration", "skill_item", "policy_item", "mission_item", "test_item", "scenario_item", "zone"])
 def test_an_item_begins_a_line(start: str) -> None:
     """Two of a kind that stand on one line are laid out on two."""
     blocks = {
         "declaration": "{} {}", "zone": "{} {}", "skill_item": "skill s() {{ \n{} {} }}",
         "policy_item": "policy p version 1 {{ \n{} {} }}", "mission_item": "mission m under p@1 on v {{ \n{} {} }}",
-        "test_item": 'test "t" {{ \n{} {} }}',
+        "test_item": 'test "t" {{ \n{} {} }}', "scenario_item": 'scenario "s" {{ \n{} {} }}',
     }  # fmt: skip
     tried = 0
     for seed in range(60):

@@ -1,6 +1,7 @@
 """Scenarios are held against what there is, and lowered with the mission and the policy that they fly."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
@@ -28,6 +29,7 @@ from rtshcua.model.scenario import (
 )
 from rtshcua.onboard.ports import Ending
 
+CHECKOUT = Path(__file__).resolve().parents[4]
 IMPORT = 'import "lib:missions/standard.rts"\n'
 S = 1_000_000
 
@@ -128,6 +130,15 @@ def test_every_kind_of_fault_can_be_written() -> None:
     incidents = flown(body).scenario.incidents
     assert [type(each.fault) for each in incidents] == list(KINDS.values())
     assert {each.fault.at_us for each in incidents} == {0}
+
+
+def test_the_reference_has_every_kind_of_fault_with_what_it_takes() -> None:
+    page = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
+    for name, kind in NAMED.items():
+        needed = [each.name for each in parameters(kind) if each.needed]
+        optional = [each.name for each in parameters(kind) if not each.needed]
+        said = ", ".join([*needed, *([f"[{', '.join(optional)}]"] if optional else [])])
+        assert f"`{name}({said})`" in page
 
 
 def test_what_is_expected() -> None:

@@ -111,7 +111,7 @@ class Sensors:
             self._without_fix_s = self._drift = 0.0
             if self._strays:
                 self._stray(dt)
-        if self.stray != (0.0, 0.0):
+        if self.stray != (0.0, 0.0) and not self.lost:
             self.jump(self.stray[0] * dt, self.stray[1] * dt)
 
     def _stray(self, dt: float) -> None:

@@ -94,16 +94,12 @@ class _Killed(Exception):
 
 
 class _Sink(MemorySink):
-    """Evidence in memory of a process that may be killed: it knows the class of each line."""
+    """Evidence in memory of a process that may be killed."""
 
     def __init__(self, *, full: bool) -> None:
         super().__init__()
-        self.classes: list[int] = []
         self.full = full
-
-    def append(self, line: bytes, durability: int) -> int:
-        self.classes.append(durability)
-        return super().append(line, durability)
+        self.written = 0  # lines that were kept before the last turn
 
 
 class _Watched(Simulation):
@@ -311,9 +307,10 @@ class _Flight:
                 raise TimeoutError(
                     f"after {self._most_us // SECOND} s it flies still: {flight.runtime.view(flight.clock.now())}"
                 )
-            self._check_disk()
+            sink = self._check_disk()
             also += self._happen()
             also += self._steps.events(flight.clock.now())
+            sink.written = sink.kept
             how, also = flight.loop.turn(also), []
             if how is not None:
                 self._close(how)
@@ -326,10 +323,11 @@ class _Flight:
             Life(self._began_us, flight.clock.elapsed_us, how.value, tuple(flight.sink.lines), tuple(self._reactions))
         )
 
-    def _check_disk(self) -> None:
+    def _check_disk(self) -> _Sink:
         sink = self._flight.sink
         assert isinstance(sink, _Sink)
         sink.full = self._is_full()
+        return sink
 
     def _is_full(self) -> bool:
         until_us = self._full_until_us
@@ -381,15 +379,16 @@ class _Flight:
     def _bury(self, *, lost: bool) -> None:
         """Keep what the process leaves behind, and end its log as the next run does.
 
-        A process that is killed between two turns has written all lines but what the writer had no time for: in half of
-        the cases the last line, if nothing was sent on it, is torn.
+        A process that is killed between two turns may have been writing: in half of the cases the last line of its last
+        turn is torn, or one that it was about to write where that turn wrote none.
         """
         flight, sink = self._flight, self._flight.sink
         assert isinstance(sink, _Sink)
         lines = list(sink.lines)
         chance = Random(f"{self._scenario.name} killed {len(self._lives)} {self._seed}")
-        if lost and lines and b'"type":"effect"' in lines[-1] and chance.random() < 0.5:
-            lines[-1] = lines[-1][: chance.randrange(1, len(lines[-1]))]
+        if lost and chance.random() < 0.5:
+            line = lines.pop() if len(lines) > sink.written else b'{"_prev":"%s"' % leaf_hash(lines[-1]).hex().encode()
+            lines.append(line[: chance.randrange(1, len(line))])
         recovered = self._recovered(lines, flight.clock.now())
         self._lives.append(Life(self._began_us, flight.clock.elapsed_us, None, recovered, tuple(self._reactions)))
 

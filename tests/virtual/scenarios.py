@@ -1,6 +1,7 @@
 """Flights of scenarios with the keys of the tests."""
 
 from rtshcua.model.faults import Fault
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AtTime, Expectation, Expected, Incident, Scenario, Start, When
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
@@ -29,9 +30,10 @@ def scenario(*incidents: Incident, start: Start = CALM, expects: tuple[Expected,
     return Scenario("tried", ("px4", "ardupilot"), 1, 1, start, incidents, expectations)
 
 
-def fast(*arguments: object, **fields: object) -> SimulationConfig:
+def fast(policy: Policy, **fields: object) -> SimulationConfig:
     """A vehicle that fits, and soon is down."""
-    return fitting(*arguments, return_mm=16 * case.M, land_mm_s=case.LAND_MM_S, **fields)  # type: ignore[arg-type]
+    low: dict[str, object] = {} if policy.vehicle.return_altitude else {"return_mm": 16 * case.M}
+    return fitting(policy, land_mm_s=case.LAND_MM_S, **low, **fields)
 
 
 def flown(of: Scenario, flavour: str = "px4", *, bundle: bytes | None = None, seed: int = 1) -> ScenarioFlown:

@@ -1,0 +1,304 @@
+"""Flights of scenarios: when incidents happen, and what each kind of fault of host and agent does to a flight."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from reference import flat_case as flat
+from rtshcua.cli.sources import compile_sources
+from rtshcua.model import faults
+from rtshcua.model.faults import AgentFault, Fault, HostFault
+from rtshcua.model.scenario import (
+    AfterStep,
+    AtTime,
+    Decides,
+    EndsInside,
+    EndsWith,
+    Expected,
+    Flies,
+    KeepsAway,
+    OnCondition,
+    ReactsWithin,
+    Start,
+)
+from rtshcua.virtual.expectations import expectations
+from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.judge import judge
+from virtual import case
+from virtual.once import once
+from virtual.sampling import each_once
+from virtual.scenarios import flown, incident, scenario, when
+from virtual.shipped import shipped
+
+S, M = case.S, case.M
+FLAVOURS = ("px4", "ardupilot")
+
+
+def records(of: ScenarioFlown) -> Iterator[dict[str, Any]]:
+    return (json.loads(line) for life in of.lives for line in life.lines)
+
+
+def events(of: ScenarioFlown) -> list[str]:
+    return [record["event"] for record in records(of) if record["type"] == "effect"]
+
+
+def dispatched(of: ScenarioFlown) -> list[str]:
+    return [record["detail"] for record in records(of) if record.get("event") == "dispatched"]
+
+
+def nothing_wrong(of: ScenarioFlown) -> None:
+    judgement = judge(of)
+    assert judgement.failures == ()
+    assert judgement.exceptions == ()
+
+
+# ---------------------------------------------------------------- determinism and times
+
+
+def test_the_same_arguments_give_the_same_flight() -> None:
+    def once_more(seed: int) -> ScenarioFlown:
+        time = AtTime(10 * S, 20 * S)
+        return flown(scenario(when(time, faults.RuntimeKilled(0, 2 * S)), when(time, faults.Babble(0, 3))), seed=seed)
+
+    first, again, other = once_more(1), once_more(1), once_more(2)
+    assert first == again
+    assert [each.at_us for each in first.happened] != [each.at_us for each in other.happened]
+
+
+def test_incidents_come_after_a_step_and_on_a_condition() -> None:
+    high = flat.clause("height > 3 m", flat.apply(flat.Op.GT, flat.signal(flat.HEIGHT), flat.const(3 * M)))
+    never = flat.clause("height > 3 km", flat.apply(flat.Op.GT, flat.signal(flat.HEIGHT), flat.const(3_000 * M)))
+    found = flown(
+        scenario(
+            when(AfterStep(1, 2 * S, 2 * S), faults.LinkQuality(0, 9_000)),
+            when(OnCondition(high, S, S), faults.ClockStep(0, S)),
+            when(OnCondition(never, 0, 0), faults.Kill(0)),
+            when(AfterStep(9, 0, 0), faults.Kill(0)),
+        )
+    )
+    assert found.ending == "completed"
+    assert [each.number for each in found.happened] == [1, 0]
+    times = {each.number: each.at_us for each in found.happened}
+    leg = next(r["at_us"] for r in records(found) if r.get("event") == "dispatched" and r["step"] == 1)
+    assert times[0] == leg - found.start_us + 2 * S
+    rises = next(sample.at_us for sample in found.samples if sample.up_mm > 3 * M)
+    assert 0 <= times[1] - rises - S < S
+
+
+def test_what_is_at_the_start() -> None:
+    found = flown(scenario(start=Start(battery=2_000, wind_mm_s=3 * M)))
+    assert found.ending == "refused"
+    assert found.samples[0].battery == 2_000
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_mission_that_ships_is_flown(flavour: str) -> None:
+    fault = faults.WindStep(0, 5 * M)
+    found = once(f"short-{flavour}", lambda: flown(scenario(incident(12, fault)), flavour, bundle=shipped("short")))
+    assert found.ending == "completed"
+    nothing_wrong(found)
+
+
+# ---------------------------------------------------------------- the host
+
+
+def test_a_runtime_that_is_killed_goes_on_in_another_process() -> None:
+    found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S))), "ardupilot")
+    killed, after = found.lives
+    assert (killed.ending, after.ending) == (None, "aborted")
+    assert 18 * S <= after.began_us <= 20 * S
+    assert [json.loads(line)["type"] for line in killed.lines[-2:]] == ["recover", "close"]
+    assert json.loads(after.lines[0])["before"] is not None
+    assert "resumed" in events(found)
+    assert not found.samples[-1].in_air
+    nothing_wrong(found)
+
+
+def test_some_killed_processes_leave_a_torn_line() -> None:
+    torn = set()
+    for seed in range(1, 8):
+        found = flown(scenario(incident(1, faults.RuntimeKilled(0, S))), seed=seed)  # on the ground: soon over
+        torn.add(json.loads(found.lives[0].lines[-2])["discarded_bytes"] > 0)
+        assert judge(found).failures == ()
+    assert torn == {True, False}
+
+
+def test_no_process_begins_where_the_vehicle_is_on_the_ground() -> None:
+    found = flown(scenario(incident(0.2, faults.RuntimeKilled(0, S))))
+    assert len(found.lives) == 1
+    assert found.left == "replayed"
+    assert not found.samples[-1].in_air
+    nothing_wrong(found)
+
+
+def test_a_process_begins_when_the_disk_takes_records_again() -> None:
+    found = flown(
+        scenario(incident(14, faults.DiskFull(0, 6 * S)), incident(15, faults.RuntimeKilled(0, S))), "ardupilot"
+    )
+    assert [life.ending for life in found.lives] == [None, "aborted"]
+    assert found.lives[1].began_us > 20 * S
+    assert any("no space left" in note for note in found.notes)
+
+
+def test_a_host_that_stalls_reads_later_what_was_said() -> None:
+    found = flown(scenario(incident(15, faults.HostStall(0, 2 * S))))
+    assert not [frame for frame in found.frames if 15_050_000 < frame.sent_us < 17 * S]
+    assert found.ending == "completed"
+    nothing_wrong(found)
+
+
+def test_a_full_disk() -> None:
+    for_good = flown(scenario(incident(15, faults.DiskFull(0))))
+    assert for_good.ending == "evidence-lost"
+    judgement = judge(for_good)
+    assert judgement.failures == ()
+    assert {each.cause for each in judgement.exceptions} == {"disk"}
+    a_while = flown(scenario(incident(15, faults.DiskFull(0, 3 * S))))
+    assert {"gap", "gap-over"} <= set(events(a_while))
+    nothing_wrong(a_while)
+
+
+def test_a_clock_that_is_set_moves_nothing_and_is_told() -> None:
+    found = flown(scenario(incident(15, faults.ClockStep(0, -3_600 * S))))
+    assert "clock-stepped" in events(found)
+    assert found.ending == "completed"
+    nothing_wrong(found)
+
+
+# ---------------------------------------------------------------- those who hand in documents
+
+LOW = """import "lib:policies/bridge_inspection.rts"
+
+mission low under bridge_inspection@7 on quad {
+  intent "Low under the bridge, when a supervisor agrees."
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 9 m) }
+  phase inspection {
+    goto(bridge_a.entry, altitude = 9 m)
+    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)
+  }
+  phase recovery { return_home() }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def low(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    source = tmp_path_factory.mktemp("low") / "low.rts"
+    source.write_text(LOW)
+    compiled, _ = compile_sources([source], mission=None, issued_at_us=flat.ISSUED)
+    assert compiled.mission is not None, compiled.diagnostics
+    return case.seal(compiled.mission, compiled.policy)
+
+
+def test_an_approval_is_given(low: bytes) -> None:
+    awaited = when(AfterStep(1, 2 * S, 2 * S), faults.Approval(0, "supervisor", 2))
+    found = flown(scenario(awaited), bundle=low)
+    assert "approval" in events(found)
+    assert "inspect_area" in dispatched(found)
+    nothing_wrong(found)
+
+
+def test_an_approval_is_refused(low: bytes) -> None:
+    found = flown(scenario(when(AfterStep(1, S, S), faults.Disapproval(0, "supervisor"))), "ardupilot", bundle=low)
+    assert "inspect_area" not in dispatched(found)
+    assert found.ending == "aborted"
+    nothing_wrong(found)
+
+
+def test_nobody_answers_what_is_not_asked() -> None:
+    found = flown(scenario(incident(5, faults.Approval(0, "supervisor")), incident(6, faults.Approval(0, "nobody"))))
+    notes = [each.note for each in found.happened]
+    assert notes[1] == "nothing of the mission asks for it"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_recall_that_comes_twice(flavour: str) -> None:
+    found = flown(scenario(incident(15, faults.Recall(0, 2))), flavour)
+    assert found.ending == "recalled"
+    assert events(found).count("recall") == 1
+    nothing_wrong(found)
+
+
+def test_a_replacement_that_comes_twice() -> None:
+    found = flown(scenario(incident(12, faults.Replacement(0, 2))))
+    assert events(found).count("replacement") == 1
+    assert "document-refused" in events(found)
+    assert found.ending == "completed"
+    nothing_wrong(found)
+
+
+def test_babble_changes_nothing() -> None:
+    found = flown(scenario(incident(12, faults.Babble(0, 20))))
+    refused = [r["detail"] for r in records(found) if r.get("event") == "document-refused"]
+    assert refused
+    assert found.ending == "completed"
+    nothing_wrong(found)
+
+
+def test_documents_for_a_dead_process_are_lost() -> None:
+    found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S)), incident(16, faults.Recall(0))))
+    assert [type(each.fault).__name__ for each in found.happened] == ["RuntimeKilled"]
+    assert found.ending == "aborted"
+
+
+# ---------------------------------------------------------------- what was expected
+
+
+@pytest.mark.parametrize(
+    ("expected", "met"),
+    [
+        (EndsWith(("recalled", "aborted")), True),
+        (EndsWith(("completed",)), False),
+        (Flies("hover"), True),
+        (Flies("hover", never=True), False),
+        (Flies("inspect_area", never=True), True),
+        (Decides("allow", "takeoff"), True),
+        (Decides("allow", "hover"), True),
+        (Decides("deny"), False),
+        (Decides("allow", "takeoff", "admitted"), True),
+        (Decides("allow", "takeoff", "state/violated"), False),
+        (ReactsWithin(500_000), True),
+        (ReactsWithin(0), False),
+        (KeepsAway(None, M), True),
+        (KeepsAway(flat.SCHOOL, 50 * M), True),
+        (KeepsAway(flat.SCHOOL, 500 * M), False),
+        (EndsInside(flat.CITY), True),
+        (EndsInside(flat.BRIDGE), False),
+    ],
+)
+def test_expectations(expected: Expected, met: bool) -> None:
+    found = once("recalled", lambda: flown(scenario(incident(15, faults.Recall(0)))))
+    (answer,) = expectations(*_with(found, expected))
+    assert answer.met is met, answer
+    assert answer.found
+
+
+def _with(found: ScenarioFlown, expected: Expected) -> tuple[ScenarioFlown, Any]:
+    from dataclasses import replace
+
+    return replace(found, scenario=scenario(expects=(expected,))), judge(found)
+
+
+# ---------------------------------------------------------------- whatever happens
+
+SECOND_LONG: dict[type[Fault], Fault] = {
+    type(fault): fault
+    for fault in (
+        faults.RuntimeKilled(0, 4 * S), faults.HostStall(0, 5 * S), faults.DiskFull(0, 5 * S),
+        faults.ClockStep(0, 9 * S), faults.Approval(0, "supervisor"), faults.Disapproval(0, "supervisor"),
+        faults.Recall(0), faults.Replacement(0), faults.Babble(0),
+    )
+}  # fmt: skip
+
+
+def test_each_kind_of_host_and_agent_is_tried() -> None:
+    assert set(SECOND_LONG) == {kind for kind in faults.KINDS.values() if issubclass(kind, HostFault | AgentFault)}
+
+
+@pytest.mark.parametrize(("kind", "at_s", "flavour"), each_once(SECOND_LONG, (1, 7, 14, 25, 33), FLAVOURS))
+def test_nothing_goes_wrong_whenever_it_happens(kind: type[Fault], at_s: int, flavour: str, low: bytes) -> None:
+    found = flown(scenario(incident(at_s, SECOND_LONG[kind])), flavour, bundle=low)
+    assert judge(found).failures == ()

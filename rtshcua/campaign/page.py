@@ -11,12 +11,11 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from rtshcua.campaign.summary import Summary
-from rtshcua.model.quantity import Dimension, display
 
 _HEIGHT: Final = 48
 _WIDTH: Final = 10
 #: how a margin's name ends says its unit
-_UNITS: Final = (("_us", Dimension.DURATION), ("_mm_s", Dimension.SPEED), ("_mm", Dimension.LENGTH))
+_UNITS: Final = (("_us", "s", 1_000_000), ("_mm_s", "m/s", 1_000), ("_mm", "m", 1_000))
 
 
 def page(summary: Summary) -> str:
@@ -41,10 +40,9 @@ def page(summary: Summary) -> str:
 
 def margin_told(name: str, value: int) -> str:
     """A margin with its unit, as a person reads it: to three digits."""
-    for suffix, dimension in _UNITS:
+    for suffix, unit, parts in _UNITS:
         if name.endswith(suffix):
-            digits = max(len(str(abs(value))) - 3, 0)
-            return display(round(value, -digits), dimension) if value else f"0 {'s' if suffix == '_us' else 'm'}"
+            return f"{value / parts:.3g} {unit}"
     return str(value)
 
 

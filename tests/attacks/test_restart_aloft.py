@@ -51,7 +51,10 @@ def test_one_that_answers_nothing_is_not_told_what_to_do_before_it_does() -> Non
     run.tick(AirState(0, True, True), Answering(0, answers=False))
     run.until(lambda run: run.clock.now().monotonic_us > START.monotonic_us + Limits().ready_us + 10 * S, 140)
     assert (run.flown, run.ending) == ([], None)
-    run.tick(Answering(0, answers=True), Ready(0))
+    run.tick(Answering(0, answers=True))
+    run.tick()
+    assert run.flown == [], "it is not ready yet"
+    run.tick(Ready(0))
     run.until_over()
     assert run.flown[-1] == "return_home"
     assert_audited(run)

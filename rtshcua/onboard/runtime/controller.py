@@ -141,8 +141,9 @@ class MissionController:
     def _wait(self, now: Now, began_us: int) -> bool:
         vehicle = self.vehicle
         if not vehicle.ready or vehicle.airborne is None:
-            # one in the air that answers nothing is waited for longer: nothing that is sent would arrive
-            if now.monotonic_us - began_us > self._limits.ready_us and not (self.link.mute and self.aloft):
+            if self.link.mute and self.aloft:  # nothing that is sent would arrive: that time does not count
+                self._began_us = now.monotonic_us
+            elif now.monotonic_us - began_us > self._limits.ready_us:
                 self._journal.effect(now, "never-ready")
                 return self._come_down(now)
             return False

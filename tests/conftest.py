@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 from virtual import once
 from virtual.forked import Forked, forked
@@ -25,10 +26,20 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 # `make soak` tries many in every property test, and new ones each time. A test that needs more or fewer than others
 # takes a share of the profile's: `@settings(max_examples=settings().max_examples * 2)`. `make mutate` needs
 # the same examples for each change, and enough of them to notice it.
-settings.register_profile("test", deadline=None, derandomize=True, max_examples=25)
+settings.register_profile("test", deadline=None, derandomize=True, max_examples=15)
 settings.register_profile("mutate", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile("soak", deadline=None, max_examples=5_000)
 settings.load_profile("test")
+
+
+def same_examples() -> None:
+    """Keep Hypothesis from drawing constants that it finds in whatever modules are loaded by now.
+
+    They make the examples of a test depend on the tests before it, and to read all modules for them takes a second or
+    two in each process. `make soak` draws them too.
+    """
+    providers._get_local_constants = lambda: providers._local_constants
+
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
 COVERING = ("unit/decision", "unit/wire", "unit/evidence")
@@ -50,6 +61,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
     What is installed has its byte code, and is linked to it; the rest is compiled by whoever comes first.
     """
+    if config.getoption("--hypothesis-profile") != "soak":
+        same_examples()
     if hasattr(config, "workerinput"):
         return
     shared = TemporaryDirectory(prefix="rtshcua_once_")

@@ -21,3 +21,12 @@ def each_once(*axes: Iterable[Any]) -> list[Any]:
         )
         for where in product(*(range(len(axis)) for axis in values))
     ]
+
+
+def parts(values: Iterable[Any], count: int) -> list[Any]:
+    """Of many cases that are alike, each so-manieth: `make test` tries the first of these parts, soak the others."""
+    every = list(values)
+    return [
+        pytest.param(every[at::count], id=f"{at + 1} of {count}", marks=() if at == 0 else pytest.mark.soak)
+        for at in range(count)
+    ]

@@ -1,7 +1,10 @@
 """Every code has a page; its bad example has that code's finding alone, its good example none."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
+
+import pytest
 
 from reference.linted import linted
 from reference.unmet import unmet
@@ -13,6 +16,7 @@ from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import Program, load
 from rtshcua.mavlink import dialect
+from virtual.sampling import parts
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 PAGES = CHECKOUT / "docs" / "codes"
@@ -89,9 +93,10 @@ def test_a_bad_example_has_its_finding_alone() -> None:
     assert wrong == {}
 
 
-def test_a_good_example_has_no_finding() -> None:
+@pytest.mark.parametrize("shown", parts(SHOWN, 3))
+def test_a_good_example_has_no_finding(shown: Sequence[Code]) -> None:
     wrong = {}
-    for code in SHOWN:
+    for code in shown:
         text = example(read_page(code).good)
         assert text is not None, code.id
         found, program = findings(text, code)

@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model.faults import Mode
+from virtual.sampling import each_once
 
 AMSL = 488.0
 LOITER, TAKEOFF, RETURN, LAND = 50593792, 33816576, 84148224, 100925440
@@ -248,8 +249,9 @@ def targets(received: list[Any]) -> list[Any]:
 NOWHERE = (2**31 - 1, 2**31 - 1, nan)
 
 
-@pytest.mark.parametrize("mode", [Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.LAND, Mode.MISSION])
-@pytest.mark.parametrize("as_int", [False, True])
+@pytest.mark.parametrize(
+    ("mode", "as_int"), each_once([Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.LAND, Mode.MISSION], [False, True])
+)
 def test_a_reposition_without_a_place_stops(flying: Any, mode: Mode, as_int: bool) -> None:
     def pause() -> list[int]:
         return flying.int(192, 0, [-1, 1, 0, nan], *NOWHERE) if as_int else flying.pause()

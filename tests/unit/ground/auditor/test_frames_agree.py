@@ -4,7 +4,7 @@ from functools import cache
 from struct import pack
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as some
 
 from reference.kinds_of_flight import recorded
@@ -40,7 +40,6 @@ POINTS = ((473_978_000, 85_456_000), (473_979_000, 85_457_000))
 
 
 @pytest.mark.parametrize("kind", AUTOPILOTS)
-@settings(max_examples=settings().max_examples * 2)
 @given(data=some.data())
 def test_the_same_frames_carry_out_the_same_commands(kind: str, data: some.DataObject) -> None:
     frame = data.draw(some.sampled_from(commands(kind)))

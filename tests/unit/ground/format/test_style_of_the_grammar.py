@@ -81,7 +81,9 @@ def test_the_kinds_of_tokens_that_may_hold_blanks_are_known() -> None:
     assert found - {"<SPACE>"} == SPACED
 
 
-@pytest.mark.parametrize("start", ["declaration", "skill_item", "policy_item", "mission_item", "test_item", "scenario_item", "zone"])
+@pytest.mark.parametrize(
+    "start", ["declaration", "skill_item", "policy_item", "mission_item", "test_item", "scenario_item", "zone"]
+)
 def test_an_item_begins_a_line(start: str) -> None:
     """Two of a kind that stand on one line are laid out on two."""
     blocks = {

@@ -222,7 +222,7 @@ def test_the_shipped_tests_are_met(path: Path) -> None:
 
 def test_the_examples_of_the_reference_are_met() -> None:
     page = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
-    section = page.partition("\n## Tests\n")[2].partition("\n## Limits\n")[0]
+    section = page.partition("\n## Tests\n")[2].partition("\n## Scenarios\n")[0]
     blocks = [block.partition("```")[0] for block in section.split("```rts\n")[1:]]
     assert len(blocks) == 2
     for block in blocks:

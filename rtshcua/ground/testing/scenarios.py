@@ -78,7 +78,7 @@ class UnderScenario(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenarioFlight:
-    """A scenario with all that flying it needs: policy and mission as `compile` makes them, not yet bound."""
+    """A scenario with all that flying it needs: policy and mission as `compile` has them, not yet bound."""
 
     declaration: ScenarioDecl
     scenario: Scenario

@@ -95,11 +95,11 @@ def test_a_condition_has_the_slots_of_the_policy() -> None:
     assert incident.when.condition.text == "height > 10 m and battery < 50 %"
     code = incident.when.condition.code
     read = {code[at + 1] for at in range(0, len(code), 3) if code[at] == Op.SIGNAL}
-    assert read == {one.policy.vehicle.height, one.policy.vehicle.battery}
+    assert read == {one.policy.lowered.policy.vehicle.height, one.policy.lowered.policy.vehicle.battery}
 
 
 def test_a_grown_zone_that_the_policy_has_is_read_on_whichever_side() -> None:
-    zones = [zone.name for zone in flown("").policy.zones]
+    zones = [zone.name for zone in flown("").policy.lowered.policy.zones]
     assert "grow(school, 20 m)" in zones
     flown("when not position outside grow(school, 20 m) kill()")
     flown("when position outside grow(school, 20 m) kill()")
@@ -153,7 +153,7 @@ def test_what_is_expected() -> None:
   expect distance to obstacle >= 3 m
   expect lands in city
 """)
-    names = [zone.name for zone in one.policy.zones]
+    names = [zone.name for zone in one.policy.lowered.policy.zones]
     assert [each.what for each in one.scenario.expectations] == [
         EndsWith(("completed", "stood-down")),
         Decides("fallback", "return_home", "state/violated", "wind.speed < 10 m/s"),
@@ -175,7 +175,7 @@ def test_what_is_expected() -> None:
 def test_the_mission_is_what_compile_makes_of_it() -> None:
     one = flown("")
     compiled = compile_program(program(IMPORT), dialect.load(), mission="standard", issued_at_us=5)
-    assert (one.policy, one.mission) == (compiled.policy, compiled.mission)
+    assert (one.policy.lowered.policy, one.mission) == (compiled.policy, compiled.mission)
 
 
 def test_a_mission_with_parameters_flies_with_their_defaults() -> None:

@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.cli import simulated
 from rtshcua.cli.faults import code_of, fail
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.simulation.config import Boot, Kind
+from rtshcua.simulation.config import Answers, Boot, Estimate, Kind
 
 PORT = 14_550
 _FIRST_STEPS = {
@@ -41,6 +41,12 @@ def sim(
     boot: Annotated[
         Boot, typer.Option(help="sensors come up in a second, or as recorded: PX4 5 s, ArduCopter 42 s")
     ] = (Boot.FAST),
+    answers: Annotated[
+        Answers, typer.Option(help="it obeys and answers at once, or after as long as was recorded")
+    ] = Answers.RECORDED,
+    estimate: Annotated[
+        Estimate, typer.Option(help="it knows where it is within centimetres, or as with a real receiver")
+    ] = Estimate.CLOSE,
     signing_key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="it obeys only what is signed with this key (keys link)")
     ] = None,
@@ -77,7 +83,7 @@ def sim(
             return fail(ExitCode.INPUT, str(error))
         words.append(f"--signing-key={signing_key}")
     words += ["--usb"] if usb else []
-    words.append(f"--boot={boot}")
+    words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
     try:
         vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", "--system", str(system), *words])
     except SimulatorError as error:

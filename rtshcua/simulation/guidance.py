@@ -40,6 +40,10 @@ _TURNED_M_S, _TURNED_M = 0.15, 0.15
 """So slow behind the target, or so near the furthest place, it comes back."""
 
 
+_BACK_M_S, _BACK_M = 0.5, 2.5
+"""How fast it comes back, and from how far at most: the recorded ones took four to nine seconds."""
+
+
 class Past(NamedTuple):
     """How far, in metres, and in which direction it flies past a target before it comes back to it."""
 
@@ -55,6 +59,11 @@ class Past(NamedTuple):
             return False
         speed = (body.v_north * self.north + body.v_east * self.east) / far
         return speed < _TURNED_M_S or far - along < _TURNED_M
+
+
+def speed_back(body: Body, north: float, east: float) -> float:
+    """How fast it comes back to a target that it flew past; from further away, as fast as to any."""
+    return _BACK_M_S if hypot(north - body.north, east - body.east) < _BACK_M else inf
 
 
 def past(here: Point, target: Point, speed: float, agility: Agility) -> Past | None:

@@ -96,6 +96,7 @@ class Vehicle:
         self._nose: float | None = None
         self._radius = 0.0
         self._past: guidance.Past | None = None
+        self._comes_back = False  # from behind its target
         self._steer_to_target()
 
     @property
@@ -270,8 +271,11 @@ class Vehicle:
         """Keeps its height for so long before it goes on landing."""
         self._waiting_s = seconds
 
-    def go_to(self, target: Point) -> None:
-        """Flies straight to `target`; on the ground it does nothing, or lifts off if armed, as the flavour does."""
+    def go_to(self, target: Point, *, past: bool = True) -> None:
+        """Flies straight to `target`; on the ground it does nothing, or lifts off if armed, as the flavour does.
+
+        `past`: whether it may fly past it, and come back.
+        """
         if self.flies:
             if self.handling.forgets_at_first_target and self.mode is Mode.GUIDED and not self.sent:
                 self._speed = None
@@ -279,7 +283,9 @@ class Vehicle:
             if self.paused:
                 return
             if target != self.target or self._activity is not Activity.TRACK:
-                self._past = self._past_of(target)
+                self._past, self._comes_back = None, False
+                if past:
+                    self._fly_past(target)
             self.target = target
             self._nose = None
             self._steer_to_target()
@@ -346,14 +352,15 @@ class Vehicle:
         self.target = self._believed(*stop.place(body), up)
         self.destination = self._believed(*stop.told_place(body), up)
         self.sent = False
-        self._past = None
+        self._past, self._comes_back = None, False
         self._activity = activity
         self.landed = Landed.IN_AIR
 
-    def _past_of(self, target: Point) -> guidance.Past | None:
-        """How it will fly past a place that it flies to from here."""
+    def _fly_past(self, target: Point) -> None:
+        """It will fly past a place that it flies to from here, and come back to it."""
         here = self._believed(self.body.north, self.body.east, self.body.up)
-        return guidance.past(here, target, self.speed, self.handling.agility)
+        self._past = guidance.past(here, target, self.speed, self.handling.agility)
+        self._comes_back = False
 
     def _steer_to_target(self) -> None:
         agility = self.handling.agility
@@ -372,12 +379,14 @@ class Vehicle:
         if self._past is not None:
             if self._past.is_over(body, north, east):
                 self._past = None
+                self._comes_back = True
             else:
                 north, east = north + self._past.north, east + self._past.east
         if self._activity is Activity.CIRCLE:
             want = guidance.around(body, north, east, self._radius, self.speed)
         else:
-            want = guidance.towards(body, north, east, self.speed, self._approach)
+            speed = guidance.speed_back(body, north, east) if self._comes_back else self.speed
+            want = guidance.towards(body, north, east, min(speed, self.speed), self._approach)
         climb = self._climb_rate(north, east)
         body.track(dt, want, self._hardest, climb, most, wind)
         if self._nose is not None:
@@ -401,7 +410,7 @@ class Vehicle:
         elif activity is Activity.RETURN_CLIMB:
             if away < guidance.ARRIVED_M and abs(body.v_up) < guidance.ARRIVED_M_S:
                 self.target = self.destination = Point(0.0, 0.0, self.target.up)
-                self._past = self._past_of(self.target)
+                self._fly_past(self.target)
                 self._steer_to_target()
                 self._activity = Activity.RETURN_CROSS
         elif activity is Activity.RETURN_CROSS:

@@ -206,7 +206,8 @@ class Px4(Flavour):
             return
         a.last_target_us = a.now_us
         if a.vehicle.mode is Mode.GUIDED:
-            a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up))
+            # how far it flies past such a target was not recorded
+            a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up), past=False)
 
     def on_sticks(self, a: Autopilot, for_us: int) -> None:
         """COM_RC_OVERRIDE: sticks leave an automatic mode for Position, or for Altitude without a position."""

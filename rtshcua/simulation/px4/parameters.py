@@ -67,7 +67,7 @@ _AGILITY = Agility(
     spool_s=1.5,
     ramp_s=2.2,
     land_detect_s=4.0,
-    overshoot_s=0.25,
+    overshoot_s=0.18,
     home_within=2.0,
     land_braking=0.2,
 )

@@ -67,7 +67,7 @@ KEPT: Mapping[str, Mapping[str, str]] = {
         "height from 37 s": JERK,
         "place from 37 s": "from 5.6 m/s, which it comes to here never, it flies further past the place of the return",
     },
-    "px4-takeover-race": {"place from 38 s": AIR},
+    "px4-takeover-race": {"place from 38 s": AIR, "place from 62 s": AIR},
     "px4-pilot-pause": {},
     "px4-pilot-goto": {
         "mode (50593792, True), time 1": "between arming and the takeoff came a heartbeat, by chance",

@@ -8,7 +8,9 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause, which nothing reports |
+| `unseen` | motion after a takeover | nothing reports ArduCopter's pause, nor PX4's where a climb ends anyway |
+| `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
+| `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
 | `link` | a collision, a late reaction | nothing came from the vehicle, or nothing got there |
 | `process` | a collision, flying on, an unlogged effect | our process was dead, or did not get to run |
@@ -22,7 +24,8 @@ from typing import Final, NamedTuple
 import msgspec
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Way
+from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.virtual.flown import Happened, Sample, ScenarioFlown
 
 #: mm/s: what a multirotor of this size does not fly against, and us: how long after it counts
@@ -38,6 +41,8 @@ _REORDER_US: Final = 60_000
 _BRAKING: Final = 2_000
 _REACTION_US: Final = 1_000_000
 _STANDS_MM_S: Final = 500
+#: mm: two heights that a report of the autopilot's target does not tell apart
+_SAME_MM: Final = 3_000
 #: a process that is killed has not written the last of these
 _UNWRITTEN_US: Final = 250_000
 _RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
@@ -197,9 +202,23 @@ class Excuses:
         return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
 
     def _unseen(self, failure: Failure) -> str | None:
-        paused = self._flown.flavour == "ardupilot" and any(self._before(failure.at_us, faults.PilotPause))
-        others = any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto, faults.PilotSticks))
-        return "unseen" if paused and not others else None
+        """Nothing reports ArduCopter's pause. PX4's ends a climb as the climb itself does, near the height of it."""
+        if any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto, faults.PilotSticks)):
+            return None
+        for fault in self._before(failure.at_us, faults.PilotPause):
+            sample = self._sample(fault.at_us)
+            if self._flown.flavour == "ardupilot":
+                return "unseen"
+            climbs = sample is not None and sample.mode is Mode.TAKEOFF
+            if sample is not None and climbs and any(abs(up - sample.up_mm) <= _SAME_MM for up in self._climbs()):
+                return "unseen"
+        return None
+
+    def _climbs(self) -> Iterator[int]:
+        """The heights that the mission takes off to."""
+        for invocation in self._flown.mission.invocations:
+            if invocation.plan.kind == MotionKind.CLIMB:
+                yield invocation.plan.altitude
 
     def _link(self, failure: Failure) -> str | None:
         """Nothing came from the vehicle, or got there, while something had to be done."""

@@ -95,7 +95,9 @@ def _is(what: Decides, flown: ScenarioFlown, record: dict[str, Any]) -> bool:
 
 def _skill(flown: ScenarioFlown, record: dict[str, Any]) -> str:
     """The skill that a decision lets fly: that of its target, of the link that it is about, or of the step."""
-    policy, step, link = flown.policy, record["step"], record["link"]
+    policy = flown.policy
+    step: int = record["step"]
+    link: int = record["link"]
     if record["target"] is not None:
         return _first_word(record["target"])
     if record["kind"] == CONTINGENCY_LINK:

@@ -23,7 +23,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, inf
+from math import hypot, inf, sqrt
 from typing import Any, Final
 
 import msgspec
@@ -86,7 +86,7 @@ def judge(flown: ScenarioFlown) -> Judgement:
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
         *_unlogged(flown, motion), *_faults(flown),
     ]  # fmt: skip
-    judged = [excuses.judged(each) for each in found]
+    judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)
     return Judgement(
         _told([each for each in judged if each.cause is None]),
@@ -117,7 +117,7 @@ def inside_mm(zone: Zone, x: float, y: float, up: float) -> float:
 def _level_mm(zone: Zone, x: float, y: float) -> float:
     if zone.shape == CIRCLE:
         east, north, square = zone.data
-        return float(square) ** 0.5 - hypot(x - east, y - north)
+        return sqrt(square) - hypot(x - east, y - north)
     within, nearest = False, inf
     for ring in _rings(zone):
         for (ax, ay), (bx, by) in zip(ring, (*ring[1:], ring[0]), strict=True):
@@ -319,20 +319,28 @@ def _motion(flown: ScenarioFlown) -> Motion:
 
 
 def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[Failure], int | None]:
-    """Frames that left later than W after a takeover took effect, while that still lasted."""
+    """Frames that left later than W after a takeover took effect.
+
+    One that was on its way then undoes the takeover. Where nothing of that shows, ours counts (docs/adr/0034): what
+    follows is an exception.
+    """
     times = [sample.at_us for sample in flown.samples]
-    found, latest = list[Failure](), None
-    within_us = MODE_WITHIN_US[flown.flavour] + flown.tick_us + flown.wait_us
-    for frame, _ in motion:
+    found, latest, crossed = list[Failure](), None, False
+    for frame, kinds in motion:
         at = bisect_left(times, frame.sent_us)
         since_us = flown.samples[at].taken_over_us if at < len(times) else None
-        if since_us is None or frame.sent_us <= since_us:
+        if since_us is None or (frame.heard_us or frame.sent_us) <= since_us:
             continue
         after_us = frame.sent_us - since_us
         latest = max(latest or 0, after_us)
-        if after_us > within_us + excuses.delay_us(since_us, frame.sent_us):
-            text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
-            found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us))
+        within_us = MODE_WITHIN_US[flown.flavour] + flown.tick_us + flown.wait_us
+        if after_us <= within_us + excuses.delay_us(since_us, frame.sent_us):
+            crossed = crossed or frame.heard_us is not None
+            continue
+        text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
+        lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
+        cause = "crossed" if crossed else "ground" if lands else None
+        found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us, cause))
     return found, latest
 
 
@@ -372,7 +380,7 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
     for life in flown.lives:
         decided: dict[tuple[int, int, int], dict[str, Any]] = {}
         for record in _records(life):
-            ref = (record.get("kind"), record.get("step"), record.get("link"))
+            ref = (record.get("kind", -1), record.get("step", -1), record.get("link", -1))
             if record["type"] == "decision":
                 decided[ref] = record
             elif record.get("event") == "dispatched" and ref in decided:

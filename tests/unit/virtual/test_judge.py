@@ -301,23 +301,42 @@ def motion(good: ScenarioFlown) -> list[Frame]:
 def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
-    def taken(before_us: int, *happened: Fault, sent_us: int = frame.sent_us) -> Judgement:
+    def taken(before_us: int, *happened: Fault, more: Sequence[Frame] = (), **fields: Any) -> Judgement:
         since_us = frame.sent_us - before_us
         samples = [
             each._replace(taken_over_us=since_us if each.at_us >= since_us else None, taken_over_by="pilot")
             for each in good.samples
         ]
-        frames = [each if each is not frame else frame._replace(sent_us=sent_us) for each in good.frames]
-        return judged(good, samples, *happened, frames=tuple(frames))
+        return judged(good, samples, *happened, frames=(*more, frame), **fields)
 
-    assert slugs(taken(2 * S)) == ["motion-after-takeover"]
+    def is_late(found: Judgement) -> bool:
+        return "motion-after-takeover" in slugs(found)
+
+    assert is_late(taken(2 * S))
     assert taken(2 * S).margins.takeover_us == 2 * S
-    assert slugs(taken(200_000)) == []
-    assert slugs(taken(2 * S, sent_us=frame.sent_us - 2 * S - 1)) != ["motion-after-takeover"]  # it was on its way
-    assert slugs(taken(2 * S, faults.LinkDelay(S, 2 * S))) == []
-    assert slugs(taken(2 * S, faults.LinkSilence(S, held=True))) == []
-    assert slugs(taken(2 * S, faults.LinkSilence(S))) == ["motion-after-takeover"]  # nothing comes later than it is
-    assert slugs(taken(2 * S, faults.PilotPause(S))) == ["motion-after-takeover"]  # that shows on PX4
+    assert not is_late(taken(200_000))
+    assert not is_late(taken(2 * S, faults.LinkDelay(S, 2 * S)))
+    assert not is_late(taken(2 * S, faults.LinkSilence(S, held=True)))
+    assert is_late(taken(2 * S, faults.LinkSilence(S)))  # nothing comes later than it is
+    assert is_late(taken(2 * S, faults.PilotPause(S)))  # that shows on PX4
+    under_way = frame._replace(sent_us=frame.sent_us - 2 * S - 1, heard_us=frame.sent_us - 2 * S + 1)
+    assert causes(taken(2 * S, more=[under_way])) == [("motion-after-takeover", "crossed")]
+
+
+def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
+    frame = motion(good)[-1]
+
+    def paused(flavour: str, up_m: float, *others: Fault) -> Judgement:
+        since_us = frame.sent_us - 5 * S
+        before = sample(since_us / S, up_m=up_m, mode=Mode.TAKEOFF)
+        after = [each for each in good.samples if each.at_us > since_us]
+        samples = [before, *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in after)]
+        happened = (faults.PilotPause(since_us), *others)
+        return judged(good, samples, *happened, frames=(frame,), flavour=flavour)
+
+    assert causes(paused("px4", 3)) == [("motion-after-takeover", "unseen")]
+    assert "motion-after-takeover" in slugs(paused("px4", 1))
+    assert "motion-after-takeover" in slugs(paused("px4", 3, faults.PilotMode(S)))
 
 
 def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:

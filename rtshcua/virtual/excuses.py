@@ -8,7 +8,7 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | nothing reports ArduCopter's pause, nor PX4's where a climb ends anyway |
+| `unseen` | motion after a takeover | ArduCopter's pause; PX4's where it stands anyway, or ends a climb |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
 | `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
@@ -41,6 +41,7 @@ _REORDER_US: Final = 60_000
 _BRAKING: Final = 2_000
 _REACTION_US: Final = 1_000_000
 _STANDS_MM_S: Final = 500
+_TICK_US: Final = 50_000
 #: mm: two heights that a report of the autopilot's target does not tell apart
 _SAME_MM: Final = 3_000
 #: a process that is killed has not written the last of these
@@ -109,6 +110,13 @@ class Excuses:
                 case faults.LinkSilence(at_us, for_us) | faults.Stall(at_us, for_us) | faults.HostStall(at_us, for_us):
                     total += min(for_us or _FOREVER, to_us - at_us)
         return total
+
+    def paused_at(self, at_us: int) -> bool:
+        """Whether it was a pilot's pause that happened at that time."""
+        return any(
+            isinstance(each.fault, faults.PilotPause) and each.at_us <= at_us <= each.at_us + _TICK_US
+            for each in self._happened
+        )
 
     # -------------------------------------------------------- what happened before
 

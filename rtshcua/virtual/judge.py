@@ -322,14 +322,15 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     """Frames that left later than W after a takeover took effect.
 
     One that was on its way then undoes the takeover. Where nothing of that shows, ours counts (docs/adr/0034): what
-    follows is an exception.
+    follows is an exception. So it is where a pilot stops what stands already, told so by us.
     """
     times = [sample.at_us for sample in flown.samples]
-    found, latest, crossed = list[Failure](), None, False
+    found, latest, crossed, holds = list[Failure](), None, False, False
     for frame, kinds in motion:
         at = bisect_left(times, frame.sent_us)
         since_us = flown.samples[at].taken_over_us if at < len(times) else None
         if since_us is None or (frame.heard_us or frame.sent_us) <= since_us:
+            holds = kinds == {MotionKind.HOLD}
             continue
         after_us = frame.sent_us - since_us
         latest = max(latest or 0, after_us)
@@ -339,7 +340,8 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
             continue
         text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
         lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
-        cause = "crossed" if crossed else "ground" if lands else None
+        stood = holds and excuses.paused_at(since_us) and _is_still(flown.samples[bisect_left(times, since_us)])
+        cause = "crossed" if crossed else "unseen" if stood else "ground" if lands else None
         found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us, cause))
     return found, latest
 

@@ -326,16 +326,18 @@ def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
 def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
-    def paused(flavour: str, up_m: float, *others: Fault) -> Judgement:
+    def paused(flavour: str, up_m: float, *others: Fault, frames: tuple[Frame, ...] = (frame,)) -> Judgement:
         since_us = frame.sent_us - 5 * S
         before = sample(since_us / S, up_m=up_m, mode=Mode.TAKEOFF)
         after = [each for each in good.samples if each.at_us > since_us]
         samples = [before, *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in after)]
         happened = (faults.PilotPause(since_us), *others)
-        return judged(good, samples, *happened, frames=(frame,), flavour=flavour)
+        return judged(good, samples, *happened, frames=frames, flavour=flavour)
 
     assert causes(paused("px4", 3)) == [("motion-after-takeover", "unseen")]
     assert "motion-after-takeover" in slugs(paused("px4", 1))
+    stop = Frame(S, S, reposition(0x7FFFFFFF, 0x7FFFFFFF))
+    assert causes(paused("px4", 1, frames=(stop, frame))) == [("motion-after-takeover", "unseen")]
     assert "motion-after-takeover" in slugs(paused("px4", 3, faults.PilotMode(S)))
 
 

@@ -46,6 +46,15 @@ class Simulator:
         """Wait until the process ends by itself; its exit code."""
         return self._process.wait()
 
+    def inject(self, fault: str) -> None:
+        """Let something go wrong, as `--fault` says it, its time counted from now on. Raises `SimulatorError`."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(fault.encode("ascii") + b"\n")
+            self._process.stdin.flush()
+        except OSError as error:
+            raise SimulatorError(f"the simulated vehicle is gone: {error.strerror or error}") from error
+
     def stop(self) -> None:
         """End it: by closing its input, and, should it not listen, by signals."""
         process = self._process

@@ -36,6 +36,16 @@ def parse_fault(text: str) -> Fault:
     return kind(**values)
 
 
+def fault_words(fault: Fault) -> str:
+    """The text that describes a fault, for `parse_fault`."""
+    words = [next(name for name, kind in OF_VEHICLE.items() if kind is type(fault)), f"at={fault.at_us}us"]
+    for each in parameters(type(fault)):
+        value = getattr(fault, each.field)
+        if value is not None:
+            words.append(f"{each.name}={_written(each, value)}")
+    return ",".join(words)
+
+
 def message_number(name: str) -> int:
     """The number of a message. Raises ValueError if the dialect has none of this name."""
     number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}", None)
@@ -59,6 +69,16 @@ def _value(parameter: Parameter, text: str) -> object:
     if match is None or match[2] not in units:
         raise ValueError(f"`{parameter.name}` is a number with its unit ({', '.join(units)}), not `{text}`")
     return round(Decimal(match[1]) * units[match[2]])
+
+
+def _written(parameter: Parameter, value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if parameter.unit is None:
+        return str(value)
+    assert isinstance(value, int)
+    word, parts = min(parameter.unit.words.items(), key=lambda each: each[1])
+    return f"{Decimal(value) / parts}{word}"
 
 
 def _word(parameter: Parameter, text: str) -> object:

@@ -2,7 +2,8 @@
 
 A thin loop around `world.Simulation`: one UDP socket on the loopback interface, real time times `--speed`. It sends to
 one peer and hears only that one, as a real link does. When it is up it prints one line of JSON. It ends on SIGTERM,
-and, if its standard input is a pipe, when the other end of that closes, so that it never outlives who started it.
+and, if its standard input is a pipe, when the other end of that closes, so that it never outlives who started it. Each
+line that comes from there is a fault as `--fault` has it, its time counted from then on.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import stat
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rtshcua.mavlink.signing import KEY_OCTETS
@@ -185,6 +187,7 @@ class _Loop:
         self._peer = peer
         self._speed = speed
         self._ended = False
+        self._unread = b""
 
     def listen(self, selector: selectors.BaseSelector) -> None:
         """Begins to listen to the peer, and to whoever may end the process."""
@@ -206,7 +209,7 @@ class _Loop:
             now = time.monotonic()
             now_us += min((now - last) * self._speed * 1_000_000, _LEAP_US)
             last = now
-            if sys.stdin in ready and not os.read(sys.stdin.fileno(), 4096):
+            if sys.stdin in ready and not self._told(os.read(sys.stdin.fileno(), 4096), int(now_us)):
                 return
             if self._link in ready:
                 self._hear(int(now_us))
@@ -227,6 +230,18 @@ class _Loop:
                 return
             if sender == self._peer:
                 self._send(self._simulation.receive(data, at_us))
+
+    def _told(self, data: bytes, at_us: int) -> bool:
+        """Takes in what came from who started it; whether that goes on."""
+        *lines, self._unread = (self._unread + data).split(b"\n")
+        for line in lines:
+            try:
+                fault = parse_fault(line.decode("ascii", "replace"))
+            except ValueError as error:
+                sys.stderr.write(f"error: {error}\n")
+                continue
+            self._simulation.inject(replace(fault, at_us=at_us + fault.at_us))
+        return bool(data)
 
     def _send(self, frames: list[bytes]) -> None:
         for frame in frames:

@@ -137,6 +137,21 @@ def test_ready_line() -> None:
         assert next(s.frames()).system == 7
 
 
+def test_its_parent_lets_something_go_wrong() -> None:
+    with Station("--speed", "20") as s:
+        assert s.process.stdin is not None
+        s.process.stdin.write(b"rain,at=0s\nbattery,at=0s,lev")
+        s.process.stdin.flush()
+        s.process.stdin.write(b"el=40%\n")
+        s.process.stdin.flush()
+        assert any(frame.name == "BATTERY_STATUS" and frame.message.battery_remaining <= 40 for frame in s.frames())
+        s.process.stdin.close()
+        s.process.stdin = None
+        assert s.process.wait(PATIENCE_S) == EXIT_OK
+        assert s.process.stderr is not None
+        assert b"no such fault: `rain`" in s.process.stderr.read()
+
+
 def test_it_ends_when_its_parent_is_gone() -> None:
     with Station() as s:
         assert s.process.stdin is not None

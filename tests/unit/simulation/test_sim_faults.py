@@ -1,14 +1,16 @@
 """Each fault, and what it shows to a client."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.campaign.drawing import Space, Tally, draw
 from rtshcua.model import faults
 from rtshcua.model.faults import Mode
-from rtshcua.simulation.faults import parse_fault
+from rtshcua.simulation.faults import OF_VEHICLE, fault_words, parse_fault
 from rtshcua.simulation.surroundings import Wind
 
 S = 1_000_000
@@ -308,3 +310,14 @@ def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, 
     inject(p, faults.BatteryVoltage, 10_200)
     p.wait(11)
     assert p.truth.mode is mode
+
+
+def test_a_fault_is_written_as_it_is_read() -> None:
+    space = Space(
+        ("takeoff", "return_home"), {"px4": 60 * S, "ardupilot": 60 * S}, kinds=frozenset(OF_VEHICLE.values())
+    )
+    drawn = [draw(7, number, space, Tally()) for number in range(400)]
+    made = [replace(each.fault, at_us=7) for one in drawn for each in one.scenario.incidents]
+    assert {type(each) for each in made} == set(OF_VEHICLE.values())
+    for fault in made:
+        assert parse_fault(fault_words(fault)) == fault, fault_words(fault)

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
 from reference.archived import CHECK, write_fleet
 from rtshcua.adapters.archive.adding import Check, Done, add
 from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.index import lay_out
 
 Add = Callable[..., list[Done]]
 
@@ -20,10 +22,18 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def empty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of an archive that has its tables, with nothing in them: the engine takes its time to make them."""
+    folder = Folder(tmp_path_factory.mktemp("empty") / "archive", make=True)
+    lay_out(folder)
+    return folder.path
+
+
 @pytest.fixture
-def folder(tmp_path: Path) -> Folder:
+def folder(empty: Path, tmp_path: Path) -> Folder:
     """An archive with nothing in it."""
-    return Folder(tmp_path / "archive", make=True)
+    return Folder(Path(copytree(empty, tmp_path / "archive")), make=True)
 
 
 @pytest.fixture

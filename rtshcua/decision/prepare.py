@@ -132,6 +132,9 @@ class Compiler:
         self._scope = scope_of(policy)
         self._conditions: dict[int, Condition] = {}
         self._requires: dict[int, Guards] = {}
+        self._guards: dict[tuple[Clause, ...], Guards | None] = {
+            clauses: None for of in policy.contracts for clauses in (of.require, of.assume, of.maintain)
+        }
         self.tables = Tables(
             zones=tuple(
                 PreparedZone(number, zone, policy.vehicle.utc_offset_us) for number, zone in enumerate(policy.zones)
@@ -155,8 +158,13 @@ class Compiler:
         return build(node, self.tables)
 
     def guards(self, clauses: tuple[Clause, ...], contract: Contract) -> Guards:
-        """The clauses of a contract."""
-        return tuple((clause, build(self.node(clause, contract), self.tables)) for clause in clauses)
+        """The clauses of a contract. Those that stand in the policy are compiled once: most steps have no others."""
+        found = self._guards.get(clauses)
+        if found is None:
+            found = tuple((clause, build(self.node(clause, contract), self.tables)) for clause in clauses)
+            if clauses in self._guards:
+                self._guards[clauses] = found
+        return found
 
     def when(self, rule: Rule) -> Node | None:
         """The tree of a rule's condition, if it has one."""

@@ -6,6 +6,7 @@ Every number is a sum of state slots and argument cells times constants, plus a 
 """
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Clause, Op
@@ -350,17 +351,31 @@ def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Moni
     slots: set[int] = set()
     left, seen = list(clauses), set[int]()
     while left:
-        code = left.pop().code
-        for at in range(0, len(code), 3):
-            op = code[at]
-            if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN):
-                slots.add(code[at + 1])
-            elif op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT):
-                slots.update(where(vehicle))
-            elif op == Op.MONITOR and code[at + 1] not in seen:
-                seen.add(code[at + 1])
-                left.append(monitors[code[at + 1]].when)
+        read = _read(left.pop().code)
+        slots |= read.slots
+        if read.where:
+            slots.update(where(vehicle))
+        left += [monitors[number].when for number in read.monitors - seen]
+        seen |= read.monitors
     return tuple(sorted(slots))
+
+
+class _Read(NamedTuple):
+    """What code reads: slots and monitors, and whether it asks where the vehicle is."""
+
+    slots: frozenset[int]
+    monitors: frozenset[int]
+    where: bool
+
+
+@lru_cache(maxsize=1024)  # checks and preparation ask it of the same code, for each step anew
+def _read(code: tuple[int, ...]) -> _Read:
+    named = list(zip(code[::3], code[1::3], strict=False))
+    return _Read(
+        frozenset(at for op, at in named if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN)),
+        frozenset(at for op, at in named if op == Op.MONITOR),
+        any(op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT) for op, _ in named),
+    )
 
 
 def monitored(clauses: Iterable[Clause]) -> bool:

@@ -52,9 +52,10 @@ def invocation(invocation: Invocation, policy: Policy, zones: Sequence[PreparedZ
     yield from within("on inadmissible", invocation.on_inadmissible, OnInadmissible.ABORT, OnInadmissible.SKIP)
     yield from within("issued at", invocation.issued_at_us, 0, MAX_VALUE)
     yield from within("phases", invocation.phases, 0, (1 << MAX_PHASES) - 1)
-    mine = invocation.contract
-    yield from tightens(mine, policy.contracts[invocation.skill])
-    yield from contract(mine, policy, scope_of(policy))
+    mine, policys = invocation.contract, policy.contracts[invocation.skill]
+    if mine != policys:  # the policy's own was looked at with the policy
+        yield from tightens(mine, policys)
+        yield from contract(mine, policy, scope_of(policy))
     if len(invocation.arguments) != cells(mine):
         yield f"{len(invocation.arguments)} argument cells instead of {cells(mine)}"
     for argument in invocation.arguments:

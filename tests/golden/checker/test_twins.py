@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from reference.flown import flown
 from reference.linted import linted
 from reference.unmet import unmet
 from rtshcua.diagnostics import codes
@@ -66,6 +67,8 @@ def findings(side: str, name: str) -> tuple[tuple[Diagnostic, ...], dict[str, So
         found = check_program(program, dialect.load())
     if name.startswith(codes.NOT_MET.id.lower()):
         found += unmet(program)
+    if name.startswith(codes.FLIGHT_FAILED.id.lower()):
+        found += flown(program)
     if name.startswith(HABITS):
         found += linted(program)
     return found, program.sources

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from reference.flown import flown
 from reference.linted import linted
 from reference.unmet import unmet
 from rtshcua.cli.pages import HEADINGS, example, read_page
@@ -64,6 +65,8 @@ def findings(text: str, code: Code) -> tuple[tuple[Diagnostic, ...], Program]:
         found = check_program(program, dialect.load())
     if code is codes.NOT_MET:
         found += unmet(program)
+    if code is codes.FLIGHT_FAILED:
+        found += flown(program)
     return found + (linted(program) if code.id.startswith("E13") else ()), program
 
 

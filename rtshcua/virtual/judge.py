@@ -442,25 +442,34 @@ def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
 
 
 def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
-    """Frames that carry out no command that a log had at that time: its last command is of another kind, or over."""
+    """Frames that carry out no command that a log had at that time: its last command is of another kind, or over.
+
+    Of commands that were dispatched at the very moment of the frame, any may be it.
+    """
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
         effects = [record for record in _records(life) if record["type"] == "effect" and record["token"] >= 0]
         times = [record["at_us"] - flown.start_us for record in effects]
+        over: dict[int, dict[str, Any]] = {}
+        for record in effects:
+            if record["event"] != "dispatched":
+                over.setdefault(record["token"], record)
         for frame, parts in motion:
             if not life.began_us <= frame.sent_us <= life.ended_us:
                 continue
-            upto = effects[: bisect_right(times, frame.sent_us)]
-            begun = next((record for record in reversed(upto) if record["event"] == "dispatched"), None)
-            if begun is None:
+            begun = [r for r in effects[: bisect_right(times, frame.sent_us)] if r["event"] == "dispatched"]
+            if not begun:
                 yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent, and no command was")
                 continue
-            over = [r for r in upto if r["token"] == begun["token"] and r is not begun and r["at_us"] > begun["at_us"]]
-            if kinds.get(begun["detail"]) not in parts:
-                text = f"{_name(frame)} was sent, and the last command was `{begun['detail']}`"
+            now_us = frame.sent_us + flown.start_us
+            may_be = [r for r in begun if r["at_us"] == now_us] + [r for r in begun if r["at_us"] < now_us][-1:]
+            fitting = [record for record in may_be if kinds.get(record["detail"]) in parts]
+            ended = [over[record["token"]] for record in fitting if record["token"] in over]
+            if not fitting:
+                text = f"{_name(frame)} was sent, and the last command was `{begun[-1]['detail']}`"
                 yield Failure("unlogged-effect", frame.sent_us, text)
-            elif over and over[0]["at_us"] - flown.start_us < frame.sent_us:
-                text = f"{_name(frame)} was sent after `{begun['detail']}` had ended: {over[0]['event']}"
+            elif len(ended) == len(fitting) and all(record["at_us"] < now_us for record in ended):
+                text = f"{_name(frame)} was sent after `{fitting[0]['detail']}` had ended: {ended[0]['event']}"
                 yield Failure("unlogged-effect", frame.sent_us, text)
     for frame, _ in motion:
         if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):

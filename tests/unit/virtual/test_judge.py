@@ -19,7 +19,7 @@ from rtshcua.virtual.flown import Frame, Happened, Reaction, Sample, ScenarioFlo
 from rtshcua.virtual.judge import SLUGS, Judgement, inside_mm, judge, moves
 from virtual import case
 from virtual.once import once
-from virtual.scenarios import flown, scenario
+from virtual.scenarios import flown, incident, scenario
 
 S, M = case.S, case.M
 
@@ -350,8 +350,16 @@ def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:
     assert "the last command was" in judge(replace(good, frames=tuple(other))).failures[0].text
     over = [*good.frames, Frame(good.ended_us + S, good.ended_us + S, land)]
     assert slugs(judge(replace(good, frames=tuple(over)))) == ["unlogged-effect"]
+    ended = frame._replace(sent_us=good.ended_us - 1)
+    assert "unlogged-effect" in slugs(judge(replace(good, frames=(ended,))))
     full = (Happened(0, 0, faults.DiskFull(0), ""),)
     assert causes(judge(replace(good, frames=(early,), happened=full))) == [("unlogged-effect", "disk")]
+
+
+def test_two_commands_at_one_moment() -> None:
+    """ArduCopter refuses to brake without a position: the landing goes out in the same turn, and both are logged."""
+    found = judge(flown(scenario(incident(13.4, faults.EstimatorUnhealthy(0, 5 * S))), "ardupilot", seed=5))
+    assert found.failures == ()
 
 
 def test_a_late_fallback(good: ScenarioFlown) -> None:

@@ -1,14 +1,13 @@
 """Flies one flight of a scenario: what goes wrong goes wrong when the scenario says so, in virtual time.
 
-The same arguments give the same flight, byte by byte. Where a scenario leaves a time open, incident `number` (from 0)
-happens after a delay that `Random(f"{scenario.name} {number} {seed}")` draws from its range; what a killed process
-loses, and what babble says, is drawn from the same source afterwards.
+The same arguments give the same flight, byte by byte. What a killed process loses, and what babble says, is drawn from
+the same source as the time of the incident (`triggers`), afterwards.
 
 What goes wrong with the vehicle, its link and its surroundings is the simulation's affair, to its tick. What goes wrong
 with our own computer and with those who hand in documents happens here, between two turns of the loop.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from heapq import heappop, heappush
@@ -16,29 +15,24 @@ from random import Random  # noqa: TID251  seeded: the same seed draws the same
 from traceback import format_exception
 from typing import Any, Final
 
-import msgspec
-
 from rtshcua.adapters.clock import StepWatch
 from rtshcua.adapters.packs import manoeuvres, packs_of
-from rtshcua.decision.case import environment, situation
-from rtshcua.decision.evaluate import NO_PHASE, Condition, build
-from rtshcua.decision.values import TRUE
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.recovery import RECOVERABLE, Examination, ending
 from rtshcua.model import faults
 from rtshcua.model.faults import AgentFault, Fault, HostFault
 from rtshcua.model.flat.situation import Now
-from rtshcua.model.scenario import AfterStep, AtTime, Incident, OnCondition, Scenario
+from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Append, Dispatch, Ending, Event, Presented, Readings
-from rtshcua.onboard.runtime.monitor import StateMonitor
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Presented
+from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.flight import MemorySink, VirtualFlight
 from rtshcua.virtual.flown import Frame, Happened, Life, Reaction, Sample, ScenarioFlown
+from rtshcua.virtual.triggers import Due, Triggers
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire import cose
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
@@ -164,9 +158,8 @@ class _Flight:
         self._lives: list[Life] = []
         self._happened: list[Happened] = []
         self._notes: list[str] = []
-        self._chances = [Random(f"{scenario.name} {number} {seed}") for number in range(len(scenario.incidents))]
+        self._triggers = Triggers(scenario, seed)
         self._agenda: list[tuple[int, int]] = []  # when, and the number of what happens to host or documents
-        self._waits: dict[int, Incident] = {}  # for a step or a condition
         self._dead_us = 0
         self._babble: list[tuple[int, int, bytes]] = []  # when, its order, and what is said then
         self._drawn = 0
@@ -183,15 +176,13 @@ class _Flight:
         self._utc_us = self._flight.clock.now().utc_us
         self._began_us = 0
         self._begin_life(self._flight)
-        for number, incident in enumerate(scenario.incidents):
-            if isinstance(incident.when, AtTime):
-                self._schedule(number, incident, 0)
-            else:
-                self._waits[number] = incident
+        self._schedule(self._triggers.start())
 
     def _config(self, chosen: Callable[..., SimulationConfig], policy: object) -> SimulationConfig:
         start = self._scenario.start
-        asked: dict[str, object] = {"flavour": Kind(self._flavour), "seed": self._seed}
+        asked: dict[str, object] = {
+            "flavour": Kind(self._flavour), "seed": self._seed, "answers": Answers.RECORDED, "estimate": Estimate.REAL,
+        }  # fmt: skip
         if start.battery is not None:
             asked["battery"] = start.battery
         if start.wind_mm_s is not None:
@@ -209,23 +200,22 @@ class _Flight:
 
     # -------------------------------------------------------- what happens when
 
-    def _schedule(self, number: int, incident: Incident, since_us: int) -> None:
-        when = incident.when
-        at_us = since_us + self._chances[number].randint(when.from_us, when.to_us)
-        if isinstance(incident.fault, HostFault | AgentFault):
-            heappush(self._agenda, (at_us, number))
-        else:
-            fault = replace(incident.fault, at_us=at_us)
-            self._world.inject(fault)
-            self._happened.append(Happened(number, at_us, fault, incident.text))
+    def _schedule(self, due: Iterable[Due]) -> None:
+        for number, at_us in due:
+            incident = self._scenario.incidents[number]
+            if isinstance(incident.fault, HostFault | AgentFault):
+                heappush(self._agenda, (at_us, number))
+            else:
+                fault = replace(incident.fault, at_us=at_us)
+                self._world.inject(fault)
+                self._happened.append(Happened(number, at_us, fault, incident.text))
 
     def _begin_life(self, flight: VirtualFlight) -> None:
         self._flight = flight
         self._began_us = flight.clock.elapsed_us
         self._reactions: list[Reaction] = []
         self._heard_us = flight.clock.elapsed_us
-        self._monitor = StateMonitor(flight.loaded.policy)
-        self._conditions: dict[int, Condition] = {}
+        self._triggers.begin(flight.loaded.policy)
         self._steps = StepWatch(self._machine_us)
         flight.loop._watch = self._stepped  # the flight's own only counts
 
@@ -239,41 +229,8 @@ class _Flight:
         for action in actions:
             if isinstance(action, Dispatch) and not action.needs_record:
                 self._reactions.append(Reaction(self._heard_us, at_us))
-            elif isinstance(action, Append) and self._waits and b'"event":"dispatched"' in action.line:
-                self._dispatched(msgspec.json.decode(action.line), at_us)
-        if self._waits and self._conditional():
-            self._look(now, events, at_us)
+        self._schedule(self._triggers.turned(now, events, actions, at_us))
         self._heard_us = at_us
-
-    def _dispatched(self, record: dict[str, Any], at_us: int) -> None:
-        for number, incident in list(self._waits.items()):
-            when = incident.when
-            if isinstance(when, AfterStep) and record["kind"] == 0 and record["step"] == when.step:
-                del self._waits[number]
-                self._schedule(number, incident, at_us)
-
-    def _conditional(self) -> bool:
-        return any(isinstance(incident.when, OnCondition) for incident in self._waits.values())
-
-    def _look(self, now: Now, events: Sequence[Event], at_us: int) -> None:
-        """Whether a condition that something waits for is true in the state that the runtime knows."""
-        monitor, policy = self._monitor, self._flight.loaded.policy
-        for event in events:
-            if isinstance(event, Readings):
-                monitor.update(event)
-        monitor.observe(now)
-        at = environment(situation(monitor.state(now.monotonic_us), policy, now), policy, (), NO_PHASE)
-        for number, incident in list(self._waits.items()):
-            when = incident.when
-            if not isinstance(when, OnCondition):
-                continue
-            condition = self._conditions.get(number)
-            if condition is None:
-                compiler = policy.compiler
-                condition = self._conditions[number] = build(compiler.node(when.condition), compiler.tables)
-            if condition(at) == TRUE:
-                del self._waits[number]
-                self._schedule(number, incident, at_us)
 
     # -------------------------------------------------------- one process after the other
 
@@ -521,7 +478,7 @@ class _Flight:
             case faults.Replacement(_, copies):
                 yield from copies * [self._replacement(loaded)]
             case faults.Babble(_, copies):
-                yield from self._babbled(loaded, utc_us, copies, self._chances[number])
+                yield from self._babbled(loaded, utc_us, copies, self._triggers.chances[number])
 
     def _answers(self, loaded: Loaded, role: str, granted: int, utc_us: int) -> list[bytes]:
         """Answers of a role to all that it is asked about."""

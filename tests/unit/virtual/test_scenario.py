@@ -155,7 +155,7 @@ def test_a_full_disk() -> None:
     judgement = judge(for_good)
     assert judgement.failures == ()
     assert {each.cause for each in judgement.exceptions} == {"disk"}
-    a_while = flown(scenario(incident(17, faults.DiskFull(0, 3 * S))))
+    a_while = flown(scenario(incident(17, faults.DiskFull(0, 2 * S))))
     assert {"gap", "gap-over"} <= set(events(a_while))
     nothing_wrong(a_while)
 

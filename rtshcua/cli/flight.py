@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rtshcua.adapters.clock import LinkClock, StepWatch
 from rtshcua.adapters.files.logs import disclosure_of
@@ -31,6 +32,9 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire.keys import Duty, SigningKey
+
+if TYPE_CHECKING:
+    from rtshcua.cli.incidents import Incidents, Watch
 
 BOOT_BYTES = 16
 _SEED_BYTES = 32
@@ -76,7 +80,7 @@ class Flight:
         self, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts, tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, witnesses: Witnessing, agents: Agents | None = None,
-        simulated: str | None = None,
+        simulated: str | None = None, incidents: "Incidents | None" = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
         self._vehicle = vehicle
@@ -112,6 +116,7 @@ class Flight:
             self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
         self._sink.settle()
         witnesses.begin(log.path, lambda: self._sink.synced)
+        self._incidents = incidents
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
         self._feed.post(self._plan())
         self._watch = Watching(
@@ -158,7 +163,10 @@ class Flight:
     def _follow(self) -> Ending:
         wait_us = max(_WAIT_US, self._clock.us_in(_FASTEST_WAIT_S))
         held_wait_us = max(HELD_WAIT_US, self._clock.us_in(HELD_WAIT_US / 1e6))
-        loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, self._watch, wait_us, held_wait_us)
+        watch: Watch = self._watch
+        if self._incidents is not None:
+            watch = self._incidents.around(watch, self._start_us)
+        loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
         while True:
             match self._interrupts.wish():

@@ -2,19 +2,20 @@
 
 import gc
 import secrets
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.files.logs import write_secret
-from rtshcua.adapters.files.runs import RunFolder
+from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
@@ -39,12 +40,16 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.ports import Ending
 from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
+
+if TYPE_CHECKING:
+    from rtshcua.cli.incidents import Incidents
 
 #: up to this many times as fast as life, a real vehicle's time limits leave the machine enough
 _UNHURRIED = 5
@@ -80,6 +85,7 @@ class Launch:
     dry_run: bool = False
     system: int | None = None
     witnesses: tuple[Address, ...] = ()
+    incidents: "Incidents | None" = None
 
 
 def launch(order: Launch) -> ExitCode:
@@ -103,7 +109,9 @@ def launch(order: Launch) -> ExitCode:
             vehicle = _listen(order, _driver(order, loaded, slack, signing), clock, tape)
             stack.callback(vehicle.close)
             if order.link is None:
-                stack.enter_context(_simulate(order, loaded, vehicle.port))
+                simulator = stack.enter_context(_simulate(order, loaded, vehicle.port))
+                if order.incidents is not None:
+                    order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = None if order.agent_socket is None else stack.enter_context(Agents(order.agent_socket, loaded))
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             if order.dry_run:
@@ -121,7 +129,7 @@ def launch(order: Launch) -> ExitCode:
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
-                past=past, witnesses=witnesses, agents=agents,
+                past=past, witnesses=witnesses, agents=agents, incidents=order.incidents,
                 simulated=simulation.told(order.speed, own=order.link is None),
             )  # fmt: skip
             del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
@@ -132,10 +140,28 @@ def launch(order: Launch) -> ExitCode:
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
             code, summary = flight.fly()
+            if order.incidents is not None:
+                with open_regular(run.path / LOG) as log:
+                    code = _hold(order.incidents, Ending(summary.ending), code, log, feed)
         if signing.trouble is not None:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterable[bytes], feed: Feed) -> ExitCode:
+    """Tell what came of the scenario; the exit code that follows."""
+    for text in incidents.happened:
+        feed.post(Note(f"the scenario: {text}"))
+    met = incidents.met(ending, list(lines))
+    for each in met:
+        feed.post(Note(f"{'met' if each.met else 'NOT MET'}: {each.expectation.text}: {each.found}"))
+    left = len(incidents.scenario.expectations) - len(met)
+    if left:
+        feed.post(
+            Note(f"{left} more of what is expected is for `rtshcua test`, which knows where the vehicle really was")
+        )
+    return code if all(each.met for each in met) else ExitCode.TESTS
 
 
 def _read(path: Path) -> bytes:

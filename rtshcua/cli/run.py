@@ -3,9 +3,10 @@
 import os
 import sys
 import tempfile
+import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
@@ -17,6 +18,10 @@ from rtshcua.cli.faults import fail, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.simulation.config import Kind
+
+if TYPE_CHECKING:
+    from rtshcua.cli.incidents import Incidents
 
 app = typer.Typer(add_completion=False)
 
@@ -64,6 +69,9 @@ def run(
         list[str] | None,
         typer.Option(metavar="udpout:HOST:PORT", help="a `rtshcua witness` that is shown the log; repeatable"),
     ] = None,
+    scenario: Annotated[
+        str | None, typer.Option(metavar="FILE[:NAME]", help="let go wrong what a scenario says; simulation only")
+    ] = None,
     rehearsal: Annotated[
         bool, typer.Option("--dry-run", help="decide every step against the present state; send no motion")
     ] = False,
@@ -80,6 +88,10 @@ def run(
         return fail(ExitCode.USAGE, "options of the simulated vehicle do not go with `--connect`", _SIM_HELP)
     if not own and vehicle is None:
         return fail(ExitCode.USAGE, "`--connect` needs `--vehicle`: which vehicle is it?", _VEHICLE_HELP)
+    if not own and scenario is not None:
+        return fail(ExitCode.USAGE, "`--scenario` is for the simulated vehicle, and does not go with `--connect`")
+    if scenario is not None and (battery is not None or wind or fault or rehearsal):
+        return fail(ExitCode.USAGE, "`--scenario` says how the vehicle starts and what goes wrong", _SCENARIO_HELP)
     if own and system is not None:
         return fail(ExitCode.USAGE, "`--system` goes with `--connect`: the simulated vehicle is alone")
     if fresh_state and (state_dir is not None or not own):
@@ -99,10 +111,14 @@ def run(
         state = state_dir or state_folder()
         if fresh_state:
             state = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rtshcua-")))
+        try:
+            incidents = None if scenario is None else _incidents(scenario, flavour, seed)
+        except Refused as refused:
+            return _say(refused, as_json=as_json)
         order = Launch(
             bundle=bundle,
             link=link,
-            simulator=words,
+            simulator=words if incidents is None else incidents.words,
             mode=mode,
             speed=speed,
             vehicle=vehicle,
@@ -120,6 +136,7 @@ def run(
             fence=not no_fence and not rehearsal,
             system=system,
             witnesses=witnesses,
+            incidents=incidents,
         )
         try:
             return launch(order)
@@ -127,6 +144,13 @@ def run(
             return _say(refused, as_json=as_json)
 
 
+def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents":
+    from rtshcua.cli.incidents import Incidents, chosen  # compiles sources, which no other run does
+
+    return Incidents(chosen(text, time.time_ns() // 1_000), flavour, seed)
+
+
+_SCENARIO_HELP = "with it go `--flavour` and `--seed`; `--battery`, `--wind`, `--fault` and `--dry-run` do not"
 _VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
 

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple, assert_never
 
 import msgspec
 
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import (
     Decides,
     EndsInside,
@@ -41,24 +43,48 @@ class Met(NamedTuple):
 def expectations(flown: ScenarioFlown, judgement: Judgement) -> tuple[Met, ...]:
     """One for each expectation of the scenario, in their order."""
     records = [record for life in flown.lives for record in _records(life.lines)]
+    ending = flown.ending or ("fault" if flown.fault else "killed")
+    said = _Said(ending, records, flown.policy, flown.mission)
     return tuple(
-        Met(expectation, *_found(expectation.what, flown, judgement, records))
+        Met(expectation, *_found(expectation.what, flown, judgement, said))
         for expectation in flown.scenario.expectations
     )
 
 
-def _found(
-    what: Expected, flown: ScenarioFlown, judgement: Judgement, records: list[dict[str, Any]]
-) -> tuple[bool, str]:  # fmt: skip
+def recorded(
+    expected: Iterable[Expectation], ending: str, lines: Iterable[bytes], policy: Policy, mission: Mission
+) -> list[Met]:
+    """Those that the records of a run can show by themselves, where nobody knows where the vehicle really was."""
+    said = _Said(ending, _records(lines), policy, mission)
+    return [
+        Met(each, *_shows(each.what, said)) for each in expected if isinstance(each.what, EndsWith | Decides | Flies)
+    ]
+
+
+class _Said(NamedTuple):
+    """What a flight's records say."""
+
+    ending: str
+    records: list[dict[str, Any]]
+    policy: Policy
+    mission: Mission
+
+
+def _shows(what: EndsWith | Decides | Flies, said: _Said) -> tuple[bool, str]:
     match what:
         case EndsWith(endings):
-            ending = flown.ending or ("fault" if flown.fault else "killed")
-            return ending in endings, f"it ended with `{ending}`"
+            return said.ending in endings, f"it ended with `{said.ending}`"
         case Decides():
-            return _decided(what, flown, records)
+            return _decided(what, said)
         case Flies(skill, never):
-            flew = [record["detail"] for record in records if record.get("event") == "dispatched"]
+            flew = [record["detail"] for record in said.records if record.get("event") == "dispatched"]
             return (skill in flew) is not never, f"it flew {_listed(flew) if flew else 'nothing'}"
+
+
+def _found(what: Expected, flown: ScenarioFlown, judgement: Judgement, said: _Said) -> tuple[bool, str]:
+    match what:
+        case EndsWith() | Decides() | Flies():
+            return _shows(what, said)
         case ReactsWithin(most_us):
             took_us = judgement.margins.stop_us
             if took_us is None:
@@ -75,34 +101,34 @@ def _found(
             assert_never(what)
 
 
-def _decided(what: Decides, flown: ScenarioFlown, records: list[dict[str, Any]]) -> tuple[bool, str]:
-    decisions = [record for record in records if record["type"] == "decision"]
+def _decided(what: Decides, said: _Said) -> tuple[bool, str]:
+    decisions = [record for record in said.records if record["type"] == "decision"]
     for record in decisions:
-        if _is(what, flown, record):
-            return True, _shown(flown, record)
+        if _is(what, said, record):
+            return True, _shown(said, record)
     alike = [record for record in decisions if record["outcome"] == what.outcome] or decisions
-    return False, f"it decided {_listed(_shown(flown, each) for each in alike) if alike else 'nothing'}"
+    return False, f"it decided {_listed(_shown(said, each) for each in alike) if alike else 'nothing'}"
 
 
-def _is(what: Decides, flown: ScenarioFlown, record: dict[str, Any]) -> bool:
+def _is(what: Decides, said: _Said, record: dict[str, Any]) -> bool:
     return (
         record["outcome"] == what.outcome
-        and (what.target is None or _skill(flown, record) == what.target)
+        and (what.target is None or _skill(said, record) == what.target)
         and (what.reason is None or record["reason"] == what.reason)
         and (what.clause is None or record["clause"] == what.clause)
     )
 
 
-def _skill(flown: ScenarioFlown, record: dict[str, Any]) -> str:
+def _skill(said: _Said, record: dict[str, Any]) -> str:
     """The skill that a decision lets fly: that of its target, of the link that it is about, or of the step."""
-    policy = flown.policy
+    policy = said.policy
     step: int = record["step"]
     link: int = record["link"]
     if record["target"] is not None:
         return _first_word(record["target"])
     if record["kind"] == CONTINGENCY_LINK:
         return policy.contracts[policy.contingency[link].skill].name
-    contract = flown.mission.invocations[step].contract
+    contract = said.mission.invocations[step].contract
     if record["kind"] == STEP:
         return contract.name
     return policy.contracts[contract.fallback[link].skill].name if link >= 0 else ""
@@ -113,8 +139,8 @@ def _first_word(text: str) -> str:
     return "" if found is None else found[0]
 
 
-def _shown(flown: ScenarioFlown, record: dict[str, Any]) -> str:
-    return f"{record['outcome']} of {_skill(flown, record) or 'a link'} ({record['reason']})"
+def _shown(said: _Said, record: dict[str, Any]) -> str:
+    return f"{record['outcome']} of {_skill(said, record) or 'a link'} ({record['reason']})"
 
 
 def _listed(words: Iterable[str]) -> str:

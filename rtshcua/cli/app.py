@@ -3,6 +3,7 @@
 `rtshcua`, `rtshcua --help` and `rtshcua --version` import neither typer nor rich (bench/startup.py measures it).
 """
 
+import gc
 import io
 import os
 import sys
@@ -62,10 +63,16 @@ def _call(row: Row, words: list[str]) -> int:
         code = QUICK[row.name](words)
         if code is not None:
             return code
-    import typer
-    from typer.main import get_command
+    collecting = gc.isenabled()
+    gc.disable()  # what is loaded stays: to look through it for garbage takes a tenth of a command's start
+    try:
+        import typer
+        from typer.main import get_command
 
-    command = get_command(import_module(row.module).app)
+        command = get_command(import_module(row.module).app)
+    finally:
+        if collecting:
+            gc.enable()
     _unguarded(command)
     try:
         with command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context:

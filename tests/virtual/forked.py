@@ -1,4 +1,4 @@
-"""Command lines in processes of their own, each forked from one that has loaded the command already.
+"""Command lines in processes of their own, each forked from one that has loaded the command and read what ships.
 
 A process that starts afresh loads modules for most of a second before it reads its first word. Where it is the command
 that is looked at, and not how it starts, this saves that second each time.
@@ -72,6 +72,7 @@ def _serve() -> None:
         for each in walk_packages(package.__path__, f"{package.__name__}."):
             if not each.name.endswith("__main__"):
                 import_module(each.name)
+    _warm()
     for line in sys.stdin:
         words, folder, environment = json.loads(line)
         with TemporaryFile() as out, TemporaryFile() as err:
@@ -90,6 +91,14 @@ def _serve() -> None:
                 file.seek(0)
                 told.append(file.read().decode())
         print(json.dumps(told), flush=True)
+
+
+def _warm() -> None:
+    """Remember what ships as each command would: read, checked, its zones compared."""
+    from rtshcua import library
+    from rtshcua.cli.sources import compile_sources
+
+    compile_sources([library.root() / "missions" / "standard.rts"], mission=None, issued_at_us=0)
 
 
 def _main(words: Sequence[str]) -> int:

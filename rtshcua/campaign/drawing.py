@@ -5,8 +5,9 @@ The same campaign, number and tally give the same scenario, in whatever process,
 - How many: 1 to 6, in `HOW_MANY` parts of a hundred.
 - Which kind: half of the time a group by its weight in `GROUPS`, then one of its kinds, each as likely; half of the
   time that pair of a kind and a state change, of `CANDIDATES` drawn so, which was tried least.
-- When: a fifth of the time anywhere in the flight, else from `BEFORE_US` before to `AFTER_US` after a state change that
-  was seen, nearer ones likelier.
+- When: a fourth of the time close to the fault before it, for what is borne alone may not be borne together; else a
+  fifth of the time anywhere in the flight, and else from `BEFORE_US` before to `AFTER_US` after a state change that was
+  seen, nearer ones likelier.
 - How deep: each parameter as `RANGES` says, evenly, or evenly in its logarithm, in steps that a person would write.
 """
 
@@ -19,7 +20,7 @@ from typing import Any, Final
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
-from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start
+from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start, When
 
 S: Final = 1_000_000
 FLAVOURS: Final = ("px4", "ardupilot")
@@ -29,6 +30,8 @@ CANDIDATES: Final = 8
 BEFORE_US: Final = 3 * S
 AFTER_US: Final = 6 * S
 _LATER: Final = 1.5  # how much likelier near than far, as a power
+#: how often a fault is close to the one before it
+TOGETHER: Final = 0.25
 
 #: how likely a group is, and what is in it
 GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
@@ -149,6 +152,8 @@ class Space:
     roles: tuple[str, ...] = ()
     flavours: tuple[str, ...] = FLAVOURS
     kinds: frozenset[type[Fault]] = frozenset(faults.KINDS.values())
+    read: tuple[str, ...] = ()
+    """The messages that the policy reads its signals from: half of those that fall silent or stick are among these."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +179,8 @@ def draw(campaign: int, number: int, space: Space, tally: Tally) -> Drawn:
     while len(incidents) < many:
         kind, moment = _pair(chance, space, tally.moments.get(flavour, []), tally)
         fault = _fault(chance, kind, space)
-        when = _when(chance, space, flavour, moment)
+        when = _close(chance, incidents[-1].when) if incidents else None
+        when = when or _when(chance, space, flavour, moment)
         incidents.append(Incident(when, fault, incident_text(when, fault, space.skills)))
         tries.append((kind.__name__, ANYWHERE if moment is None else moment.label))
     start = Start(
@@ -213,9 +219,21 @@ def _when(chance: Random, space: Space, flavour: str, moment: Moment | None) -> 
             return AfterStep(chance.randrange(len(space.skills)), after, after)
         at = Range(0, max(space.lasts_us[flavour], S), 100_000).draw(chance)
         return AtTime(at, at)
-    away = chance.random() ** _LATER
-    at = moment.at_us + round((AFTER_US if chance.random() < 0.6 else -BEFORE_US) * away / 20_000) * 20_000
-    return AtTime(max(at, 0), max(at, 0))
+    at = max(moment.at_us + _away(chance), 0)
+    return AtTime(at, at)
+
+
+def _close(chance: Random, before: When) -> AtTime | AfterStep | None:
+    """A time close to that of the fault before; None: another one."""
+    if chance.random() >= TOGETHER:
+        return None
+    at = max(before.from_us + _away(chance), 0)
+    return AfterStep(before.step, at, at) if isinstance(before, AfterStep) else AtTime(at, at)
+
+
+def _away(chance: Random) -> int:
+    far = chance.random() ** _LATER
+    return round((AFTER_US if chance.random() < 0.6 else -BEFORE_US) * far / 20_000) * 20_000
 
 
 def _fault(chance: Random, kind: type[Fault], space: Space) -> Fault:
@@ -242,7 +260,7 @@ def _value(chance: Random, kind: type[Fault], name: str, space: Space) -> object
     if name == "mode":
         return chance.choice(_MODES)
     if name == "message":
-        return chance.choice(MESSAGES)
+        return chance.choice(space.read if space.read and chance.random() < 0.5 else MESSAGES)
     if name == "role":
         return chance.choice(space.roles or ("supervisor",))
     span = RANGES.get((kind, name)) or RANGES[None, name]

@@ -166,7 +166,8 @@ def _space(
         lasts[each] = calm.flown_us
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
     roles = sorted({policy.roles[rule.approver] for rule in policy.rules if rule.approver >= 0})
-    return Space(skills, lasts, tuple(roles), flavours, kinds)
+    read = sorted({source.message for signal in policy.signals for source in signal.sources})
+    return Space(skills, lasts, tuple(roles), flavours, kinds, tuple(read))
 
 
 def _imported(source: Path, folder: Folder) -> str:

@@ -232,7 +232,7 @@ def _close(chance: Random, before: When) -> AtTime | AfterStep | None:
 
 
 def _away(chance: Random) -> int:
-    far = chance.random() ** _LATER
+    far: float = chance.random() ** _LATER
     return round((AFTER_US if chance.random() < 0.6 else -BEFORE_US) * far / 20_000) * 20_000
 
 

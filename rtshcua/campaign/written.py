@@ -1,6 +1,7 @@
 """A scenario as its source is written: what a failure is kept as, and what a person reads."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 
 from rtshcua.model.faults import KINDS, Fault, Parameter, parameters
 from rtshcua.model.quantity import Dimension, display
@@ -16,21 +17,25 @@ def scenario_text(scenario: Scenario, mission: str, imported: str, comment: str 
     lines.append(f"  aboard {', '.join(scenario.flavours)}")
     first, last = scenario.first_seed, scenario.last_seed
     lines.append(f"  seeds  {first}" if first == last else f"  seeds  {first} .. {last}")
-    lines += start_lines(scenario.start)
+    started = _start(scenario.start)
+    lines += [f"  start  {started}"] if started else []
     lines += [f"  {each.text}" for each in scenario.incidents]
     lines += [f"  expect {each.text}" for each in scenario.expectations]
     return "\n".join([*lines, "}", ""])
 
 
-def start_lines(start: Start) -> list[str]:
-    """How it starts, a line each."""
-    lines = []
+def _start(start: Start) -> str:
+    """What it starts with; empty where nothing is said of that."""
+    said = []
     if start.battery is not None:
-        lines.append(f"  start  battery = {display(start.battery, Dimension.RATIO)}")
+        said.append(f"battery = {display(start.battery, Dimension.RATIO)}")
     if start.wind_mm_s is not None:
         speed, gust = (display(each, Dimension.SPEED) for each in (start.wind_mm_s, start.gust_mm_s))
-        lines.append(f"  start  wind(speed = {speed}, from = {start.wind_from_deg} deg, gust = {gust})")
-    return lines
+        said.append(f"wind(speed = {speed}, from = {start.wind_from_deg} deg, gust = {gust})")
+    if start.utc_us is not None:
+        moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=start.utc_us)
+        said.append(f'at "{moment.isoformat().replace("+00:00", "Z")}"')
+    return ", ".join(said)
 
 
 def incident_text(when: When, fault: Fault, skills: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Final
@@ -34,6 +34,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario, Start
 from rtshcua.simulation.config import Kind
 from rtshcua.virtual import development
+from rtshcua.virtual.flight import LATER_US
 
 app = typer.Typer(add_completion=False)
 
@@ -88,7 +89,7 @@ def campaign(
     begun = folder.identity()
     if isinstance(begun, Refusal):
         return findings.end(begun)
-    issued_us = asked_us or (begun.issued_at_us if begun is not None else time.time_ns() // 1_000)
+    issued_us = asked_us or (begun.issued_at_us if begun is not None else time.time_ns() // 1_000_000_000 * 1_000_000)
     compiled, sources = compile_sources([source, *(with_ or ())], mission=mission, issued_at_us=issued_us)
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
@@ -119,7 +120,7 @@ def campaign(
             folder.tell(_summary(identity, past, flights, folder))
     wanted = {number: past[number] for number in range(flights)}
     if not quickly:
-        _shrink(order, field, wanted, past, folder, _imported(source, folder), progress)
+        _shrink(order, field, wanted, past, folder, _imported(source, folder), issued_us, progress)
     summary = _summary(identity, past, flights, folder)
     folder.tell(summary)
     if not as_json_:
@@ -181,7 +182,7 @@ def _imported(source: Path, folder: Folder) -> str:
 
 def _shrink(
     order: Order, field: Field, wanted: Mapping[int, Result], past: Mapping[int, Result], folder: Folder, imported: str,
-    progress: "_Progress",
+    issued_us: int, progress: "_Progress",
 ) -> None:  # fmt: skip
     """Keep the smallest flight of each failure as a scenario, if none is kept yet."""
     first: dict[str, int] = {}
@@ -198,6 +199,7 @@ def _shrink(
             return any(each.slug == slug for each in field.fly(Flight(number, candidate)).failures)
 
         small, _ = shrink(scenario, order.space.skills, still)
+        small = replace(small, start=replace(small.start, utc_us=issued_us + LATER_US))
         failed = next(each for each in wanted[number].failures if each.slug == slug)
         comment = f"{slug}: {failed.text}\nFlight {number} of campaign {order.seed}, as small as it still fails."
         folder.save(slug, scenario_text(small, wanted_mission(folder), imported, comment))

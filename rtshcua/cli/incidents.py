@@ -60,6 +60,9 @@ class Incidents:
             if isinstance(incident.fault, HostFault | AgentFault):
                 text = f"`{incident.text}` goes wrong in virtual time alone"
                 raise Refused(ExitCode.USAGE, "usage", text, "`rtshcua test` flies the scenario")
+        if self.scenario.start.utc_us is not None:
+            text = "the scenario says at what time it begins, and a run begins now"
+            raise Refused(ExitCode.USAGE, "usage", text, "`rtshcua test` flies the scenario")
         if flavour is not None and flavour not in self.scenario.flavours:
             text = f"the scenario is flown aboard {', '.join(self.scenario.flavours)}"
             raise Refused(ExitCode.USAGE, "usage", text, "leave `--flavour` out, or name one of these")

@@ -66,12 +66,15 @@ class Incident:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How the vehicle and the air are at the start; None: as the simulated vehicle comes. 1/10000, mm/s, degrees."""
+    """How the vehicle, the air and the time are at the start; None: as the simulated vehicle comes, and a minute after
+    the mission was issued. 1/10000, mm/s, degrees, us since the epoch.
+    """
 
     battery: int | None = None
     wind_mm_s: int | None = None
     wind_from_deg: int = 0
     gust_mm_s: int = 0
+    utc_us: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

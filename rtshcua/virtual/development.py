@@ -8,9 +8,12 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Final
 
+from msgspec.structs import replace
+
 from rtshcua.ground.compiler import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.virtual.flight import LATER_US
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 
@@ -46,6 +49,13 @@ def root(issued_at_us: int) -> bytes:
         ),
     )
     return signed.sign(made[Duty.ROOT])
+
+
+def flies_at(mission: Mission, utc_us: int) -> Mission:
+    """The mission, issued so that it flies at this UTC time."""
+    issued_us = utc_us - LATER_US
+    steps = tuple(replace(step, issued_at_us=issued_us) for step in mission.invocations)
+    return replace(mission, issued_at_us=issued_us, invocations=steps)
 
 
 def seal(policy: Policy, mission: Mission) -> bytes:

@@ -30,7 +30,8 @@ from rtshcua.wire.trust import MAX_ROOT, open_root
 
 #: signs the log where no other key is given; no trust root names it, so whoever audits such a log refuses it
 NOBODY: Final = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
-_LATER_US = 60 * SECOND  # after it was issued, a bundle flies
+#: after it was issued, a bundle flies
+LATER_US: Final = 60 * SECOND
 
 
 class ReadableSink(EvidenceSink, Protocol):
@@ -141,7 +142,7 @@ class VirtualFlight:
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
     ) -> None:  # fmt: skip
         policy, mission = _claimed(bundle)
-        utc_us = mission.issued_at_us + _LATER_US if utc_us is None else utc_us
+        utc_us = mission.issued_at_us + LATER_US if utc_us is None else utc_us
         self.clock = vehicle.clock if vehicle else VirtualClock(Now(START.monotonic_us, utc_us, START.utc_error_us))
         now = self.clock.now()
         self._root_key = cose.unverified(root, limit=MAX_ROOT).kid

@@ -59,7 +59,9 @@ class Flying:
             self._workers = None
 
     def _fly(self, scenario: ScenarioFlight) -> Flown:
-        policy, mission = scenario.policy.lowered.policy, scenario.mission
+        policy, mission, start = scenario.policy.lowered.policy, scenario.mission, scenario.scenario.start
+        if start.utc_us is not None:
+            mission = development.flies_at(mission, start.utc_us)
         field = Field(development.seal(policy, mission), development.root(mission.issued_at_us))
         wanted = list(tries(scenario.scenario))
         workers: Workers = Here()

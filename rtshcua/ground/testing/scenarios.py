@@ -29,6 +29,8 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.scenarios import (
     AfterStep,
     AtTime,
+    Beginning,
+    Begins,
     Charge,
     Decides,
     Delay,
@@ -149,9 +151,12 @@ class _Lowering:
     def _text(self, span: Span) -> str:
         return self._context.report.text(span)
 
-    def _start(self, beginnings: Sequence[Charge | FaultCall]) -> Start:
+    def _start(self, beginnings: Sequence[Beginning]) -> Start:
         start = Start()
         for each in beginnings:
+            if isinstance(each, Begins):
+                start = replace(start, utc_us=each.utc_us)
+                continue
             if isinstance(each, Charge):
                 start = replace(start, battery=each.value.value)
                 continue

@@ -31,6 +31,16 @@ class Charge(Node, kw_only=True):
     value: Quantity
 
 
+class Begins(Node, kw_only=True):
+    """`at "2026-06-01T08:00:00Z"`: UTC at the start of the run, in us since the epoch."""
+
+    kind: Literal["begins"] = "begins"
+    utc_us: int
+
+
+Beginning = Charge | FaultCall | Begins
+
+
 class Delay(Node):
     """`30 s .. 40 s`: drawn by the seed; of one time both ends are the same."""
 
@@ -126,6 +136,6 @@ class ScenarioDecl(Node):
     mission: Name
     flavours: tuple[Name, ...]  # none written: all that there are
     seeds: Seeds | None
-    start: tuple[Charge | FaultCall, ...]
+    start: tuple[Beginning, ...]
     incidents: tuple[Incident, ...]
     demands: tuple[Demand, ...]

@@ -10,7 +10,9 @@ import pytest
 from rtshcua import library
 from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.results import Failed, Result
+from rtshcua.campaign.trying import Trial, Tried, Try, Wrong
 from rtshcua.cli import app
+from rtshcua.cli.testing import flying
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.faults import GpsLoss
 
@@ -119,7 +121,10 @@ def test_it_goes_on_where_it_stopped(
 
 
 def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
-    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+    here: Path,
+    capsys: pytest.CaptureFixture[str],
+    flies: Callable[[Any], None],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     flies(without_gps)
     code, out, _ = run(capsys, "--flights", "120")
@@ -134,6 +139,17 @@ def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
     page = Path("runs/campaign-short-1/report.html").read_text()
     assert "flew into a &lt;pillar&gt;" in page
     assert "<pillar>" not in page
+    monkeypatch.setattr(flying.Trial, "fly", _failing)
+    assert app.main(["test", "runs/campaign-short-1/failures"]) == ExitCode.TESTS
+    assert "collision" in capsys.readouterr().err
+
+
+def _failing(_: Trial, flight: Try) -> Tried:
+    """What a kept failure says can be read: it is the flight that failed."""
+    assert [type(each.fault) for each in flight.scenario.incidents] == [GpsLoss]
+    assert flight.scenario.start.utc_us == 1_780_300_800_000_000 + 60 * S
+    wrong = (Wrong(-1, "collision", "flew into it"),)
+    return Tried(flight.number, flight.flavour, flight.seed, "crashed", wrong, (), (), ())
 
 
 def test_another_campaign_in_the_folder_is_refused(

@@ -20,6 +20,8 @@ from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.scenarios import (
     AfterStep,
     AtTime,
+    Beginning,
+    Begins,
     Charge,
     Decides,
     Delay,
@@ -41,8 +43,8 @@ from rtshcua.model.scenario import ENDINGS, FLAVOURS, MAX_SEEDS
 OBSTACLE = "obstacle"
 #: the endings as sources write them
 ENDS = tuple(each.replace("-", "_") for each in ENDINGS)
-#: what a flight starts with: the charge, and the air
-BATTERY, WIND = "battery", "wind"
+#: what a flight starts with: the charge, the air, and the time
+BATTERY, WIND, AT = "battery", "wind", "at"
 
 
 def check(context: Context) -> None:
@@ -139,7 +141,9 @@ def _ascending(context: Context, low: Quantity, high: Quantity) -> bool:
     return False
 
 
-def _beginning(context: Context, beginning: Charge | FaultCall) -> None:
+def _beginning(context: Context, beginning: Beginning) -> None:
+    if isinstance(beginning, Begins):
+        return
     name = beginning.name
     written = context.report.text(beginning.span)
     if isinstance(beginning, Charge) and name.text == BATTERY:
@@ -169,12 +173,13 @@ def _beginning(context: Context, beginning: Charge | FaultCall) -> None:
 def _once(context: Context, scenario: ScenarioDecl) -> None:
     seen: dict[str, Span] = {}
     for beginning in scenario.start:
-        first = seen.setdefault(beginning.name.text, beginning.span)
+        what = AT if isinstance(beginning, Begins) else beginning.name.text
+        first = seen.setdefault(what, beginning.span)
         if first is not beginning.span:
             context.report.add(
                 codes.GIVEN_TWICE,
                 beginning.span,
-                f"`{beginning.name.text}` is given twice",
+                f"`{what}` is given twice",
                 help="keep one of them",
                 labels=[(first, "first given here")],
             )

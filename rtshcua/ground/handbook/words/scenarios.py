@@ -5,12 +5,14 @@ from typing import assert_never
 
 from rtshcua.ground.handbook.words.cases import told_expectation
 from rtshcua.ground.handbook.words.conditions import told_condition
+from rtshcua.ground.handbook.words.places import utc
 from rtshcua.ground.handbook.words.skills import told_argument
 from rtshcua.ground.handbook.words.values import quantity
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, listed, name, named
 from rtshcua.model.ir.scenarios import (
     AfterStep,
     AtTime,
+    Begins,
     Charge,
     Decides,
     Delay,
@@ -42,7 +44,9 @@ def told_scenario(scenario: ScenarioDecl, names: Vocabulary) -> Iterator[str]:
         yield _demand(demand)
 
 
-def _beginning(one: Charge | FaultCall, names: Vocabulary) -> str:
+def _beginning(one: Charge | FaultCall | Begins, names: Vocabulary) -> str:
+    if isinstance(one, Begins):
+        return f"the time at {utc(one.utc_us)}"
     return f"{name(one.name.text)} at {quantity(one.value)}" if isinstance(one, Charge) else _fault(one, names)
 
 

@@ -12,6 +12,8 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.scenarios import (
     AfterStep,
     AtTime,
+    Beginning,
+    Begins,
     Charge,
     Decides,
     Delay,
@@ -49,9 +51,13 @@ class Scenarios(Tests):
         """`seeds 1 .. 20`."""
         return Part("seeds", span, Seeds(span=span, first=first, last=last or first))
 
-    def start(self, span: Span, *beginnings: Charge | FaultCall) -> Part:
-        """`start battery = 80 %, wind(speed = 3 m/s)`."""
+    def start(self, span: Span, *beginnings: Beginning) -> Part:
+        """`start battery = 80 %, wind(speed = 3 m/s), at "2026-06-01T08:00:00Z"`."""
         return Part("start", span, beginnings)
+
+    def begins(self, span: Span, utc_us: int) -> Begins:
+        """`at "2026-06-01T08:00:00Z"`."""
+        return Begins(span=span, utc_us=utc_us)
 
     def charge(self, span: Span, name: Name, value: Quantity) -> Charge:
         """`battery = 80 %`."""

@@ -46,11 +46,14 @@ class _Record(NamedTuple):
 
 
 class RunLoop:
-    """One run. `watch` sees each step's events and actions, after they were carried out; it must not block."""
+    """One run. `watch` sees each step's events and actions, after they were carried out; it must not block.
+
+    `prepares`: between steps the runtime looks ahead, so that the next one is quick. In virtual time no one waits.
+    """
 
     def __init__(
         self, runtime: Stepped, vehicle: ports.Vehicle, sink: ports.EvidenceSink, clock: ports.Clock, watch: Watch,
-        wait_us: int = WAIT_US, held_wait_us: int = HELD_WAIT_US,
+        wait_us: int = WAIT_US, held_wait_us: int = HELD_WAIT_US, *, prepares: bool = True,
     ) -> None:  # fmt: skip
         self._runtime = runtime
         self._vehicle = vehicle
@@ -59,6 +62,7 @@ class RunLoop:
         self._watch = watch
         self._wait_us = wait_us
         self._held_wait_us = min(wait_us, held_wait_us)
+        self._prepares = prepares
         self._held: tuple[Dispatch, _Record] | None = None  # a command, and the record that it is held for
         self._lines = sink.kept  # that were given to the sink
         self._failed: int | None = None  # the sink refused something, when so many lines had been given to it
@@ -81,7 +85,8 @@ class RunLoop:
             actions = self._runtime.actions(now)
             ending = self._act(actions, reflex)
         self._watch(now, events, actions)
-        self._runtime.prepare(now)
+        if self._prepares:
+            self._runtime.prepare(now)
         return ending
 
     def _tend(self) -> None:

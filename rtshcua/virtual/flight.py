@@ -180,7 +180,7 @@ class VirtualFlight:
         )
         self.events: list[Event] = []
         self.steps = 0
-        self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us)
+        self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us, prepares=False)
 
     def fly(self, each: Callable[[Self], Sequence[Event]] = lambda _: (), most_s: int = 3_600) -> FlownFlight:
         """Fly until the end; `each` is called before every turn, and may inject faults or give events.

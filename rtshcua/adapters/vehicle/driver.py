@@ -106,8 +106,8 @@ class Driver:
             if self.flavour is None:
                 self._choose(frame)
             if frame.system == self.system and self.flavour is not None:
-                if frame.component == AUTOPILOT:
-                    self._watch.heard(now_us)
+                if frame.component == AUTOPILOT and (self._watch.heard_us != now_us or self._watch.down):
+                    self._watch.heard(now_us)  # one frame tells of the moment what all of it do
                     self._look(now_us, events)
                 told = self._take(frame, now_us, events, send)
                 if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
@@ -123,7 +123,7 @@ class Driver:
         if self._beat_us is None or now_us - self._beat_us >= HEARTBEAT_US:
             self._beat_us = now_us
             send.append(messages.heartbeat())
-        self.seen.pass_time(now_us)
+        aged = self.seen.pass_time(now_us)
         self._watch.strict = self._watch.strict or self.seen.airborne  # what is sent to it there has to arrive
         ts1_ns = self.source.clock.due(now_us)
         if ts1_ns is not None:
@@ -133,16 +133,18 @@ class Driver:
             send += self.preflight.due(self.system, now_us)
         self._hear(self._texts.due(now_us), events)
         self._look(now_us, events)
-        self._advance(now_us, send, events)
+        if self._manoeuvre is not None and (aged or now_us >= self._manoeuvre.due_us):
+            self._advance(now_us, send, events)
         send += self._ask(now_us)
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
         for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
-            events += [ports.Noted(now_us, text) for text in notes]
-            notes.clear()
+            if notes:
+                events += [ports.Noted(now_us, text) for text in notes]
+                notes.clear()
         send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
-        return events, self._pack(send, now_us, events)
+        return events, self._pack(send, now_us, events) if send else []
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
         """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard.
@@ -194,7 +196,7 @@ class Driver:
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
-        """Take in one frame; False if a manoeuvre sees nothing new in it."""
+        """Take in one frame; whether a manoeuvre may see something new in it."""
         name, message, component = frame.name, frame.message, frame.component
         at_us = self.source.of(frame, now_us)
         if self.source.stepped:
@@ -204,8 +206,7 @@ class Driver:
         elif name in self._spoken:
             return False  # what the autopilot itself tells is not taken from anybody else
         if name == "COMMAND_ACK":
-            self._acknowledge(frame, now_us)
-            return True
+            return self._acknowledge(frame, now_us) or self._asks
         self._streams.heard(name, now_us)
         if name in self._telemetry.intervals:
             vouched = partial(self.seen.estimator.vouches_for, name, now_us=now_us)
@@ -215,7 +216,7 @@ class Driver:
         if component != AUTOPILOT or name not in self._heeded:
             return False
         before = self.seen.mode
-        self.seen.take(name, message, now_us, at_us, self.source.place)
+        new = self.seen.take(name, message, now_us, at_us, self.source.place)
         crashed = self._crash.look(self.seen, now_us)
         if crashed is not None:
             events.append(ports.Crashed(now_us, crashed))
@@ -223,27 +224,32 @@ class Driver:
         match name:
             case "HEARTBEAT":
                 self._watch_mode(before, now_us, events)
-            case "ATTITUDE":
-                return False
             case "STATUSTEXT":
                 self._hear(self._texts.take(message, now_us), events)
-            case _ if self._is_for_us(message):
+            case _ if name in preflight.HEEDED and self._is_for_us(message):
                 send += self.preflight.take(name, message, self.system, now_us)
-        air = (self.seen.armed, self.seen.airborne)
-        if air != self._was_air and self.seen.landed_state:
-            self._was_air = air
-            events.append(ports.AirState(now_us, *air))
-        return True
+        if new and self.seen.landed_state:
+            air = (self.seen.armed, self.seen.airborne)
+            if air != self._was_air:
+                self._was_air = air
+                events.append(ports.AirState(now_us, *air))
+        return new or (name != "ATTITUDE" and self._asks)
 
-    def _acknowledge(self, frame: Received, now_us: int) -> None:
+    @property
+    def _asks(self) -> bool:
+        """Whether a frame waits until it is known who flies, which it may be time to ask."""
+        return self._aids.query.waits
+
+    def _acknowledge(self, frame: Received, now_us: int) -> bool:
+        """Take in a COMMAND_ACK; whether it is of the command under way."""
         message = frame.message
         if frame.component != AUTOPILOT or not self._is_for_us(message):
-            return
+            return False
         self._watch.answered()
         if message.command == messages.SET_INTERVAL:
             self._streams.answered(message.result == 0, now_us)
-        else:
-            self._commander.acknowledge(message.command, message.result, self.seen.up_us)
+            return False
+        return self._commander.acknowledge(message.command, message.result, self.seen.up_us)
 
     def _is_for_us(self, message: Message) -> bool:
         return getattr(message, "target_component", 0) in (0, OURS)

@@ -79,16 +79,19 @@ class Commander:
             return self._sent_us + stage.repeat_us if stage.repeat_us else NEVER
         return NEVER if self.accepted or self._tries >= RETRIES else self._sent_us + RETRY_US * self.slack
 
-    def acknowledge(self, command: int, result: int, now_us: int) -> None:
-        """Take in one COMMAND_ACK of the vehicle. PX4 answers some twice: accepted, and then what came of it."""
+    def acknowledge(self, command: int, result: int, now_us: int) -> bool:
+        """Take in one COMMAND_ACK of the vehicle; whether it belongs to the present stage. PX4 answers some twice:
+        accepted, and then what came of it.
+        """
         if self._stage is None or command != self._stage.command:
-            return
+            return False
         if result == _IN_PROGRESS:
             self._sent_us = self.busy_us = now_us  # it is at it: wait on
         elif result == _ACCEPTED:
             self.accepted = True
         elif not self._doubtful:
             self.refused = result
+        return True
 
     def due(self, now_us: int) -> list[Message]:
         """What must be sent again now: an unanswered command with `confirmation` raised, or a repeated target."""
@@ -136,6 +139,11 @@ class WhoFliesQuery:
         self._target = False  # the frame waits for a target, too
         #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
         self.ends_us: int | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether a frame waits for the answer."""
+        return self._came is not None
 
     def is_young(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down."""
@@ -233,6 +241,7 @@ class Manoeuvre:
         self._was_landing = seen.landing
         self._taken = False
         self._accepted: tuple[int, int] | None = None  # when the present stage was, and after how many heartbeats
+        self._changed = False  # something was sent, or another stage begun: what that does is still to be looked at
         self.over = False
         #: until then `advance` has nothing to say, unless something is observed or acknowledged
         self.due_us = 0
@@ -252,8 +261,9 @@ class Manoeuvre:
 
     def advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         """Messages to send and events, after something was observed or time went by."""
+        self._changed = False
         out = self._advance(seen, now_us)
-        self.due_us = self._due_us(seen, now_us)
+        self.due_us = now_us if self._changed else self._due_us(seen, now_us)
         return out
 
     def _advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
@@ -286,6 +296,7 @@ class Manoeuvre:
 
     def _enter(self, seen: ObservedVehicle) -> None:
         self._entered_us, self._progress = seen.up_us, None
+        self._accepted, self._changed = None, True
         if not self._left:
             self._commander.start(None, seen.up_us)
             return
@@ -307,7 +318,7 @@ class Manoeuvre:
 
     def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""
-        self._waits, self._entered_us = False, seen.up_us
+        self._waits, self._entered_us, self._changed = False, seen.up_us, True
         target = self._left[0].target
         if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
             self._aids.targets.expect(target, seen)
@@ -333,19 +344,26 @@ class Manoeuvre:
 
     def _due_us(self, seen: ObservedVehicle, now_us: int) -> int:
         """When to look again, in real time, unless something is seen before."""
-        if self.over:
-            return NEVER
-        if self._aids.query.ends_us is not None:
-            return self._aids.query.ends_us
+        at_us = NEVER if self._taken else self._aids.targets.due_us(seen.up_us)
+        if self._accepted is not None:
+            at_us = min(at_us, self._accepted[0] + TAKEN_BACK_US)
+        if not self.over:
+            at_us = min(at_us, self._ends_us)
+        due_us, answer_us = now_us + max(at_us - seen.up_us, 0), self._aids.query.ends_us
+        return due_us if answer_us is None else min(due_us, answer_us)
+
+    @property
+    def _ends_us(self) -> int:
+        """When, in link time, the present stage may be over, or have failed, with nothing more seen."""
         if not self._left:
             ends = self._held_us is not None and self._command.hold_us
-            at_us = (self._held_us or 0) + self._command.hold_us if ends else NEVER
-        elif self._waits:
-            at_us = self._entered_us + MODE_UNKNOWN_US
-        else:
-            watched = [each.due_us for each in (self._progress, self._stop) if each is not None]
-            at_us = min(self._commander.due_us, self._shows_us, *watched)
-        return now_us + max(at_us - seen.up_us, 0)
+            return (self._held_us or 0) + self._command.hold_us if ends else NEVER
+        if self._waits:
+            return self._entered_us + MODE_UNKNOWN_US
+        at_us = min(self._commander.due_us, self._shows_us)
+        if self._progress is not None:
+            at_us = min(at_us, self._progress.due_us)
+        return at_us if self._stop is None else min(at_us, self._stop.due_us)
 
     @property
     def _shows_us(self) -> int:
@@ -393,7 +411,7 @@ class Manoeuvre:
         if seen.down and homeward:  # it is done: no flight is left
             return None
         if seen.mode in self._modes:
-            self._before = frozenset()
+            self._before, self._accepted = frozenset(), None
         elif seen.mode not in self._before or self._was_taken_back(seen):
             return self._flavour.mode_name(seen.mode)
         self._was_landing = self._was_landing and seen.landing

@@ -174,16 +174,17 @@ class ObservedVehicle:
     text_severity: int = _DEBUG
     prearm_text: str = ""
 
-    def take(self, name: str, message: Any, now_us: int, at_us: int | None, place: int) -> None:
+    def take(self, name: str, message: Any, now_us: int, at_us: int | None, place: int) -> bool:
         """Take in one message of the autopilot's component that was made at `at_us` (None: nobody knows) and sent in
-        this `place`, but for one that is older than the last of its name.
+        this `place`, but for one that is older than the last of its name. Whether there is news in it: a report of
+        mode or place, or anything else that was not so before; a tilt is none.
         """
         if place < self.places.get(name, place):
-            return
+            return False
         self.places[name] = place
         if at_us is not None:
             if at_us < self.made_us.get(name, at_us):
-                return
+                return False
             self.made_us[name] = at_us
         match name:
             case "HEARTBEAT":
@@ -192,39 +193,51 @@ class ObservedVehicle:
                 self.heartbeat_us = now_us
                 self.beats += 1
                 self._judge(message.system_status)
+                return True
             case "EXTENDED_SYS_STATE":
-                self.landed_state = message.landed_state
+                was, self.landed_state = self.landed_state, message.landed_state
+                return bool(was != self.landed_state)
             case "GLOBAL_POSITION_INT" if at_us is not None and now_us - at_us <= STALE_US:
                 self._place(message, now_us)
+                return True
             case "POSITION_TARGET_GLOBAL_INT":
+                before = self.target
                 if message.coordinate_frame in _ABOVE_SEA and isfinite(message.alt):
                     self.target = message.lat_int, message.lon_int, round(message.alt * 1_000)
                     self.target_us = now_us
                     self.targets += 1
+                return before != self.target
             case "ATTITUDE":
                 self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
             case "GPS_RAW_INT":
-                self.fix = message.fix_type
+                fix, self.fix = self.fix, message.fix_type
+                return bool(fix != self.fix)
             case "SYS_STATUS":
+                health = self.prearm, self.unwell
                 # PX4 1.16 sets the bit of the check without saying that there is such a check (recorded)
                 self.prearm = bool(message.onboard_control_sensors_health & _PREARM)
                 self.unwell = _unwell(message)
+                return health != (self.prearm, self.unwell)
             case self.estimator.report if at_us is not None:
                 self.estimator.take(message.flags, at_us)
-                self._doubt(now_us)
+                return self._doubt(now_us)
+        return False
 
-    def pass_time(self, now_us: int) -> None:
-        """Time goes by: where it was, and what the estimator last said, grows old."""
+    def pass_time(self, now_us: int) -> bool:
+        """Time goes by: where it was, and what the estimator last said, grows old. Whether something grew too old."""
         self.now_us = now_us
-        if now_us - self.made_us.get("GLOBAL_POSITION_INT", now_us) > STALE_US:
-            self.located, self.levelled, self.speed = False, False, None
-        else:
-            self._doubt(now_us)
+        if now_us - self.made_us.get("GLOBAL_POSITION_INT", now_us) <= STALE_US:
+            return self._doubt(now_us)
+        was = self.located or self.levelled or self.speed is not None
+        self.located, self.levelled, self.speed = False, False, None
+        return was
 
-    def _doubt(self, now_us: int) -> None:
-        """Where it was holds no longer than the estimator vouches for it."""
+    def _doubt(self, now_us: int) -> bool:
+        """Where it was holds no longer than the estimator vouches for it. Whether it holds no longer."""
+        was = self.located, self.levelled
         self.located = self.located and self.estimator.position(now_us)
         self.levelled = self.levelled and self.estimator.height(now_us)
+        return was != (self.located, self.levelled)
 
     def say(self, severity: int, text: str) -> None:
         """Keep what it said: the gravest text since `hush`, and the last that says why it would not arm."""

@@ -98,8 +98,8 @@ class BrakingWatch:
 
     @property
     def due_us(self) -> int:
-        """By when it must stand still, in link time; never while it was not seen to obey."""
-        return NEVER if self._since_us is None else self._since_us + self._brakes.stands_us(self._speed or 0)
+        """From when it may be found too fast, in link time; never while it was not seen to obey."""
+        return NEVER if self._since_us is None else self._since_us + self._brakes.reaction_us + LAG_US
 
     def has_failed(self, seen: ObservedVehicle, *, obeyed: bool) -> bool:
         """Whether it is faster than it may be by now, or moves when it must stand still.
@@ -161,6 +161,12 @@ class TargetWatch:
         self._prior, self._settled_us = seen.target, seen.up_us + settles_us
         if target is not None:
             self._ours.append(target)
+
+    def due_us(self, up_us: int) -> int:
+        """From when a report that is older than our frame counts as somebody else's, in link time, if that is to come
+        yet.
+        """
+        return NEVER if self._expected is None or up_us >= self._settled_us else self._settled_us
 
     def told_again(self) -> None:
         """The present target went out once more: each time that it stops anew, it stops somewhere else."""

@@ -55,11 +55,11 @@ def kind_of(number: int) -> Kind | None:
 
 def decode(frame: bytes, kind: Kind) -> Message | None:
     """The message in a whole frame, signed or not; None if its checksum is wrong."""
-    end = HEADER + frame[1]
+    length, fields = frame[1], kind.fields
+    end = HEADER + length
     if not checks(frame[1:end] + kind.extra, frame[end], frame[end + 1]):
         return None
-    fields = kind.fields
-    if frame[1] >= fields.size:  # what is longer than we know comes of a newer dialect
+    if length >= fields.size:  # what is longer than we know comes of a newer dialect
         return kind.build(fields.unpack_from(frame, HEADER))
     return kind.build(fields.unpack(frame[HEADER:end].ljust(fields.size, b"\0")))  # zeros at the end are not sent
 
@@ -79,19 +79,24 @@ def _layout(of: Any) -> tuple[tuple[str, int, int], ...]:
 def _numbers(of: Any) -> Callable[[tuple[Any, ...]], Message]:
     """A message of numbers, without the generated constructor, which takes longer than all the rest."""
     rest, layout, new = _bare(of), _layout(of), of.__new__
+    kept = tuple(rest.values())
     single = [(name, start) for name, start, length in layout if length == 1]
     arrays = tuple((name, start, start + length) for name, start, length in layout if length > 1)
-    names, pick = tuple(name for name, _ in single), tuple(start for _, start in single)
+    names, pick = (*rest, *[name for name, _ in single]), tuple(start for _, start in single)
+
+    def plain(values: tuple[Any, ...]) -> Message:
+        message = new(of)
+        message.__dict__ = dict(zip(names, kept + values, strict=True))
+        return message
 
     def build(values: tuple[Any, ...]) -> Message:
-        message = new(of)
-        held = message.__dict__ = rest.copy()
-        held.update(zip(names, map(values.__getitem__, pick) if arrays else values, strict=True))
+        message = plain(tuple([values[start] for start in pick]))
+        held = message.__dict__
         for name, start, end in arrays:
             held[name] = list(values[start:end])
         return message
 
-    return build
+    return build if arrays else plain
 
 
 def _values(of: Any) -> Callable[[Message], Iterable[Any]]:

@@ -43,6 +43,8 @@ _REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
 SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
 """The parameters that hold the vehicle's own system id."""
 
+_GUIDED = Mode.GUIDED  # an enumeration's attributes are slow to find
+
 Handler = Callable[["Autopilot", Command], tuple[int, ...]]
 """Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
 Builder = Callable[["Autopilot"], Message | None]
@@ -238,7 +240,8 @@ class Autopilot:
         if vehicle.in_air and self.surroundings.is_hit(vehicle.body):
             vehicle.crash()
         self.failsafes.step(_TICK_S)
-        self._keep_targets()
+        if self.flavour.target_timeout_us is not None:
+            self._keep_targets(self.flavour.target_timeout_us)
         self._follow_plans()
         while self._boot_texts and sensors.age_s >= self._boot_texts[0][0]:
             _, severity, text = self._boot_texts.popleft()
@@ -282,13 +285,15 @@ class Autopilot:
     def _tell(self) -> None:
         """What happened, and what stands against arming."""
         vehicle, flavour = self.vehicle, self.flavour
-        for event in vehicle.events:
-            if event in flavour.texts:
-                up = round(vehicle.target.up)
-                facts = {"speed": vehicle.touched_m_s, "up": up, "amsl": up + self.home.amsl_mm // 1000}
-                self.say(mavlink.MAV_SEVERITY_INFO, flavour.texts[event].format(**facts))
-        vehicle.events.clear()
-        self.tell_mode()
+        if vehicle.events:
+            for event in vehicle.events:
+                if event in flavour.texts:
+                    up = round(vehicle.target.up)
+                    facts = {"speed": vehicle.touched_m_s, "up": up, "amsl": up + self.home.amsl_mm // 1000}
+                    self.say(mavlink.MAV_SEVERITY_INFO, flavour.texts[event].format(**facts))
+            vehicle.events.clear()
+        if vehicle.mode is not self._told_mode:
+            self.tell_mode()
         if vehicle.armed or not flavour.reminds:
             self._remind_us = self.now_us + _REMIND_FIRST_US
         elif self.now_us >= self._remind_us:
@@ -331,12 +336,12 @@ class Autopilot:
     def _may_clear(self, kind: int) -> bool:
         return kind != MISSION or self._home_item is None or not self.mission.running
 
-    def _keep_targets(self) -> None:
+    def _keep_targets(self, timeout_us: int) -> None:
         """Leaves GUIDED when position targets stop coming."""
-        vehicle, timeout, last = self.vehicle, self.flavour.target_timeout_us, self.last_target_us
-        if timeout is None or vehicle.mode is not Mode.GUIDED or not vehicle.in_air or not vehicle.armed:
+        vehicle, last = self.vehicle, self.last_target_us
+        if vehicle.mode is not _GUIDED or not vehicle.in_air or not vehicle.armed:
             return
-        if last is None or self.now_us - last > timeout:
+        if last is None or self.now_us - last > timeout_us:
             self._fail_over(Mode.LOITER)
 
     # ------------------------------------------------------------------------------------------- taken over

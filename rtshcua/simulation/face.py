@@ -66,8 +66,10 @@ class Face:
         if autopilot.off_us:
             return []
         for number in autopilot.streams.due(autopilot.now_us):
-            autopilot.send(autopilot.reports.message(number))
-        return self._collect()
+            message = autopilot.reports.message(number)
+            if message is not None:
+                autopilot.outbox.append(message)
+        return self._collect() if autopilot.outbox else []
 
     def radio_due(self, now_us: int) -> list[bytes]:
         """The frames that the radio sends now, by the world's time: it runs on while the autopilot's loop halts."""
@@ -87,11 +89,9 @@ class Face:
 
     def _collect(self) -> list[bytes]:
         a, outbox = self._autopilot, self._autopilot.outbox
-        if not outbox:
-            return []
-        frames = [a.signing.seal(self._codec.pack(message), a.now_us) for message in outbox]
+        frames = [self._codec.pack(message) for message in outbox]
         outbox.clear()
-        return frames
+        return [a.signing.seal(frame, a.now_us) for frame in frames] if a.signing.on else frames
 
 
 def _heartbeat(a: Autopilot, received: Received) -> None:

@@ -78,7 +78,7 @@ class Failsafes:
             self._lands_blind = False
             return
         self._watch_position(dt)
-        if vehicle.mode is not Mode.LAND and battery.level <= LOW_TO_LAND:
+        if battery.level <= LOW_TO_LAND and vehicle.mode is not Mode.LAND:
             self._say(*self._rules.level)
             self._enter(Mode.LAND)
 
@@ -86,7 +86,7 @@ class Failsafes:
         has_position = self._sensors.has_position
         self._without_s = 0.0 if has_position else self._without_s + dt
         self._back_s = self._back_s + dt if has_position else 0.0
-        if self._vehicle.mode in NEEDS_POSITION and self._without_s > self._rules.position_after_s:
+        if self._without_s > self._rules.position_after_s and self._vehicle.mode in NEEDS_POSITION:
             for text in self._rules.position:
                 self._say(*text)
             self._enter(Mode.LAND)

@@ -135,27 +135,29 @@ class Body:
         if much > _MOST:
             ask_north *= _MOST / much
             ask_east *= _MOST / much
-        change_north, change_east = ask_north - self.lean_north, ask_east - self.lean_east
+        lean_north, lean_east = self.lean_north, self.lean_east
+        change_north, change_east = ask_north - lean_north, ask_east - lean_east
         change = hypot(change_north, change_east)
         if change > JERK * dt:
             change_north *= JERK * dt / change
             change_east *= JERK * dt / change
-        self.lean_north += change_north
-        self.lean_east += change_east
+        self.lean_north = lean_north = lean_north + change_north
+        self.lean_east = lean_east = lean_east + change_east
         air_north, air_east = wind[0] - self.v_north, wind[1] - self.v_east
         drag = _ROTOR_DRAG + _BODY_DRAG * hypot(air_north, air_east)
         drag_north, drag_east = drag * air_north, drag * air_east
         learn = dt / _LEARN_S
         self._trim_north += (-drag_north - self._trim_north) * learn
         self._trim_east += (-drag_east - self._trim_east) * learn
-        self._move(dt, (self.lean_north + drag_north) * dt, (self.lean_east + drag_east) * dt)
+        self._move(dt, (lean_north + drag_north) * dt, (lean_east + drag_east) * dt)
         north, east = cos(self.yaw), sin(self.yaw)
-        self.pitch = -atan((self.lean_north * north + self.lean_east * east) / GRAVITY)
-        self.roll = atan((self.lean_east * north - self.lean_north * east) / GRAVITY)
+        self.pitch = -atan((lean_north * north + lean_east * east) / GRAVITY)
+        self.roll = atan((lean_east * north - lean_north * east) / GRAVITY)
 
     def _climb(self, dt: float, climb: float, most: float) -> None:
-        ask = max(-most, min(most, (climb - self.v_up) * 2 * _FOLLOW))
-        self.a_up += max(-_CLIMB_JERK * dt, min(_CLIMB_JERK * dt, ask - self.a_up))
+        ask = (climb - self.v_up) * 2 * _FOLLOW
+        change, jerk = (-most if ask < -most else most if ask > most else ask) - self.a_up, _CLIMB_JERK * dt
+        self.a_up += -jerk if change < -jerk else jerk if change > jerk else change
         self._rise(dt)
 
     def _rise(self, dt: float) -> None:

@@ -61,9 +61,10 @@ class Link:
 
     def due(self, now_us: int) -> list[bytes]:
         """What has arrived by now."""
-        arrived = []
-        while self._under_way and self._under_way[0][0] <= now_us:
-            arrived.append(heappop(self._under_way)[2])
+        arrived: list[bytes] = []
+        under_way = self._under_way
+        while under_way and under_way[0][0] <= now_us:
+            arrived.append(heappop(under_way)[2])
         return arrived
 
     def _happens(self, part: int) -> bool:

@@ -29,6 +29,9 @@ class MissionState(IntEnum):
     COMPLETE = 5
 
 
+_MODE, _ACTIVE = Mode.MISSION, MissionState.ACTIVE  # an enumeration's attributes are slow to find
+
+
 @dataclass(frozen=True, slots=True)
 class MissionRules:
     """What a flavour does its own way."""
@@ -174,9 +177,9 @@ class Mission:
         if self._judge_at_us is not None and now_us >= self._judge_at_us:
             self._judge()
         vehicle = self._vehicle
-        if vehicle.mode is not Mode.MISSION:
+        if vehicle.mode is not _MODE:
             self._entered = False
-            if self.state is MissionState.ACTIVE:
+            if self.state is _ACTIVE:
                 self.state = MissionState.PAUSED
                 self._begun, self._arrived_us = False, None
                 self._send(self.message())

@@ -55,10 +55,14 @@ class Activity(Enum):
     WRECK = auto()
 
 
+# bound once, for an enumeration's attributes are slow to find and a step looks at many
+_REST, _CLIMB, _TRACK, _RETURN_CLIMB, _RETURN_CROSS, _RETURN_WAIT = tuple(Activity)[:6]
+_CIRCLE, _DESCEND, _TOUCHED, _FALL, _WRECK = tuple(Activity)[6:]
+
 _FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
 
-_DOWN = frozenset({Activity.REST, Activity.TOUCHED, Activity.WRECK})
-_STEADY = frozenset({Activity.TRACK, Activity.DESCEND, Activity.CIRCLE})
+_DOWN = (_REST, _TOUCHED, _WRECK)
+_STEADY = (_TRACK, _DESCEND, _CIRCLE)
 """Activities that go on until something else is asked for, or the ground comes."""
 _HARD_M_S = 4.0
 """Who comes down faster than this breaks."""
@@ -89,7 +93,7 @@ class Vehicle:
         self._stood_s = 0.0  # since it was armed, or came down
         self._lifting_s: float | None = None  # until the motors carry it, if it is to lift off
         self._has_flown = False  # since it was armed
-        self._activity = Activity.REST
+        self._activity = _REST
         self._error = (0.0, 0.0)  # how far its estimate is off
         self._speed: float | None = None
         self._waiting_s = 0.0
@@ -102,22 +106,22 @@ class Vehicle:
     @property
     def in_air(self) -> bool:
         """Whether it has left the ground, and does not know that it came down."""
-        return self._activity is not Activity.REST
+        return self._activity is not _REST
 
     @property
     def flies(self) -> bool:
         """Whether it is in the air and obeys."""
-        return self._activity not in (Activity.REST, Activity.FALL, Activity.WRECK)
+        return self._activity not in (_REST, _FALL, _WRECK)
 
     @property
     def lies(self) -> bool:
         """Whether it lies on the ground as it came down."""
-        return self._activity is Activity.WRECK
+        return self._activity is _WRECK
 
     @property
     def descends(self) -> bool:
         """Whether it is on its way down to land, or has come down."""
-        return self._activity in (Activity.DESCEND, Activity.TOUCHED)
+        return self._activity in (_DESCEND, _TOUCHED)
 
     @property
     def orders(self) -> tuple[object, ...]:
@@ -155,10 +159,10 @@ class Vehicle:
         self.takeoff_up = None
         self.destination, self.sent, self.paused = None, False, False
         self._lifting_s = None
-        if self._activity in (Activity.REST, Activity.TOUCHED, Activity.WRECK):
-            self._activity, self.landed = Activity.REST, Landed.ON_GROUND
+        if self._activity in (_REST, _TOUCHED, _WRECK):
+            self._activity, self.landed = _REST, Landed.ON_GROUND
         else:
-            self._activity = Activity.FALL
+            self._activity = _FALL
             self.landed = Landed.ON_GROUND  # autopilots call a vehicle landed that is disarmed, wherever it is
         self.events.append(event)
         if self.handling.after_landing is not None and not self.in_air:
@@ -176,7 +180,7 @@ class Vehicle:
         """Has flown into something: it falls. The motors are on, for all that the autopilot knows."""
         if not self.crashed:
             self.crashed = True
-            self._activity = Activity.FALL
+            self._activity = _FALL
             self.body.crash()
 
     def set_mode(self, mode: Mode) -> None:
@@ -211,10 +215,10 @@ class Vehicle:
     def climb(self) -> None:
         """Takes off to `takeoff_up` if armed, and if that is above where it is."""
         up = self.takeoff_up
-        if not self.armed or up is None or up <= self.body.up or self._activity is Activity.FALL:
+        if not self.armed or up is None or up <= self.body.up or self._activity is _FALL:
             return
         if self.in_air:
-            self._hold(Activity.CLIMB, up)
+            self._hold(_CLIMB, up)
             self.landed = Landed.TAKEOFF
         else:
             self._lift(self._believed(self.body.north, self.body.east, up))
@@ -254,7 +258,7 @@ class Vehicle:
     def land_here(self) -> None:
         """Descends and lands, whatever the mode."""
         if self.flies:
-            self._hold(Activity.DESCEND, self.body.up)
+            self._hold(_DESCEND, self.body.up)
             self._waiting_s = 0.0
             self.landed = Landed.LANDING
 
@@ -262,7 +266,7 @@ class Vehicle:
         """Climbs to the height of the way home, flies home and lands, whatever the mode."""
         if self.flies:
             body = self.body
-            self._hold(Activity.RETURN_CLIMB, max(body.up, self.handling.return_up))
+            self._hold(_RETURN_CLIMB, max(body.up, self.handling.return_up))
             if self.handling.comes_back:
                 self.target = self.destination = self._believed(body.north, body.east, self.target.up)
                 self._steer_to_target()
@@ -282,14 +286,14 @@ class Vehicle:
             self.destination, self.sent = target, True
             if self.paused:
                 return
-            if target != self.target or self._activity is not Activity.TRACK:
+            if target != self.target or self._activity is not _TRACK:
                 self._past, self._comes_back = None, False
                 if past:
                     self._fly_past(target)
             self.target = target
             self._nose = None
             self._steer_to_target()
-            self._activity = Activity.TRACK
+            self._activity = _TRACK
             self.landed = Landed.IN_AIR
         elif self.armed and not self.in_air and self.handling.lifts_to_targets and target.up > self.body.up:
             self._lift(target)
@@ -304,7 +308,7 @@ class Vehicle:
         if self.flies:
             self.target, self._radius = centre, radius
             self._past = None
-            self._activity = Activity.CIRCLE
+            self._activity = _CIRCLE
             self.landed = Landed.IN_AIR
 
     # ------------------------------------------------------------------------------------------------- in time
@@ -322,8 +326,8 @@ class Vehicle:
             self._stand(dt)
             return battery.IDLE if self.armed else battery.REST
         if not powered:
-            self._activity = activity = Activity.FALL
-        if activity is Activity.FALL:
+            self._activity = activity = _FALL
+        if activity is _FALL:
             body.fall(dt)
         else:
             self._fly(dt, wind, error, sees)
@@ -338,7 +342,7 @@ class Vehicle:
         """A place as it takes it to be: it steers by its estimate, which may be off."""
         return Point(north + self._error[0], east + self._error[1], up)
 
-    def _hold(self, activity: Activity = Activity.TRACK, up: float | None = None) -> None:
+    def _hold(self, activity: Activity = _TRACK, up: float | None = None) -> None:
         """Stops where it can, at the height `up`, or where it can stop climbing as well."""
         body, agility = self.body, self.handling.agility
         stop = agility.brake if self.mode is Mode.BRAKE else agility.stop
@@ -369,8 +373,9 @@ class Vehicle:
     def _fly(self, dt: float, wind: tuple[float, float], error: tuple[float, float], sees: bool) -> None:
         body, agility = self.body, self.handling.agility
         self._waiting_s -= dt
-        self._advance(error)
-        most = agility.takeoff_acceleration if self._activity is Activity.CLIMB else agility.climb_acceleration
+        if self._activity not in _STEADY:
+            self._advance(error)
+        most = agility.takeoff_acceleration if self._activity is _CLIMB else agility.climb_acceleration
         self.blind = self.blind or not sees
         north, east = self.target.north - error[0], self.target.east - error[1]
         if self.blind:
@@ -382,7 +387,7 @@ class Vehicle:
                 self._comes_back = True
             else:
                 north, east = north + self._past.north, east + self._past.east
-        if self._activity is Activity.CIRCLE:
+        if self._activity is _CIRCLE:
             want = guidance.around(body, north, east, self._radius, self.speed)
         else:
             speed = guidance.speed_back(body, north, east) if self._comes_back else self.speed
@@ -397,44 +402,42 @@ class Vehicle:
     def _advance(self, error: tuple[float, float]) -> None:
         """Goes on to the next part of a takeoff or a return when the present one is done."""
         activity, body = self._activity, self.body
-        if activity in _STEADY:
-            return
         away = abs(self.target.up - body.up)
-        if activity is Activity.CLIMB:
+        if activity is _CLIMB:
             if away < self.handling.agility.takeoff_within:
-                self._activity = Activity.TRACK
+                self._activity = _TRACK
                 self.landed = Landed.IN_AIR
                 self.takeoff_up = None
                 if self.mode is Mode.TAKEOFF and self.handling.after_takeoff is not None:
                     self.mode = self.handling.after_takeoff
-        elif activity is Activity.RETURN_CLIMB:
+        elif activity is _RETURN_CLIMB:
             if away < guidance.ARRIVED_M and abs(body.v_up) < guidance.ARRIVED_M_S:
                 self.target = self.destination = Point(0.0, 0.0, self.target.up)
                 self._fly_past(self.target)
                 self._steer_to_target()
-                self._activity = Activity.RETURN_CROSS
-        elif activity is Activity.RETURN_CROSS:
+                self._activity = _RETURN_CROSS
+        elif activity is _RETURN_CROSS:
             within = self.handling.agility.home_within
             if guidance.is_above(body, self.target.north - error[0], self.target.east - error[1], within):
-                self._activity = Activity.RETURN_WAIT
+                self._activity = _RETURN_WAIT
                 self._waiting_s = self.handling.agility.return_wait_s
         elif self._waiting_s <= 0:
-            self._activity = Activity.DESCEND
+            self._activity = _DESCEND
             self.destination = Point(self.target.north, self.target.east, 0.0)
             self.landed = Landed.LANDING
             self.events.append(Event.HOME)
 
     def _climb_rate(self, north: float, east: float) -> float:
         """Upwards; (north, east) is the target as it is steered to."""
-        if self._activity is Activity.DESCEND:
+        if self._activity is _DESCEND:
             if self._waiting_s > 0:
                 return 0.0
             return guidance.landing_rate(self.body, self.handling)
-        climbs = self._activity is Activity.CLIMB
+        climbs = self._activity is _CLIMB
         rate = guidance.climb_rate(self.body.up, self.target.up, self.handling, climbs)
-        if self._activity is Activity.TRACK:
+        if self._activity is _TRACK:
             most = guidance.steepest(self.body, north, east, self.target.up)
-            rate = max(-most, min(most, rate))
+            return -most if rate < -most else most if rate > most else rate
         return rate
 
     # ---------------------------------------------------------------------------------------------- on the ground
@@ -442,13 +445,13 @@ class Vehicle:
     def _stand(self, dt: float) -> None:
         handling = self.handling
         self._stood_s += dt
-        if self._activity is Activity.TOUCHED:
+        if self._activity is _TOUCHED:
             if self._stood_s >= handling.agility.land_detect_s:
                 self._stood_s = 0.0
-                self._activity = Activity.REST
+                self._activity = _REST
                 self.landed = Landed.ON_GROUND
                 self.events.append(Event.LANDED)
-        elif self._activity is Activity.WRECK:
+        elif self._activity is _WRECK:
             if self.armed and handling.crash_disarm_s is not None and self._stood_s >= handling.crash_disarm_s:
                 self.disarm(Event.CRASHED)
         elif self._lifting_s is not None:
@@ -465,7 +468,7 @@ class Vehicle:
         self.events.append(Event.TAKEOFF)
         self._steer_to_target()
         climbs = self.takeoff_up is not None
-        self._activity = Activity.CLIMB if climbs else Activity.TRACK
+        self._activity = _CLIMB if climbs else _TRACK
         self.landed = Landed.TAKEOFF if climbs else Landed.IN_AIR
 
     def _touch_down(self) -> None:
@@ -475,9 +478,9 @@ class Vehicle:
         self.body.stop(upright=not self.crashed)
         self.events += [Event.TOUCHED, Event.TIPPED] if self.crashed and self.armed else [Event.TOUCHED]
         if not self.armed:
-            self._activity = Activity.REST
+            self._activity = _REST
         else:
-            self._activity = Activity.WRECK if self.crashed else Activity.TOUCHED
+            self._activity = _WRECK if self.crashed else _TOUCHED
         self.landed = self.landed if self.armed else Landed.ON_GROUND
         self._stood_s = 0.0
         self.blind = False

@@ -97,7 +97,8 @@ class Simulation:
             self._ticked_us = at_us
             if autopilot.surroundings.moving:
                 autopilot.surroundings.step(TICK_US / 1_000_000)
-            self._happen(at_us)
+            if self._events:
+                self._happen(at_us)
             self._deliver(at_us)
             if not self._halted:
                 autopilot.tick()

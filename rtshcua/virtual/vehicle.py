@@ -75,17 +75,24 @@ class VirtualVehicle:
         events, self._pending = self._pending, []
         waiting, self._waiting = self._waiting, []
         self._take(waiting, events)
-        end_us = self.clock.elapsed_us + timeout_us
+        clock, driver = self.clock, self.driver
+        end_us = clock.elapsed_us + timeout_us
         looked_at = 0
         while True:
-            happened, frames = self.driver.tick(self.clock.monotonic_us)
+            happened, frames = driver.tick(clock.monotonic_us)
             events += happened
-            self._send(frames, events)
-            if self.clock.elapsed_us >= end_us or any(not isinstance(event, Readings) for event in events[looked_at:]):
+            if frames:
+                self._send(frames, events)
+            if clock.elapsed_us >= end_us:
                 return events
-            looked_at = len(events)
-            self.clock.elapsed_us = min(end_us, self.clock.elapsed_us + self._tick_us)
-            self._take(self.simulation.advance(self.clock.elapsed_us), events)
+            if looked_at < len(events):
+                if any([type(event) is not Readings for event in events[looked_at:]]):
+                    return events
+                looked_at = len(events)
+            clock.elapsed_us = min(end_us, clock.elapsed_us + self._tick_us)
+            datagrams = self.simulation.advance(clock.elapsed_us)
+            if datagrams:
+                self._take(datagrams, events)
 
     def begin(self, command: Command, now_us: int) -> None:
         """Start a command."""
@@ -110,9 +117,11 @@ class VirtualVehicle:
                 self._take(self.simulation.receive(frame, self.clock.elapsed_us), events)
 
     def _take(self, datagrams: Sequence[bytes], events: list[Event]) -> None:
+        now_us = self.clock.monotonic_us
         for original in datagrams:
             for datagram in self.hurt(original):
-                heard = self.driver.receive(datagram, self.clock.monotonic_us)
-                self.received += len(heard.frames)
-                events += heard.events
-                self._send(heard.answers, events)
+                came, answers, frames = self.driver.receive(datagram, now_us)
+                self.received += len(frames)
+                events += came
+                if answers:
+                    self._send(answers, events)

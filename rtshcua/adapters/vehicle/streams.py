@@ -90,7 +90,8 @@ class StreamRequests:
             self._late_us.append(now_us)
             self._answer_us = min(2 * self._answer_us, LATEST_US)
         if not self._queue:
-            self._measure(now_us)
+            if self._measured_us is None or now_us - self._measured_us >= MEASURE_US:
+                self._measure(now_us)
             if now_us - self._looked_us >= ANSWER_US:
                 self._looked_us = now_us
                 self._queue += [name for name in self._wanted if self._is_quiet(name, now_us)]
@@ -119,11 +120,8 @@ class StreamRequests:
 
     def _measure(self, now_us: int) -> None:
         """Once every request was answered: compare what came since with what was asked for."""
-        since_us = self._measured_us
-        if since_us is not None and now_us - since_us < MEASURE_US:
-            return
-        if since_us is not None:
-            self._compare(now_us - since_us)
+        if self._measured_us is not None:
+            self._compare(now_us - self._measured_us)
         self._measured_us, self._counts = now_us, dict.fromkeys(self._wanted, 0)
 
     def _compare(self, passed_us: int) -> None:

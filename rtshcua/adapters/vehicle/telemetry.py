@@ -1,7 +1,7 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from rtshcua.decision.tree import where
 from rtshcua.mavlink import dialect
@@ -15,6 +15,9 @@ from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, proje
 #: Each message is asked for several times within the shortest time to stale of what it carries, within these, in us.
 MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
 _WITHIN_STALE = 4
+
+
+_NUMBERS: Final = (int, float)  # as `int | float` it would be made anew for each field
 
 
 def _always(_: str) -> bool:
@@ -128,7 +131,7 @@ def _place(source: SignalSource, message: Any, projection: Projection) -> tuple[
 
 def _field(source: SignalSource, message: Any, field: str) -> int | None:
     raw = getattr(message, field)
-    if not isinstance(raw, int | float):
+    if not isinstance(raw, _NUMBERS):
         return None
     value = quantise(raw, source.numerator, source.denominator, source.unknown)
     return None if value is None or abs(value) > MAX_VALUE else value

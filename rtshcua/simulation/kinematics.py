@@ -156,8 +156,8 @@ class Body:
 
     def _climb(self, dt: float, climb: float, most: float) -> None:
         ask = (climb - self.v_up) * 2 * _FOLLOW
-        change, jerk = (-most if ask < -most else most if ask > most else ask) - self.a_up, _CLIMB_JERK * dt
-        self.a_up += -jerk if change < -jerk else jerk if change > jerk else change
+        change, jerk = max(-most, min(most, ask)) - self.a_up, _CLIMB_JERK * dt
+        self.a_up += max(-jerk, min(jerk, change))
         self._rise(dt)
 
     def _rise(self, dt: float) -> None:

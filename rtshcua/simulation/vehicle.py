@@ -437,7 +437,7 @@ class Vehicle:
         rate = guidance.climb_rate(self.body.up, self.target.up, self.handling, climbs)
         if self._activity is _TRACK:
             most = guidance.steepest(self.body, north, east, self.target.up)
-            return -most if rate < -most else most if rate > most else rate
+            rate = max(-most, min(most, rate))
         return rate
 
     # ---------------------------------------------------------------------------------------------- on the ground

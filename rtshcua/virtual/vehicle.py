@@ -86,7 +86,7 @@ class VirtualVehicle:
             if clock.elapsed_us >= end_us:
                 return events
             if looked_at < len(events):
-                if any([type(event) is not Readings for event in events[looked_at:]]):
+                if any(type(event) is not Readings for event in events[looked_at:]):
                     return events
                 looked_at = len(events)
             clock.elapsed_us = min(end_us, clock.elapsed_us + self._tick_us)

@@ -1,7 +1,6 @@
 """A vehicle without its socket: frames in, events and frames out, time given; for real and virtual time."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
@@ -131,7 +130,8 @@ class Driver:
         send += self._streams.due(self.system, now_us)
         if self.seen.down and not self._was_ready:
             send += self.preflight.due(self.system, now_us)
-        self._hear(self._texts.due(now_us), events)
+        if self._texts.waits:
+            self._hear(self._texts.due(now_us), events)
         self._look(now_us, events)
         if self._manoeuvre is not None and (aged or now_us >= self._manoeuvre.due_us):
             self._advance(now_us, send, events)
@@ -143,7 +143,8 @@ class Driver:
             if notes:
                 events += [ports.Noted(now_us, text) for text in notes]
                 notes.clear()
-        send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
+        if self._announcer.waits:
+            send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         return events, self._pack(send, now_us, events) if send else []
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
@@ -209,8 +210,7 @@ class Driver:
             return self._acknowledge(frame, now_us) or self._asks
         self._streams.heard(name, now_us)
         if name in self._telemetry.intervals:
-            vouched = partial(self.seen.estimator.vouches_for, name, now_us=now_us)
-            values = self._telemetry.read(name, message, component, vouched)
+            values = self._telemetry.read(name, message, component, self.seen.estimator.doubtful(name, now_us))
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
         if component != AUTOPILOT or name not in self._heeded:

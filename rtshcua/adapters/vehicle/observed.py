@@ -48,6 +48,9 @@ _RESTS_ON: Mapping[str, Mapping[str, int]] = {
 }  # fmt: skip
 
 
+_NONE: Final = frozenset[str]()
+
+
 class Estimator:
     """The last report, by `flags` and when it was made. A height is above home, so it means nothing before there is
     one: the estimator must have had a position once.
@@ -58,6 +61,7 @@ class Estimator:
         self._flags = 0
         self._at_us: int | None = None
         self._homed = False
+        self._doubted: tuple[tuple[str, int, bool] | None, frozenset[str]] = None, _NONE  # the last answer, and to what
 
     def take(self, flags: int, at_us: int) -> None:
         """A report came that was made at `at_us` (see `source_time`); one that is older than the last is set aside."""
@@ -72,6 +76,10 @@ class Estimator:
             return False
         astray = bits & (POSITION | POSITION_RELATIVE | VELOCITY_HORIZONTAL) and self._flags & (_GLITCH | _GLITCHING)
         return not astray and self._flags & bits == bits
+
+    def is_stale(self, now_us: int) -> bool:
+        """Whether it has not reported, or not for too long."""
+        return self._at_us is None or now_us - self._at_us > STALE_US
 
     def position(self, now_us: int) -> bool:
         """Whether it knows where it is."""
@@ -88,6 +96,18 @@ class Estimator:
         if bits & HEIGHT and field == "relative_alt":
             return self.height(now_us)
         return not bits or self.vouches(bits, now_us)
+
+    def doubtful(self, message: str, now_us: int) -> frozenset[str]:
+        """The fields of a message that are not vouched for."""
+        fields = _RESTS_ON.get(message)
+        if fields is None:
+            return _NONE
+        if self.is_stale(now_us):
+            return frozenset(fields)
+        key = (message, self._flags, self._homed)
+        if self._doubted[0] != key:
+            self._doubted = key, frozenset(field for field in fields if not self.vouches_for(message, field, now_us))
+        return self._doubted[1]
 
     def missing(self, now_us: int) -> str | None:
         """What it has not got, in words; None when it has a position and a height."""
@@ -227,7 +247,7 @@ class ObservedVehicle:
         """Time goes by: where it was, and what the estimator last said, grows old. Whether something grew too old."""
         self.now_us = now_us
         if now_us - self.made_us.get("GLOBAL_POSITION_INT", now_us) <= STALE_US:
-            return self._doubt(now_us)
+            return self.estimator.is_stale(now_us) and self._doubt(now_us)
         was = self.located or self.levelled or self.speed is not None
         self.located, self.levelled, self.speed = False, False, None
         return was

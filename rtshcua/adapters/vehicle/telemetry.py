@@ -1,6 +1,6 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from rtshcua.decision.tree import where
@@ -17,18 +17,15 @@ MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
 _WITHIN_STALE = 4
 
 
+_NONE: Final = frozenset[str]()
 _NUMBERS: Final = (int, float)  # as `int | float` it would be made anew for each field
 
 
-def _always(_: str) -> bool:
-    return True
-
-
-def _says_nothing(name: str, message: Any) -> bool:
+def _says_nothing(wind: Any) -> bool:
     """A multirotor of ArduPilot's that estimates no wind reports none from the south, and does so in 8 m/s (recorded):
     `atan2(-0, -0)` is -180 degrees.
     """
-    return bool(name == "WIND" and message.speed == 0 and message.direction == -180)
+    return bool(wind.speed == 0 and wind.direction == -180)
 
 
 class UnknownSource(ValueError):
@@ -61,21 +58,22 @@ class Telemetry:
         self.sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
 
     def read(
-        self, name: str, message: Any, component: int = AUTOPILOT, vouched: Callable[[str], bool] = _always
+        self, name: str, message: Any, component: int = AUTOPILOT, doubtful: frozenset[str] = _NONE
     ) -> tuple[tuple[int, int | None], ...]:
         """(slot, canonical integer) of every signal that this message carries; None is "reported as not known".
 
-        So is a value that rests on a field of the autopilot's which is not `vouched` for. When it was measured is not
-        said here: see `source_time`.
+        So is a value that rests on a field of the autopilot's which is `doubtful`. When it was measured is not said
+        here: see `source_time`.
         """
         carried = self._by_message.get(name)
         if carried is None or not self._is_first(name, message, component):
             return ()
-        known = vouched if component == AUTOPILOT else _always
-        empty = _says_nothing(name, message)
+        if component != AUTOPILOT:
+            doubtful = _NONE
+        empty = name == "WIND" and _says_nothing(message)
         values: list[tuple[int, int | None]] = []
         for signal, source in carried:
-            if empty or not all(map(known, source.fields)):
+            if empty or (doubtful and not doubtful.isdisjoint(source.fields)):
                 values += [(slot, None) for slot in range(signal.slot, signal.slot + 1 + (signal.kind == POSITION))]
             elif signal.kind == POSITION:
                 x, y = _place(source, message, self._projection)

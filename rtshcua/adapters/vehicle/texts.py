@@ -51,6 +51,11 @@ class StatusTexts:
             said += self._finish(now_us)
         return said
 
+    @property
+    def waits(self) -> bool:
+        """Whether a text is not whole yet."""
+        return bool(self._parts)
+
     def due(self, now_us: int) -> list[Said]:
         """The text whose end did not come in time."""
         return self._finish(now_us) if self._parts and now_us - self._at_us > CHUNK_US else []
@@ -89,6 +94,11 @@ class Announcer:
     def add(self, severity: int, text: str) -> None:
         """Announce a text; of a long one the first 50 octets."""
         self._waiting.append((severity, text))
+
+    @property
+    def waits(self) -> bool:
+        """Whether there is something to tell."""
+        return bool(self._waiting)
 
     def due(self, now_us: int, *, busy: bool) -> list[Message]:
         """The next one, unless the link is busy or was just used for one."""

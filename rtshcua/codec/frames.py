@@ -99,6 +99,21 @@ def _numbers(of: Any) -> Callable[[tuple[Any, ...]], Message]:
     return build if arrays else plain
 
 
+def maker(of: Any) -> Callable[..., Message]:
+    """What makes a message of numbers as the generated constructor does, from the same arguments in their order."""
+    rest, new = _bare(of), of.__new__
+    kept, names, defaults = tuple(rest.values()), (*rest, *of.fieldnames), of.__init__.__defaults__ or ()
+
+    def make(*values: Any) -> Message:
+        message = new(of)
+        missing = len(names) - len(kept) - len(values)
+        given = values + defaults[-missing:] if missing else values
+        message.__dict__ = dict(zip(names, kept + given, strict=True))
+        return message
+
+    return make
+
+
 def _values(of: Any) -> Callable[[Message], Iterable[Any]]:
     """What takes the numbers of a message out of it, in the order of the wire."""
     layout = _layout(of)

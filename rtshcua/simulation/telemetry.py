@@ -6,11 +6,24 @@ from math import atan2, degrees, hypot
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Message
+from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.failsafe import LOW_TO_LAND
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
+
+_HEARTBEAT = maker(mavlink.MAVLink_heartbeat_message)
+_SYS_STATUS = maker(mavlink.MAVLink_sys_status_message)
+_GPS_RAW_INT = maker(mavlink.MAVLink_gps_raw_int_message)
+_GLOBAL_POSITION_INT = maker(mavlink.MAVLink_global_position_int_message)
+_ATTITUDE = maker(mavlink.MAVLink_attitude_message)
+_VFR_HUD = maker(mavlink.MAVLink_vfr_hud_message)
+_BATTERY_STATUS = maker(mavlink.MAVLink_battery_status_message)
+_HOME_POSITION = maker(mavlink.MAVLink_home_position_message)
+_DISTANCE_SENSOR = maker(mavlink.MAVLink_distance_sensor_message)
+_RADIO_STATUS = maker(mavlink.MAVLink_radio_status_message)
+_EXTENDED_SYS_STATE = maker(mavlink.MAVLink_extended_sys_state_message)
+_SYSTEM_TIME = maker(mavlink.MAVLink_system_time_message)
 
 GOOD_FLAGS, LOST_FLAGS = 0x33F, 0x025
 """ESTIMATOR_STATUS_FLAGS and EKF_STATUS_FLAGS share these bits: all well; only attitude and height (as recorded)."""
@@ -49,9 +62,7 @@ def heartbeat(a: Autopilot) -> Message:
         status = mavlink.MAV_STATE_CRITICAL
     else:
         status = mavlink.MAV_STATE_ACTIVE if active else mavlink.MAV_STATE_STANDBY
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_QUADROTOR, a.flavour.autopilot, base, modes.numbers[vehicle.mode], status, 3
-    )
+    return _HEARTBEAT(mavlink.MAV_TYPE_QUADROTOR, a.flavour.autopilot, base, modes.numbers[vehicle.mode], status, 3)
 
 
 def _in_danger(a: Autopilot) -> bool:
@@ -76,7 +87,7 @@ def sys_status(a: Autopilot) -> Message | None:
     if not a.vehicle.armed and not a.ready:
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     battery = a.battery
-    return mavlink.MAVLink_sys_status_message(
+    return _SYS_STATUS(
         present, enabled, healthy, 250, battery.millivolts, battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
     )
 
@@ -85,14 +96,14 @@ def gps_raw_int(a: Autopilot) -> Message:
     """GPS_RAW_INT: what the receiver measures, with its noise; the last place again while there is no fix."""
     sensors, body = a.sensors, a.vehicle.body
     if not sensors.receives:
-        return mavlink.MAVLink_gps_raw_int_message(a.now_us, 0, 0, 0, 0, 65_535, 65_535, 65_535, 65_535, 0)
+        return _GPS_RAW_INT(a.now_us, 0, 0, 0, 0, 65_535, 65_535, 65_535, 65_535, 0)
     fix_type, satellites = (a.flavour.fix, 10) if sensors.has_fix else (mavlink.GPS_FIX_TYPE_NO_FIX, 3)
     point = sensors.fix(body)
     latitude, longitude = a.home.globe(point.north, point.east)
     amsl = a.home.amsl_mm + round(point.up * 1000)
     speed = round(hypot(body.v_north, body.v_east) * 100)
     course = round(degrees(atan2(body.v_east, body.v_north)) * 100) % 36_000
-    return mavlink.MAVLink_gps_raw_int_message(
+    return _GPS_RAW_INT(
         a.now_us, fix_type, latitude, longitude, amsl, 70, 110, speed, course, satellites, amsl, 900, 1780, 400
     )
 
@@ -103,12 +114,12 @@ def global_position_int(a: Autopilot) -> Message | None:
     if not sensors.tells_position:
         return None
     if not sensors.receives:
-        return mavlink.MAVLink_global_position_int_message(a.boot_ms, 0, 0, 0, 0, 0, 0, 0, 0)
+        return _GLOBAL_POSITION_INT(a.boot_ms, 0, 0, 0, 0, 0, 0, 0, 0)
     point = sensors.estimate(body)
     v_north, v_east, v_up = sensors.velocity(body)
     latitude, longitude = a.home.globe(point.north, point.east)
     up = round(point.up * 1000) if sensors.has_origin else 0
-    return mavlink.MAVLink_global_position_int_message(
+    return _GLOBAL_POSITION_INT(
         a.boot_ms,
         latitude,
         longitude,
@@ -124,7 +135,7 @@ def global_position_int(a: Autopilot) -> Message | None:
 def attitude(a: Autopilot) -> Message:
     """ATTITUDE, without rates."""
     body = a.vehicle.body
-    return mavlink.MAVLink_attitude_message(a.boot_ms, body.roll, body.pitch, body.yaw, 0.0, 0.0, 0.0)
+    return _ATTITUDE(a.boot_ms, body.roll, body.pitch, body.yaw, 0.0, 0.0, 0.0)
 
 
 def vfr_hud(a: Autopilot) -> Message:
@@ -133,7 +144,7 @@ def vfr_hud(a: Autopilot) -> Message:
     throttle = round(min(100.0, 45 * a.battery.load)) if a.vehicle.in_air else 0
     v_north, v_east, v_up = a.sensors.velocity(body)
     airspeed = hypot(body.v_north - a.air.north, body.v_east - a.air.east) if a.vehicle.in_air else 0.0
-    return mavlink.MAVLink_vfr_hud_message(
+    return _VFR_HUD(
         airspeed,
         hypot(v_north, v_east),
         round(degrees(body.yaw)) % 360,
@@ -153,7 +164,7 @@ def battery_status(a: Autopilot) -> Message:
     else:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_OK
     voltages = [battery.millivolts] + [65_535] * 9
-    return mavlink.MAVLink_battery_status_message(
+    return _BATTERY_STATUS(
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
         mavlink.MAV_BATTERY_TYPE_LIPO,
@@ -173,7 +184,7 @@ def home_position(a: Autopilot) -> Message | None:
     if not a.sensors.has_origin:
         return None
     home = a.home
-    return mavlink.MAVLink_home_position_message(
+    return _HOME_POSITION(
         home.latitude, home.longitude, home.amsl_mm, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, a.now_us
     )
 
@@ -181,7 +192,7 @@ def home_position(a: Autopilot) -> Message | None:
 def distance_sensor(a: Autopilot) -> Message:
     """DISTANCE_SENSOR looking ahead; its greatest distance if nothing is there."""
     seen = a.surroundings.ahead(a.vehicle.body)
-    return mavlink.MAVLink_distance_sensor_message(
+    return _DISTANCE_SENSOR(
         a.boot_ms,
         int(RANGE_MIN_M * 100),
         int(RANGE_MAX_M * 100),
@@ -214,12 +225,12 @@ def radio_status(a: Autopilot) -> Message:
     """RADIO_STATUS, from the radio: signal strength of 254 when all is well, and `txbuf` as the link's quality in %."""
     percent = a.link_quality // 100
     rssi = 254 * percent // 100
-    return mavlink.MAVLink_radio_status_message(rssi, rssi, percent, 30, 30, 0, 0)
+    return _RADIO_STATUS(rssi, rssi, percent, 30, 30, 0, 0)
 
 
 def extended_sys_state(vtol: int) -> Builder:
     """EXTENDED_SYS_STATE; `vtol` is its `vtol_state`."""
-    return lambda a: mavlink.MAVLink_extended_sys_state_message(vtol, a.vehicle.landed)
+    return lambda a: _EXTENDED_SYS_STATE(vtol, a.vehicle.landed)
 
 
 def autopilot_version(capabilities: int, version: int, numbered: int) -> Builder:
@@ -231,7 +242,7 @@ def autopilot_version(capabilities: int, version: int, numbered: int) -> Builder
 
 def system_time(a: Autopilot) -> Message:
     """SYSTEM_TIME: the time of day, and since the start."""
-    return mavlink.MAVLink_system_time_message(a.utc_us + a.now_us, a.boot_ms)
+    return _SYSTEM_TIME(a.utc_us + a.now_us, a.boot_ms)
 
 
 AVAILABLE_MODES = 435

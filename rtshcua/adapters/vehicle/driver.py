@@ -27,6 +27,7 @@ from rtshcua.onboard.ports import Command, Event, Said
 HEARTBEAT_US = 1_000_000
 
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
+_OF_PREFLIGHT = frozenset(preflight.HEEDED)
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
 
 
@@ -226,7 +227,7 @@ class Driver:
                 self._watch_mode(before, now_us, events)
             case "STATUSTEXT":
                 self._hear(self._texts.take(message, now_us), events)
-            case _ if name in preflight.HEEDED and self._is_for_us(message):
+            case _ if name in _OF_PREFLIGHT and self._is_for_us(message):
                 send += self.preflight.take(name, message, self.system, now_us)
         if new and self.seen.landed_state:
             air = (self.seen.armed, self.seen.airborne)

@@ -4,13 +4,18 @@ from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Message
+from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS, autopilot_version, extended_sys_state
 
 _PLACE_ONLY = 0xFDF8
 """`type_mask`: only the place counts; the last byte's upper half is set as well (`send_position_target_global_int`)."""
+
+_POSITION_TARGET_GLOBAL_INT = maker(mavlink.MAVLink_position_target_global_int_message)
+_EKF_STATUS_REPORT = maker(mavlink.MAVLink_ekf_status_report_message)
+_WIND = maker(mavlink.MAVLink_wind_message)
+_TIMESYNC = maker(mavlink.MAVLink_timesync_message)
 
 
 def _position_target(a: Autopilot) -> Message | None:
@@ -26,7 +31,7 @@ def _position_target(a: Autopilot) -> Message | None:
         return None
     latitude, longitude = a.home.globe(target.north, target.east)
     amsl = a.home.amsl_mm / 1000 + target.up
-    return mavlink.MAVLink_position_target_global_int_message(
+    return _POSITION_TARGET_GLOBAL_INT(
         a.boot_ms, mavlink.MAV_FRAME_GLOBAL, _PLACE_ONLY, latitude, longitude, amsl, *[0.0] * 8
     )
 
@@ -56,19 +61,19 @@ def _ekf_status_report(a: Autopilot) -> Message | None:
     if sensors.glitching:
         flags |= _GLITCHING
     velocity, place = (_REJECTED, _REJECTED) if sensors.unhealthy else (0.008, 0.005)
-    return mavlink.MAVLink_ekf_status_report_message(flags, velocity, place, 0.001, 0.006, 0.0)
+    return _EKF_STATUS_REPORT(flags, velocity, place, 0.001, 0.006, 0.0)
 
 
 def _wind(a: Autopilot) -> Message | None:
     if not a.sensors.locates:
         return None
     # -180 degrees and no speed are what a copter without an estimate of the wind reports; this one has one
-    return mavlink.MAVLink_wind_message(a.air.from_degrees if a.air.speed else 0.0, a.air.speed, 0.0)
+    return _WIND(a.air.from_degrees if a.air.speed else 0.0, a.air.speed, 0.0)
 
 
 def _timesync(a: Autopilot) -> Message:
     """It asks for the other end's time; its own system id is added to its time, by which it knows the answer."""
-    return mavlink.MAVLink_timesync_message(0, a.now_us * 1000 + a.system)
+    return _TIMESYNC(0, a.now_us * 1000 + a.system)
 
 
 BUILDERS: Mapping[int, Builder] = COMMON | {

@@ -5,7 +5,7 @@ from math import nan
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Message
+from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.telemetry import (
@@ -16,6 +16,11 @@ from rtshcua.simulation.telemetry import (
     current_mode,
     extended_sys_state,
 )
+
+_POSITION_TARGET_GLOBAL_INT = maker(mavlink.MAVLink_position_target_global_int_message)
+_ESTIMATOR_STATUS = maker(mavlink.MAVLink_estimator_status_message)
+_WIND_COV = maker(mavlink.MAVLink_wind_cov_message)
+_TIMESYNC = maker(mavlink.MAVLink_timesync_message)
 
 _NAVIGATED = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND})
 """The modes in which the navigator sets one; a pilot's modes, OFFBOARD and circling have none."""
@@ -34,7 +39,7 @@ def _position_target(a: Autopilot) -> Message | None:
     amsl = 0.0 if vehicle.mode is Mode.LAND else a.home.amsl_mm / 1000 + target.up
     body = vehicle.body
     velocity = (body.v_north, body.v_east, -body.v_up)
-    return mavlink.MAVLink_position_target_global_int_message(
+    return _POSITION_TARGET_GLOBAL_INT(
         a.boot_ms, mavlink.MAV_FRAME_GLOBAL_INT, 0, latitude, longitude, amsl, *velocity, 0.0, 0.0, 0.0, body.yaw, 0.0
     )
 
@@ -64,7 +69,7 @@ def _estimator_status(a: Autopilot) -> Message | None:
     if sensors.glitching:
         flags |= mavlink.ESTIMATOR_GPS_GLITCH
     velocity, place, off_m = (_REJECTED, _REJECTED, _ASTRAY_M) if sensors.unhealthy else (0.06, 0.04, 0.3)
-    return mavlink.MAVLink_estimator_status_message(
+    return _ESTIMATOR_STATUS(
         a.now_us, flags, velocity, place, 0.03, 0.06, 0.005, nan, off_m, 0.3
     )
 
@@ -72,14 +77,14 @@ def _estimator_status(a: Autopilot) -> Message | None:
 def _wind_cov(a: Autopilot) -> Message | None:
     if not a.sensors.locates:
         return None
-    return mavlink.MAVLink_wind_cov_message(
+    return _WIND_COV(
         a.now_us, a.air.north, a.air.east, 0.0, 0.1, 0.0, a.home.amsl_mm / 1000 + a.vehicle.body.up, 0.5, 0.5
     )
 
 
 def _timesync(a: Autopilot) -> Message:
     """PX4 asks for the other end's time."""
-    return mavlink.MAVLink_timesync_message(0, a.now_us * 1000)
+    return _TIMESYNC(0, a.now_us * 1000)
 
 
 BUILDERS: Mapping[int, Builder] = COMMON | {

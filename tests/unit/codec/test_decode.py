@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Codec, decode, kind_of
+from rtshcua.codec.frames import Codec, decode, kind_of, maker
 from rtshcua.mavlink.framing import checksum
 
 NOT_MADE = ("_header", "_payload", "_msgbuf", "_crc")
@@ -62,6 +62,18 @@ def test_every_message_is_packed_as_pymavlink_packs_it() -> None:
             message = decode(frame_of(number, payload), kind)
             assert ours.pack(message) == message.pack(theirs), of.msgname
             theirs.seq = (theirs.seq + 1) % 256
+
+
+def test_every_message_of_numbers_is_made_as_its_constructor_makes_it() -> None:
+    for of in mavlink.mavlink_map.values():
+        if "char" in of.fieldtypes:
+            continue
+        fields, defaults = list(range(len(of.fieldnames))), len(of.__init__.__defaults__ or ())
+        for given in {len(fields), len(fields) - defaults}:
+            ours, theirs = maker(of)(*fields[:given]), of(*fields[:given])
+            assert type(ours) is type(theirs)
+            assert sorted(vars(ours)) == sorted(vars(theirs))
+            assert all(getattr(ours, name) == vars(theirs)[name] for name in vars(theirs) if name not in NOT_MADE)
 
 
 @pytest.mark.parametrize("bit", range(8 * 14))

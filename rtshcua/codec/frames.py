@@ -212,9 +212,9 @@ class Codec:
         A frame does not span datagrams, so nothing is kept from one call to the next. The time is the verifier's.
         """
         good: list[Received] = []
-        start = 0
+        start, octets = 0, len(datagram)
         in_garbage = False
-        while start < len(datagram):
+        while start < octets:
             end = _frame_end(datagram, start)
             received = _decode(datagram[start:end]) if end else None
             if received is not None:
@@ -233,7 +233,7 @@ class Codec:
             else:
                 self.damaged += not in_garbage
                 next_marker = datagram.find(MARKER, start + 1)
-                start, in_garbage = (next_marker if next_marker >= 0 else len(datagram)), True
+                start, in_garbage = (next_marker if next_marker >= 0 else octets), True
         return good
 
 

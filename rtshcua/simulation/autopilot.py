@@ -237,7 +237,7 @@ class Autopilot:
         self.battery.drain(_TICK_S, load)
         if sensors.late:
             sensors.follow(_TICK_S, vehicle.body)
-        if vehicle.in_air and self.surroundings.is_hit(vehicle.body):
+        if self.surroundings.pillars and vehicle.in_air and self.surroundings.is_hit(vehicle.body):
             vehicle.crash()
         self.failsafes.step(_TICK_S)
         if self.flavour.target_timeout_us is not None:

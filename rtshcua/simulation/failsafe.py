@@ -74,7 +74,7 @@ class Failsafes:
         if self._measured_s >= _MEASURES_S:
             self._watch_voltage(self._measured_s)
             self._measured_s = 0.0
-        if not vehicle.in_air or not vehicle.armed:
+        if not vehicle.armed or not vehicle.in_air:
             self._lands_blind = False
             return
         self._watch_position(dt)

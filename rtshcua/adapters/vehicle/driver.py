@@ -106,8 +106,10 @@ class Driver:
             if self.flavour is None:
                 self._choose(frame)
             if frame.system == self.system and self.flavour is not None:
-                if frame.component == AUTOPILOT and (self._watch.heard_us != now_us or self._watch.down):
-                    self._watch.heard(now_us)  # one frame tells of the moment what all of it do
+                if frame.component == AUTOPILOT and (
+                    self._watch.heard_us != now_us or self._watch.down or self._was_mute
+                ):
+                    self._watch.heard(now_us)  # one frame tells of a moment what all of that moment do
                     self._look(now_us, events)
                 told = self._take(frame, now_us, events, send)
                 if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
@@ -129,7 +131,7 @@ class Driver:
         if ts1_ns is not None:
             send.append(messages.time_sync(ts1_ns))
         send += self._streams.due(self.system, now_us)
-        if self.seen.down and not self._was_ready:
+        if not self._was_ready and self.seen.down:
             send += self.preflight.due(self.system, now_us)
         if self._texts.waits:
             self._hear(self._texts.due(now_us), events)
@@ -140,8 +142,8 @@ class Driver:
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
-        for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
-            if notes:
+        if self.seen.notes or self._streams.notes or self.preflight.notes:
+            for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
                 events += [ports.Noted(now_us, text) for text in notes]
                 notes.clear()
         if self._announcer.waits:
@@ -314,7 +316,7 @@ class Driver:
         """Ask who flies, if it is time to."""
         if self._released:
             return []
-        flies = self.seen.airborne or (self._manoeuvre is not None and not self._manoeuvre.over)
+        flies = (self._manoeuvre is not None and not self._manoeuvre.over) or self.seen.airborne
         asks = self._aids.query.due(self.system, self.seen, now_us, flies=flies)
         if asks:
             self._watch.asked(now_us)

@@ -81,12 +81,13 @@ class VehicleLink:
         if self._others is not None:
             self.overhear(datagram, now_us, elsewhere=False)
         for each in self._codec.parse(datagram, now_us):
-            if each.component == OURS:
+            _, name, _, component, _, _, _ = each
+            if component == OURS:
                 continue  # what comes back under our own name says nothing of the vehicle
             received.append(each)
-            if each.name in _OBSERVED:
+            if name in _OBSERVED:
                 self._frames.observe(unsigned(each.frame))
-            elif each.name == "RADIO_STATUS" and not each.signed and isinstance(self._verifier, UnsignedRadio):
+            elif name == "RADIO_STATUS" and not each.signed and isinstance(self._verifier, UnsignedRadio):
                 self._verifier.temper(each.message, now_us)
         return received
 

@@ -10,7 +10,9 @@ ALL = ("lat", "relative_alt", "vx", "vz", "hdg")
 
 
 def known(estimator: Estimator, now_us: int = S) -> set[str]:
-    return {field for field in ALL if estimator.vouches_for(GPI, field, now_us)}
+    vouched = {field for field in ALL if estimator.vouches_for(GPI, field, now_us)}
+    assert vouched == set(ALL) - estimator.doubtful(GPI, now_us)
+    return vouched
 
 
 @pytest.mark.parametrize(("flags", "fields"), [

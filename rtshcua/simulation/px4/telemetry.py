@@ -69,9 +69,7 @@ def _estimator_status(a: Autopilot) -> Message | None:
     if sensors.glitching:
         flags |= mavlink.ESTIMATOR_GPS_GLITCH
     velocity, place, off_m = (_REJECTED, _REJECTED, _ASTRAY_M) if sensors.unhealthy else (0.06, 0.04, 0.3)
-    return _ESTIMATOR_STATUS(
-        a.now_us, flags, velocity, place, 0.03, 0.06, 0.005, nan, off_m, 0.3
-    )
+    return _ESTIMATOR_STATUS(a.now_us, flags, velocity, place, 0.03, 0.06, 0.005, nan, off_m, 0.3)
 
 
 def _wind_cov(a: Autopilot) -> Message | None:

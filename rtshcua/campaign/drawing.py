@@ -36,25 +36,25 @@ TOGETHER: Final = 0.25
 #: how likely a group is, and what is in it
 GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
     (
-        24,
+        20,
         (
             faults.LinkDelay, faults.LinkJitter, faults.LinkReorder, faults.LinkLoss, faults.LinkSilence,
             faults.LinkSilence, faults.LinkQuality,
         ),
     ),
     (
-        18,
+        15,
         (
             faults.Freeze, faults.StaleSource, faults.MessageStuck, faults.MessageSilence, faults.Stall,
             faults.EstimatorUnhealthy, faults.Reboot,
         ),
     ),
-    (12, (faults.GpsLoss, faults.GpsJump, faults.GpsDrift, faults.GpsGlitch)),
-    (12, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
-    (8, (faults.Obstacle, faults.Pillar)),
-    (14, (faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotSticks, faults.Kill)),
-    (6, (faults.RuntimeKilled, faults.HostStall, faults.DiskFull, faults.ClockStep)),
-    (6, (faults.Approval, faults.Disapproval, faults.Recall, faults.Replacement, faults.Babble)),
+    (11, (faults.GpsLoss, faults.GpsJump, faults.GpsDrift, faults.GpsGlitch)),
+    (11, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
+    (7, (faults.Obstacle, faults.Pillar)),
+    (12, (faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotSticks, faults.Kill)),
+    (12, (faults.RuntimeKilled, faults.HostStall, faults.DiskFull, faults.ClockStep)),
+    (12, (faults.Approval, faults.Disapproval, faults.Recall, faults.Replacement, faults.Babble)),
 )  # fmt: skip
 
 

@@ -61,6 +61,20 @@ class Reaction(NamedTuple):
     acted_us: int
 
 
+class Heard(NamedTuple):
+    """What one frame told: when it was measured, on the clock of the logs, and (slot, value) of its signals."""
+
+    measured_us: int
+    values: tuple[tuple[int, int | None], ...]
+
+
+class Turn(NamedTuple):
+    """A turn of the loop: when, and which values of signals it was given, in their order."""
+
+    at_us: int
+    heard: tuple[Heard, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Life:
     """One process of the runtime, from its first record to its last. `ending` None: it was killed, or it broke."""
@@ -71,6 +85,10 @@ class Life:
     lines: tuple[bytes, ...]
     """Its log; what was killed is recovered."""
     reactions: tuple[Reaction, ...]
+    turns: tuple[Turn, ...] = ()
+    """What it heard, turn by turn of its loop."""
+    kept_us: tuple[int, ...] = ()
+    """When each line of its log was kept, but for those that recovery added."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,8 @@ whether their decisions are derived again; what the logs say is then held agains
 | `unlogged-effect` | a frame that moves it, which carries out no command that the log has |
 | `fault` | an exception came out of the runtime, or the run did not end |
 
+What it owes besides, from supervision to the order of chains, has slugs of its own (`conduct`).
+
 A failure that physics does not allow to prevent is an *exception* instead, with its `cause` (`excuses`).
 """
 
@@ -34,6 +36,7 @@ from rtshcua.ground.auditor.audit import Auditor
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
+from rtshcua.virtual.conduct import Conduct
 from rtshcua.virtual.excuses import Excuses, Failure
 from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
 
@@ -84,7 +87,7 @@ def judge(flown: ScenarioFlown) -> Judgement:
     end, ended_us = _end(flown)
     found = [
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
-        *_unlogged(flown, motion), *_faults(flown),
+        *_unlogged(flown, motion), *_faults(flown), *Conduct(flown, motion, local_mm).failures(),
     ]  # fmt: skip
     judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)

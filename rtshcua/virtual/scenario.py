@@ -31,7 +31,7 @@ from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.flight import MemorySink, VirtualFlight
-from rtshcua.virtual.flown import Frame, Happened, Life, Reaction, Sample, ScenarioFlown
+from rtshcua.virtual.flown import Frame, Happened, Heard, Life, Reaction, Sample, ScenarioFlown, Turn
 from rtshcua.virtual.triggers import Due, Triggers
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire import cose
@@ -88,12 +88,20 @@ class _Killed(Exception):
 
 
 class _Sink(MemorySink):
-    """Evidence in memory of a process that may be killed."""
+    """Evidence in memory of a process that may be killed: it knows when each line was kept."""
 
-    def __init__(self, *, full: bool) -> None:
+    def __init__(self, clock: VirtualClock, *, full: bool) -> None:
         super().__init__()
         self.full = full
         self.written = 0  # lines that were kept before the last turn
+        self.kept_us: list[int] = []
+        self._clock = clock
+
+    def append(self, line: bytes, durability: int) -> int:
+        try:
+            return super().append(line, durability)
+        finally:
+            self.kept_us += [self._clock.elapsed_us] * (self.kept - len(self.kept_us))
 
 
 class _Watched(Simulation):
@@ -170,7 +178,7 @@ class _Flight:
 
         self._flight = VirtualFlight(
             bundle, vehicle, root=root, log_key=keys.log, utc_us=utc_us, wait_us=WAIT_US, tick_us=tick_us,
-            sink=lambda _: _Sink(full=False),
+            sink=lambda clock: _Sink(clock, full=False),
         )  # fmt: skip
         self._world = self._watch(self._flight.vehicle)
         self._utc_us = self._flight.clock.now().utc_us
@@ -214,6 +222,7 @@ class _Flight:
         self._flight = flight
         self._began_us = flight.clock.elapsed_us
         self._reactions: list[Reaction] = []
+        self._turns: list[Turn] = []
         self._heard_us = flight.clock.elapsed_us
         self._triggers.begin(flight.loaded.policy)
         self._steps = StepWatch(self._machine_us)
@@ -226,6 +235,8 @@ class _Flight:
     def _stepped(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
         """What a turn of the loop did."""
         at_us = self._flight.clock.elapsed_us
+        heard = tuple([Heard(event.at_us, event.values) for event in events if isinstance(event, Readings)])
+        self._turns.append(Turn(now.monotonic_us - START.monotonic_us, heard))
         for action in actions:
             if isinstance(action, Dispatch) and not action.needs_record:
                 self._reactions.append(Reaction(self._heard_us, at_us))
@@ -276,9 +287,7 @@ class _Flight:
     def _close(self, how: Ending) -> None:
         flight = self._flight
         flight.close(how)
-        self._lives.append(
-            Life(self._began_us, flight.clock.elapsed_us, how.value, tuple(flight.sink.lines), tuple(self._reactions))
-        )
+        self._lives.append(self._life(how.value, tuple(flight.sink.lines)))
 
     def _check_disk(self) -> _Sink:
         sink = self._flight.sink
@@ -347,7 +356,16 @@ class _Flight:
             line = lines.pop() if len(lines) > sink.written else b'{"_prev":"%s"' % leaf_hash(lines[-1]).hex().encode()
             lines.append(line[: chance.randrange(1, len(line))])
         recovered = self._recovered(lines, flight.clock.now())
-        self._lives.append(Life(self._began_us, flight.clock.elapsed_us, None, recovered, tuple(self._reactions)))
+        self._lives.append(self._life(None, recovered))
+
+    def _life(self, ending: str | None, lines: tuple[bytes, ...]) -> Life:
+        """The process that ends now."""
+        sink = self._flight.sink
+        assert isinstance(sink, _Sink)
+        return Life(
+            self._began_us, self._flight.clock.elapsed_us, ending, lines, tuple(self._reactions), tuple(self._turns),
+            tuple(sink.kept_us),
+        )  # fmt: skip
 
     def _recovered(self, lines: Sequence[bytes], now: Now) -> tuple[bytes, ...]:
         key = self._keys.log
@@ -418,7 +436,7 @@ class _Flight:
         try:
             flight = VirtualFlight(
                 self._bundle, root=self._root, log_key=self._keys.log, wait_us=WAIT_US, resumed=True, vehicle=vehicle,
-                sink=lambda _: _Sink(full=full), tick_us=self._tick_us, before=before_hash,
+                sink=lambda clock: _Sink(clock, full=full), tick_us=self._tick_us, before=before_hash,
             )  # fmt: skip
         except OSError as error:
             return [], str(error.strerror)

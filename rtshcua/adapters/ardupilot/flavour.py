@@ -5,7 +5,7 @@ It obeys position targets in GUIDED only, and ignores them silently elsewhere; t
 
 from rtshcua.adapters.vehicle import effects, flavour, messages
 from rtshcua.adapters.vehicle.effects import Effect
-from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, FenceHabits, ReturnAltitude, Stage
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
@@ -14,6 +14,8 @@ from rtshcua.onboard.ports import Command
 
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
+#: mm: how near a target may be that shows while it takes off
+_TAKES_OFF = 3_000
 _GUIDED = frozenset({CopterMode.GUIDED})
 _BRAKE = frozenset({CopterMode.BRAKE})
 _POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
@@ -26,12 +28,18 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
             height = command.altitude
             takeoff = messages.command(system, messages.TAKEOFF, 0, 0, 0, 0, 0, 0, height / 1_000)
             rises = flavour.climbing(height)
+            # It reports no target while it takes off in GUIDED (`get_wp`): whoever gives it one ends the takeoff.
+            amsl = None if seen.home_amsl is None else seen.amsl(height)
+            above = ExpectedTarget(seen.latitude, seen.longitude, amsl, _TAKES_OFF)
             return [
                 flavour.entering(system, CopterMode.GUIDED),
                 flavour.arming(system, _GUIDED),
-                Stage(takeoff, messages.TAKEOFF, lambda seen: seen.airborne, _GUIDED, flavour.ARM_US, powered=True),
-                Stage(None, None, effects.climbed(height), _GUIDED, powered=True, progress=rises),
-            ]
+                Stage(
+                    takeoff, messages.TAKEOFF, lambda seen: seen.airborne, _GUIDED, flavour.ARM_US, powered=True,
+                    target=above,
+                ),
+                Stage(None, None, effects.climbed(height), _GUIDED, powered=True, target=above, progress=rises),
+            ]  # fmt: skip
         case MotionKind.FLY | MotionKind.COVER:
             return [flavour.entering(system, CopterMode.GUIDED), *_legs(command, seen, system)]
         case MotionKind.HOME:

@@ -1,0 +1,412 @@
+"""What a runtime owes besides: held against what it heard, what it wrote down, and what really was.
+
+| slug | is a failure |
+|---|---|
+| `untrue` | the log says that a command succeeded, or a position was taken over as measured later than it was so |
+| `no-stop` | a stop got to the vehicle, and it flew on |
+| `not-watched` | what a running step rests on did not hold, as heard, and nothing followed |
+| `needless` | a running step was broken off for something that, as heard, held or had grace left |
+| `chain` | a fallback was not the first link that could, or of the chain that its cause asks for, or not tried again |
+| `release` | a step's deadline was not counted from when the step before it ended |
+| `unrecorded` | a frame that only a step sends left before the record of that step's decision was kept |
+
+Supervision is done again here, by the rules that `decision` has, from the values that the loop was given.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import hypot
+from typing import Any, Final
+
+import msgspec
+
+from rtshcua.decision.links import choose_fallback
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.onboard.ports import Readings
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.monitor import StateMonitor
+from rtshcua.onboard.runtime.supervisor import Supervisor
+from rtshcua.virtual.excuses import Failure
+from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+
+Record = dict[str, Any]
+Motion = Sequence[tuple[Frame, frozenset[MotionKind]]]
+
+#: mm: what noise, lag and a position's own error make of a place that is told, and of one that was reached
+TOLD_MM: Final = 4_000
+REACHED_MM: Final = 6_000
+#: us: how long after a fact a report of it may come on a good link
+_LATER_US: Final = 1_500_000
+#: mm/s: a vehicle that is told to stop is faster than this, and has lost so much of it after so long on top of its
+#: reaction; no slower than so much is asked for
+_FAST_MM_S, _LOST_MM_S, _SLOW_MM_S = 2_500, 800, 1_200
+_STOPS_US: Final = 2_300_000
+_STANDS_MM_S: Final = 1_800
+_ONLY_STEPS: Final = frozenset({MotionKind.FLY, MotionKind.COVER, MotionKind.CLIMB})
+_HOMEWARD: Final = frozenset({MotionKind.HOME, MotionKind.LAND})
+#: what makes a vehicle tell what is not so
+_DECEIVES: Final = (faults.ReceiverFault, faults.Freeze, faults.MessageStuck, faults.Reboot)
+#: and what disturbs how it stops
+_DISTURBS: Final = (faults.WindStep, faults.Stall, faults.EstimatorUnhealthy)
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A command of a log: from when, until when, and how it ended; `until_us` None: it did not."""
+
+    kind: int
+    step: int
+    link: int
+    motion: MotionKind
+    since_us: int
+    until_us: int | None
+    how: str
+    detail: str
+
+
+class Conduct:
+    """What is to be said of the runtime in one flight. `motion` are its frames that move the vehicle; `local_mm` says
+    where east and north of home a place is.
+    """
+
+    def __init__(
+        self, flown: ScenarioFlown, motion: Motion, local_mm: Callable[[Policy, int, int], tuple[float, float]]
+    ) -> None:
+        self._flown = flown
+        self._local_mm = local_mm
+        self._motion = motion
+        self._times = [sample.at_us for sample in flown.samples]
+        self._limits = Limits()
+        policy = prepare(flown.policy)
+        assert not isinstance(policy, Refusal)
+        self._policy: PreparedPolicy = policy
+        invocations = prepare_mission(flown.mission, policy)
+        assert not isinstance(invocations, Refusal)
+        self._invocations: tuple[PreparedInvocation, ...] = invocations
+        self._kinds = {contract.name: MotionKind(contract.motion.kind) for contract in flown.policy.contracts}
+
+    def failures(self) -> Iterator[Failure]:
+        """All of them."""
+        for life in self._flown.lives:
+            if not life.turns:
+                continue  # what it heard is not told
+            records = list(_records(life))
+            flights = list(self._flights(records))
+            yield from self._succeeded(flights)
+            yield from self._stops(flights)
+            yield from self._told(life)
+            yield from self._watched(life, records, flights)
+            yield from self._chains(records, flights)
+            yield from self._released(records)
+            yield from self._recorded(life, records)
+
+    # -------------------------------------------------------- what a log says
+
+    def _at(self, record: Record) -> int:
+        return int(record["at_us"]) - self._flown.start_us
+
+    def _flights(self, records: Sequence[Record]) -> Iterator[Flight]:
+        effects = [record for record in records if record["type"] == "effect"]
+        for number, record in enumerate(effects):
+            if record["event"] != "dispatched" or record["detail"] not in self._kinds:
+                continue
+            end = next((each for each in effects[number + 1 :] if each["token"] == record["token"]), None)
+            yield Flight(
+                record["kind"], record["step"], record["link"], self._kinds[record["detail"]], self._at(record),
+                None if end is None else self._at(end),
+                "" if end is None else end["event"],
+                "" if end is None else end["detail"],
+            )  # fmt: skip
+
+    # -------------------------------------------------------- what really was
+
+    def _between(self, from_us: int, to_us: int) -> Sequence[Sample]:
+        low = max(bisect_left(self._times, from_us) - 1, 0)
+        return self._flown.samples[low : bisect_right(self._times, to_us) + 1]
+
+    def _sample(self, at_us: int) -> Sample:
+        return self._flown.samples[max(bisect_right(self._times, at_us) - 1, 0)]
+
+    def _before(self, at_us: int, *kinds: type[Fault]) -> bool:
+        return any(each.at_us <= at_us and isinstance(each.fault, kinds) for each in self._flown.happened)
+
+    def _during(self, from_us: int, to_us: int, *kinds: type[Fault]) -> bool:
+        for each in self._flown.happened:
+            if each.at_us <= to_us and isinstance(each.fault, kinds):
+                for_us = getattr(each.fault, "for_us", None)
+                if for_us is None or each.at_us + for_us >= from_us:
+                    return True
+        return False
+
+    def _delayed_us(self, at_us: int) -> int:
+        """How long ago what is told now may have been."""
+        late = (faults.LinkFault, faults.StaleSource, faults.Stall, faults.HostStall, faults.MessageSilence)
+        return _LATER_US + (8_000_000 if self._during(at_us - 8_000_000, at_us, *late) else 0)
+
+    def _is_others(self, at_us: int) -> bool:
+        sample = self._sample(at_us)
+        return sample.crashed or sample.taken_over_us is not None
+
+    # -------------------------------------------------------- effects are what is seen
+
+    def _succeeded(self, flights: Sequence[Flight]) -> Iterator[Failure]:
+        for flight in flights:
+            if flight.how != "succeeded" or flight.until_us is None or self._before(flight.until_us, *_DECEIVES):
+                continue
+            at_us = flight.until_us
+            seen = self._between(at_us - self._delayed_us(at_us), at_us)
+            if any(sample.crashed for sample in seen) or any(self._is_so(flight, sample) for sample in seen):
+                continue
+            sample = self._sample(at_us)
+            text = f"a `{flight.motion.name.lower()}` succeeded, and it was {sample.up_mm / 1000:.1f} m up at "
+            yield Failure("untrue", at_us, text + f"{sample.speed_mm_s / 1000:.1f} m/s")
+
+    def _is_so(self, flight: Flight, sample: Sample) -> bool:
+        match flight.motion:
+            case MotionKind.HOME | MotionKind.LAND:
+                return not sample.in_air
+            case MotionKind.HOLD:
+                return sample.speed_mm_s <= _STANDS_MM_S
+            case _ if flight.kind != STEP:
+                return True
+        plan = self._flown.mission.invocations[flight.step].plan
+        if flight.motion is MotionKind.CLIMB:
+            return sample.up_mm >= plan.altitude - REACHED_MM // 2
+        x, y = self._place(sample)
+        return hypot(x - plan.path[-2], y - plan.path[-1]) <= REACHED_MM
+
+    def _place(self, sample: Sample) -> tuple[float, float]:
+        return self._local_mm(self._flown.policy, sample.latitude, sample.longitude)
+
+    def _told(self, life: Life) -> Iterator[Failure]:
+        """A place was taken over, and the vehicle was nowhere near since it is said to have been measured."""
+        slot = self._flown.policy.vehicle.position
+        worst: Failure | None = None
+        count = 0
+        for turn in life.turns[::3]:
+            for heard in turn.heard:
+                values = dict(heard.values)
+                x, y = values.get(slot), values.get(slot + 1)
+                if x is None or y is None:
+                    continue
+                if self._before(turn.at_us, *_DECEIVES, faults.EstimatorUnhealthy):
+                    return
+                samples = self._between(heard.measured_us - self._flown.start_us, turn.at_us)
+                if not samples or not samples[0].in_air:
+                    continue
+                off = min(hypot(x - east, y - north) for east, north in map(self._place, samples))
+                if off > TOLD_MM:
+                    count += 1
+                    if worst is None or off > worst.amount:
+                        text = f"a place was heard that is {off / 1000:.1f} m from where it was since it was measured"
+                        worst = Failure("untrue", turn.at_us, text, round(off))
+        if worst is not None and count >= 3:
+            yield worst
+
+    def _stops(self, flights: Sequence[Flight]) -> Iterator[Failure]:
+        """From the first frame of a stop that got there: so long later it is slower."""
+        after_us = (self._flown.policy.vehicle.reaction_us or 1_000_000) + _STOPS_US
+        heard = [frame for frame, _ in self._motion if frame.heard_us is not None]
+        for flight in flights:
+            frame = next((each for each in heard if each.sent_us >= flight.since_us), None)
+            if flight.motion is not MotionKind.HOLD or frame is None or frame.heard_us is None:
+                continue
+            at_us = frame.heard_us
+            then_us = at_us + after_us
+            ends_us = 1 << 60 if flight.until_us is None else flight.until_us
+            if at_us - flight.since_us > 1_000_000 or ends_us < then_us - 300_000 or self._is_others(then_us):
+                continue
+            if self._before(then_us, *_DECEIVES, *_DISTURBS):
+                continue
+            fast, then = self._sample(at_us).speed_mm_s, self._sample(then_us)
+            if fast >= _FAST_MM_S and then.speed_mm_s > max(fast - _LOST_MM_S, _SLOW_MM_S):
+                text = f"told to stop at {fast / 1000:.1f} m/s, and {then.speed_mm_s / 1000:.1f} m/s are left"
+                yield Failure("no-stop", then_us, text, then.speed_mm_s)
+
+    # -------------------------------------------------------- supervision
+
+    def _watched(self, life: Life, records: Sequence[Record], flights: Sequence[Flight]) -> Iterator[Failure]:
+        steps = [each for each in flights if each.kind == STEP]
+        decision = next((record for record in records if record["type"] == "decision"), None)
+        if not steps or not life.turns or decision is None:
+            return
+        ahead_us = decision["utc_us"] - decision["at_us"]
+        silences = list(self._silences(records))
+        monitor = StateMonitor(self._policy)
+        queue = iter(steps)
+        step = next(queue, None)
+        supervisor: Supervisor | None = None
+        stood_us: int | None = None
+        bound_us = self._flown.wait_us + 2 * self._flown.tick_us
+        start_us = self._flown.start_us
+        found: str | None = None
+        for turn in life.turns:
+            at_us = turn.at_us
+            now = Now(at_us + start_us, at_us + start_us + ahead_us, decision["utc_error_us"])
+            while step is not None and step.until_us is not None and step.until_us < at_us:
+                step, supervisor = next(queue, None), None
+            runs = step is not None and step.since_us < at_us
+            if runs and step is not None and supervisor is None:
+                supervisor = Supervisor(self._invocations[step.step], self._policy, step.since_us + start_us)
+                found, stood_us = None, None
+            silent = any(since_us <= at_us < until_us for since_us, until_us in silences)
+            if runs and silent and stood_us is None:
+                stood_us = at_us
+            if runs and not silent and stood_us is not None and supervisor is not None:
+                supervisor.grace.stood(now.monotonic_us - stood_us - start_us)
+                stood_us = None
+            for heard in turn.heard:
+                readings = Readings(heard.measured_us, heard.values)
+                if runs and not silent and found is None and supervisor is not None and monitor.hides(readings):
+                    found = supervisor.violated(monitor.state(now.monotonic_us), now)
+                    monitor.seen()
+                monitor.update(readings)
+            monitor.observe(now)
+            if not runs or supervisor is None or step is None or silent:
+                continue
+            if found is None:
+                found = supervisor.violated(monitor.state(now.monotonic_us), now)
+            ended_us = step.until_us
+            if found is not None and (ended_us is None or ended_us > at_us + bound_us):
+                if ended_us is not None or life.ended_us > at_us + bound_us:
+                    end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
+                    if not self._excused(at_us, silences, bound_us):
+                        yield Failure("not-watched", at_us, f"step {step.step} rests on `{found}`, and {end}")
+                step, supervisor = next(queue, None), None
+            elif ended_us == at_us and step.how == "violated" and found is None:
+                yield Failure("needless", at_us, f"step {step.step} was broken off, and as heard holds: {step.detail}")
+
+    def _excused(self, at_us: int, silences: Sequence[tuple[int, int]], bound_us: int) -> bool:
+        return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in silences)
+
+    def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int]]:
+        """From when a link was lost until state was judged again."""
+        since_us: int | None = None
+        for record in records:
+            if record["type"] != "effect":
+                continue
+            if record["event"] == "link-lost" and since_us is None:
+                since_us = self._at(record)
+            elif record["event"] in ("fresh", "not-fresh") and since_us is not None:
+                yield since_us, self._at(record)
+                since_us = None
+        if since_us is not None:
+            yield since_us, 1 << 60
+
+    # -------------------------------------------------------- chains
+
+    def _chains(self, records: Sequence[Record], flights: Sequence[Flight]) -> Iterator[Failure]:
+        airborne = [record for record in records if self._sample(self._at(record)).in_air]
+        for number, (record, after) in enumerate(pairwise(airborne)):
+            if record["type"] == "decision":
+                if record["kind"] == STEP and record["outcome"] == "deny":
+                    asked = next((each for each in airborne[number + 1 :] if each["type"] == "decision"), None)
+                    if asked is not None and asked["kind"] == FALLBACK_LINK:
+                        text = f"step {record['step']} was denied, and its own fallback was asked for"
+                        yield Failure("chain", self._at(record), text)
+                continue
+            match record.get("event"):
+                case "violated" if after["type"] == "decision" and after["kind"] == FALLBACK_LINK:
+                    yield from self._first(after)
+                case "recall":
+                    yield from self._recalled(self._at(record), flights, records)
+                case "stranded":
+                    yield from self._stranded(record, flights)
+                case "not-fresh":
+                    yield from self._hasty(record, records)
+
+    def _first(self, asked: Record) -> Iterator[Failure]:
+        """The first link that a chain begins with is the first that could fly."""
+        state = State(**{name: tuple(value) for name, value in asked["state"].items()})
+        now = Now(asked["at_us"], asked["utc_us"], asked["utc_error_us"])
+        choice = choose_fallback(self._invocations[asked["step"]], state, self._policy, now)
+        if choice is None or choice.index == asked["link"]:
+            return
+        text = f"the fallback of step {asked['step']} begins with link {asked['link']}, and {choice.index} could fly"
+        yield Failure("chain", self._at(asked), text)
+
+    def _recalled(self, at_us: int, flights: Sequence[Flight], records: Sequence[Record]) -> Iterator[Failure]:
+        """A step that goes nowhere near home ends at once."""
+        bound_us = self._flown.wait_us + 2 * self._flown.tick_us
+        silent = any(
+            since_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in self._silences(records)
+        )
+        for flight in flights:
+            if flight.kind != STEP or flight.motion in _HOMEWARD or silent:
+                continue
+            if flight.since_us <= at_us and flight.until_us is not None and flight.until_us > at_us + bound_us:
+                text = f"step {flight.step} went on for {(flight.until_us - at_us) / 1e6:.1f} s after a recall"
+                yield Failure("chain", at_us, text)
+
+    def _stranded(self, record: Record, flights: Sequence[Flight]) -> Iterator[Failure]:
+        """The last link was tried as often as may be."""
+        last = len(self._flown.policy.contingency) - 1
+        tried = sum(each.kind == CONTINGENCY_LINK and each.link == last for each in flights)
+        if tried < 1 + self._limits.tries:
+            yield Failure("chain", self._at(record), f"given up after the last link was tried {tried} times")
+
+    def _hasty(self, record: Record, records: Sequence[Record]) -> Iterator[Failure]:
+        """Fresh state is waited for as long as it may still come."""
+        before = [each for each in records if each["type"] == "effect" and each["at_us"] <= record["at_us"]]
+        backs = [each for each in before if each["event"] == "link-back"]
+        ends = [each for each in before if each["event"] in ("fresh", "not-fresh") and each is not record]
+        in_this = [each for each in backs if not ends or each["at_us"] > ends[-1]["at_us"]]
+        if len(in_this) == 1 and record["at_us"] - in_this[0]["at_us"] < self._limits.fresh_us:
+            yield Failure("chain", self._at(record), f"fresh state was not waited for: {record['detail']}")
+
+    # -------------------------------------------------------- releases and records
+
+    def _released(self, records: Sequence[Record]) -> Iterator[Failure]:
+        """A step is released by the end of the one before it, and by nothing else."""
+        released: int | None = None
+        for record in records:
+            if record["type"] == "effect":
+                ends = record["event"] in ("succeeded", "skipped") and record["kind"] == STEP
+                if ends or (record["event"] == "ready" and released is None):
+                    released = record["at_us"]
+            elif record["type"] == "decision" and record["kind"] == STEP and released is not None:
+                given = record["context"]["released_us"]
+                if given != released:
+                    text = (
+                        f"step {record['step']} counts as released {(given - released) / 1e6:.1f} s later than it was"
+                    )
+                    yield Failure("release", self._at(record), text, abs(given - released))
+
+    def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[Failure]:
+        """What only steps send leaves after the record of such a step's decision was kept."""
+        policy = self._flown.policy
+        links = {policy.contracts[link.skill].motion.kind for link in policy.contingency}
+        links |= {policy.contracts[link.skill].motion.kind for c in policy.contracts for link in c.fallback}
+        links |= {policy.contracts[r.target.skill].motion.kind for r in policy.rules if r.target is not None}
+        allowed: list[tuple[int, MotionKind]] = []
+        for number, record in enumerate(records[: len(life.kept_us)]):
+            if record["type"] == "decision" and record["kind"] == STEP and record["outcome"] == "allow":
+                kind = self._flown.mission.invocations[record["step"]].contract.motion.kind
+                allowed.append((life.kept_us[number], kind))
+        kept = [kept_us for kept_us, _ in allowed]
+        for frame, parts in self._motion:
+            if not life.began_us <= frame.sent_us <= life.ended_us or not parts or not parts <= _ONLY_STEPS - links:
+                continue
+            at = bisect_right(kept, frame.sent_us) - 1
+            if at < 0 or allowed[at][1] not in parts:
+                text = "a frame of a step was sent before the record of its decision was kept"
+                yield Failure("unrecorded", frame.sent_us, text)
+                return
+
+
+def _records(life: Life) -> Iterator[Record]:
+    for line in life.lines:
+        try:
+            record: Record = msgspec.json.decode(line)
+        except msgspec.DecodeError:
+            return
+        yield record

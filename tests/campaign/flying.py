@@ -1,0 +1,88 @@
+"""Flights of the field mission by the right runtime, and by wrong ones."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from campaign.wrong import BY_NAME
+from rtshcua.campaign.drawing import FLAVOURS, Space, Tally, draw
+from rtshcua.campaign.flights import Field, Flight, flown, moments
+from rtshcua.campaign.results import Failed, Result
+from rtshcua.cli.sources import compile_sources
+from rtshcua.model.scenario import Scenario, Start
+from rtshcua.virtual import development
+from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.judge import judge
+
+ISSUED_US: Final = 1_767_225_600_000_000
+_COMPILED, _ = compile_sources([Path(__file__).with_name("field.rts")], mission=None, issued_at_us=ISSUED_US)
+assert _COMPILED.policy is not None, _COMPILED.diagnostics
+assert _COMPILED.mission is not None
+POLICY, MISSION = _COMPILED.policy, _COMPILED.mission
+FIELD: Final = Field(development.seal(POLICY, MISSION), development.root(ISSUED_US))
+SKILLS: Final = tuple(POLICY.contracts[each.skill].name for each in MISSION.invocations)
+#: us: how long a calm flight takes
+LASTS_US: Final = {"px4": 76_650_000, "ardupilot": 77_700_000}
+
+
+@dataclass(frozen=True)
+class Right:
+    """A flight by the right runtime, and its log."""
+
+    flight: Flight
+    result: Result
+    log: bytes
+
+    def shows(self, words: Sequence[bytes]) -> bool:
+        """Whether any of these is in the log, or none is asked for."""
+        return not words or any(word in self.log for word in words)
+
+
+@cache
+def space() -> Space:
+    """What is drawn from."""
+    roles = sorted({POLICY.roles[rule.approver] for rule in POLICY.rules if rule.approver >= 0})
+    read = sorted({source.message for signal in POLICY.signals for source in signal.sources})
+    return Space(SKILLS, LASTS_US, tuple(roles), FLAVOURS, read=tuple(read))
+
+
+def flight_of(seed: int, number: int, drawn_from: Space, known: Tally) -> Flight:
+    """A flight of a campaign."""
+    made = draw(seed, number, drawn_from, known)
+    return Flight(number, made.scenario, made.tries)
+
+
+def calm(flavour: str) -> Scenario:
+    """Nothing goes wrong."""
+    return Scenario("calm", (flavour,), 1, 1, Start(), (), ())
+
+
+def right(flight: Flight) -> Right:
+    """By the right runtime."""
+    return judged(flight, flown(FIELD, flight.scenario))
+
+
+def judged(flight: Flight, was: ScenarioFlown) -> Right:
+    """What came of it."""
+    verdict = judge(was)
+    result = Result(
+        flight.number, was.flavour, was.seed, tuple(each.text for each in flight.scenario.incidents), flight.tries,
+        was.ending or "none", tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
+        tuple(Failed(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
+        {name: value for name, value in asdict(verdict.margins).items() if value is not None}, tuple(moments(was)),
+        was.samples[-1].at_us, "",
+    )  # fmt: skip
+    return Right(flight, result, b"".join(line for life in was.lives for line in life.lines))
+
+
+def wrongly(name: str, scenario: Scenario) -> ScenarioFlown:
+    """By a wrong one."""
+    with BY_NAME[name].made():
+        return flown(FIELD, scenario)
+
+
+def wrong_fails(name: str, flight: Flight) -> tuple[str, ...]:
+    """The slugs of its failures."""
+    return tuple(dict.fromkeys(each.slug for each in judge(wrongly(name, flight.scenario)).failures))

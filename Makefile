@@ -9,7 +9,7 @@ unexport PYTHONHOME PYTHONPATH PYTHONDONTWRITEBYTECODE
 MAKEFLAGS += --no-print-directory
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test clients lint soak fuzz mutate bench size clean
+.PHONY: help setup demo test clients lint soak fuzz mutate wrong bench size clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -43,6 +43,9 @@ fuzz: setup ## look for inputs that break parser, checker, compiler or boundary:
 mutate: setup ## change one thing at a time in what decides, and list what no test notices (docs/mutation.md)
 	@$(BIN)/python .make/mutate $(or $(TARGETS),rtshcua/decision) --tests $(or $(TESTS),tests/unit/decision) \
 	    --jobs $(JOBS) --one-in $(or $(ONE_IN),10)
+
+wrong: setup ## fly campaigns against wrong runtimes, and count the flights that find them (docs/flying/wrong-runtimes.md)
+	@$(BIN)/python .make/wrong $(TARGETS) --flights $(or $(FLIGHTS),120) --seeds $(or $(SEEDS),1) --jobs $(JOBS)
 
 bench: setup ## run every benchmark; each prints a ratio against a peer or a limit
 	@status=0; for file in bench/*.py; do $(BIN)/python "$$file" || { echo "$$file: limit not met" >&2; status=1; }; done; \

@@ -3,10 +3,10 @@
 | slug | is a failure |
 |---|---|
 | `untrue` | the log says that a command succeeded, or a position was taken over as measured later than it was so |
-| `no-stop` | a stop got to the vehicle, and it flew on |
+| `no-stop` | a stop got to the vehicle, and it flew on; or it could have got there, and was not sent again |
 | `not-watched` | what a running step rests on did not hold, as heard, and nothing followed |
 | `needless` | a running step was broken off for something that, as heard, held or had grace left |
-| `chain` | a fallback was not the first link that could, or of the chain that its cause asks for, or not tried again |
+| `chain` | a fallback was not the first link that could, not of the right chain, not tried again; or anything after a takeover |
 | `release` | a step's deadline was not counted from when the step before it ended |
 | `unrecorded` | a frame that only a step sends left before the record of that step's decision was kept |
 
@@ -51,6 +51,9 @@ _LATER_US: Final = 1_500_000
 _FAST_MM_S, _LOST_MM_S, _SLOW_MM_S = 2_500, 800, 1_200
 _STOPS_US: Final = 2_300_000
 _STANDS_MM_S: Final = 1_800
+#: us: in this time a command that got no answer was sent again; and in this all tries of a last link are over
+_AGAIN_US: Final = 2_000_000
+_HELD_OUT_US: Final = 60_000_000
 _ONLY_STEPS: Final = frozenset({MotionKind.FLY, MotionKind.COVER, MotionKind.CLIMB})
 _HOMEWARD: Final = frozenset({MotionKind.HOME, MotionKind.LAND})
 #: what makes a vehicle tell what is not so
@@ -106,8 +109,10 @@ class Conduct:
             yield from self._told(life)
             yield from self._watched(life, records, flights)
             yield from self._chains(records, flights)
+            yield from self._went_on(records)
             yield from self._released(records)
             yield from self._recorded(life, records)
+        yield from self._left()
 
     # -------------------------------------------------------- what a log says
 
@@ -217,12 +222,15 @@ class Conduct:
         after_us = (self._flown.policy.vehicle.reaction_us or 1_000_000) + _STOPS_US
         heard = [frame for frame, _ in self._motion if frame.heard_us is not None]
         for flight in flights:
-            frame = next((each for each in heard if each.sent_us >= flight.since_us), None)
-            if flight.motion is not MotionKind.HOLD or frame is None or frame.heard_us is None:
+            if flight.motion is not MotionKind.HOLD:
+                continue
+            ends_us = 1 << 60 if flight.until_us is None else flight.until_us
+            frame = next((each for each in heard if flight.since_us <= each.sent_us < ends_us), None)
+            if frame is None or frame.heard_us is None:
+                yield from self._unheard(flight)
                 continue
             at_us = frame.heard_us
             then_us = at_us + after_us
-            ends_us = 1 << 60 if flight.until_us is None else flight.until_us
             if at_us - flight.since_us > 1_000_000 or ends_us < then_us - 300_000 or self._is_others(then_us):
                 continue
             if self._before(then_us, *_DECEIVES, *_DISTURBS):
@@ -231,6 +239,26 @@ class Conduct:
             if fast >= _FAST_MM_S and then.speed_mm_s > max(fast - _LOST_MM_S, _SLOW_MM_S):
                 text = f"told to stop at {fast / 1000:.1f} m/s, and {then.speed_mm_s / 1000:.1f} m/s are left"
                 yield Failure("no-stop", then_us, text, then.speed_mm_s)
+
+    def _unheard(self, flight: Flight) -> Iterator[Failure]:
+        """A stop of which nothing got there, though it would have in the end, was not said again."""
+        ends_us = flight.until_us
+        if ends_us is None or ends_us - flight.since_us < _AGAIN_US or self._is_others(ends_us):
+            return
+        deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence)
+        sent = any(flight.since_us <= frame.sent_us < ends_us for frame, _ in self._motion)
+        if sent and not self._during(ends_us - _AGAIN_US, ends_us, *deaf):
+            yield Failure("no-stop", ends_us, "no stop got to the vehicle, and none was sent again")
+
+    def _left(self) -> Iterator[Failure]:
+        """Whoever hears it, and is heard, and still has it, does not leave it in the air."""
+        flown = self._flown
+        last, ended_us = flown.samples[-1], flown.ended_us
+        if not last.in_air or flown.ending in (None, "link-lost") or flown.left or self._is_others(last.at_us):
+            return
+        deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence, faults.Freeze)
+        if not self._during(ended_us - _HELD_OUT_US, ended_us, *deaf):
+            yield Failure("not-ended", ended_us, f"the run ended ({flown.ending}), and left it in the air")
 
     # -------------------------------------------------------- supervision
 
@@ -323,6 +351,17 @@ class Conduct:
                     yield from self._stranded(record, flights)
                 case "not-fresh":
                     yield from self._hasty(record, records)
+
+    def _went_on(self, records: Sequence[Record]) -> Iterator[Failure]:
+        """Nothing is decided or sent after a takeover or a crash was told."""
+        told: Record | None = None
+        for record in records:
+            effect = record["type"] == "effect"
+            if effect and record["event"] in ("taken-over", "crashed"):
+                told = told or record
+            elif told is not None and (record["type"] == "decision" or (effect and record["event"] == "dispatched")):
+                yield Failure("chain", self._at(record), f"it went on, though `{told['event']}: {told['detail']}`")
+                return
 
     def _first(self, asked: Record) -> Iterator[Failure]:
         """The first link that a chain begins with is the first that could fly."""

@@ -382,6 +382,7 @@ def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
 
 def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
     """The first frame of a command leaves within its permit's time, a step's within its deadline."""
+    kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
         decided: dict[tuple[int, int, int], dict[str, Any]] = {}
         for record in _records(life):
@@ -390,7 +391,9 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
                 decided[ref] = record
             elif record.get("event") == "dispatched" and ref in decided:
                 at_us = record["at_us"] - flown.start_us
-                first = next((frame for frame, _ in motion if at_us <= frame.sent_us <= life.ended_us), None)
+                kind = kinds.get(record["detail"])
+                sent = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us <= life.ended_us)
+                first = next(sent, None)
                 if first is not None:
                     yield from _in_time(flown, first, decided[ref])
 

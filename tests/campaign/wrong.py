@@ -238,6 +238,10 @@ def _false(_: Any) -> Any:
     return lambda self, *given, **more: False
 
 
+def _asks_nothing(_: Any) -> Any:
+    return lambda self, *given, **more: []
+
+
 def _nobody(_: Any) -> Any:
     return lambda self: ""
 
@@ -296,8 +300,9 @@ WRONG: Final = (
           ((runtime.EventHandler, "_record", _times_of_day),), (b'"clock-stepped"',)),
     Wrong("landing-by-word", "A landing has succeeded when its mode shows.",
           ((flavour, "landing", _landed_by_word),), (b'"detail":"emergency_land"',)),
-    Wrong("mode-not-asked", "A frame that moves the vehicle does not wait for a fresh word on its mode.",
-          ((manoeuvre.ModeQuery, "is_newer", _true), (manoeuvre.ModeQuery, "is_young", _true)), (b'"taken-over"',)),
+    Wrong("mode-not-asked", "The mode is not asked for: what the last heartbeat said counts.",
+          ((manoeuvre.ModeQuery, "is_newer", _true), (manoeuvre.ModeQuery, "is_young", _true),
+           (manoeuvre.ModeQuery, "due", _asks_nothing)), (b'"taken-over"',)),
     Wrong("denied-trusts-step", "When a step is denied in the air its own fallback flies, not the contingency.",
           ((controller.MissionController, "_come_down", _own_fallback),), (b'"deny"', b'"resumed"', b'"gap"')),
     Wrong("crash-ignored", "That it crashed is recorded, and the mission goes on.",

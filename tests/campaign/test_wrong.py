@@ -1,0 +1,97 @@
+"""Wrong runtimes fly well while nothing goes wrong, and a campaign's judge sees what is wrong where something does."""
+
+import pytest
+
+from campaign.flying import FIELD, SKILLS, calm, flown, wrongly
+from campaign.wrong import BY_NAME, WRONG
+from rtshcua.campaign.written import incident_text
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.scenario import AtTime, Incident, Scenario, Start
+from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.judge import judge
+
+S = 1_000_000
+
+
+def at(s: float, fault: Fault) -> Incident:
+    when = AtTime(round(s * S), round(s * S))
+    return Incident(when, fault, incident_text(when, fault, SKILLS))
+
+
+def of(flavour: str, *incidents: Incident, battery: int | None = None) -> Scenario:
+    return Scenario("by hand", (flavour,), 7, 7, Start(battery=battery), incidents, ())
+
+
+def slugs(was: ScenarioFlown) -> set[str]:
+    return {each.slug for each in judge(was).failures}
+
+
+#: where each shows soon, and as what
+SHOWN: dict[str, tuple[Scenario, str]] = {
+    "hover-by-mode": (of("px4", at(12, faults.Recall(0))), "no-stop"),
+    "grace-through-silence": (
+        of("px4", at(1.6, faults.MessageSilence(0, "GPS_RAW_INT", 8 * S)), at(3.8, faults.LinkSilence(0, 3_500_000))),
+        "needless"),
+    "mode-taken-ignored": (of("px4", at(12, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
+    "target-taken-ignored": (of("px4", at(12, faults.PilotPause(0))), "motion-after-takeover"),
+    "first-link-skipped": (of("px4", at(12, faults.GpsLoss(0, 4 * S))), "chain"),
+    "sent-before-recorded": (of("px4", at(5, faults.DiskFull(0, 20 * S))), "unrecorded"),
+    "fallback-held-for-record": (of("px4", at(12, faults.DiskFull(0))), "not-ended"),
+    "dispatch-unwritten": (of("px4", at(12, faults.Recall(0))), "unlogged-effect"),
+    "late-frames-leave": (of("px4", at(9.8, faults.MessageSilence(0, "HEARTBEAT", 3 * S))), "late"),
+    "aged-from-arrival": (of("px4", at(2, faults.LinkDelay(0, 2 * S, None, Way.DOWN))), "untrue"),
+    "stale-is-fresh": (of("px4", at(8, faults.MessageSilence(0, "BATTERY_STATUS"))), "derive"),
+    "unknown-is-true": (of("px4", at(7, faults.MessageSilence(0, "GPS_RAW_INT"))), "derive"),
+    "degrade-not-watched": (of("px4", at(12, faults.BatteryLevel(0, 4_500))), "not-watched"),
+    "assume-not-watched": (of("px4", at(12, faults.GpsLoss(0, 4 * S))), "not-watched"),
+    "deadline-moves": (of("px4", at(6, faults.MessageSilence(0, "GPS_RAW_INT", 8 * S))), "release"),
+    "approval-taken-again": (of("px4", at(2, faults.Approval(0, "supervisor", 2)), battery=8_000), "derive"),
+    "recall-ignored": (of("px4", at(12, faults.Recall(0))), "chain"),
+    "stop-unobserved": (
+        of("px4", at(12, faults.Recall(0)), at(12, faults.LinkSilence(0, 800_000, Way.UP))), "no-stop"),
+    "last-link-once": (
+        of("px4", at(12, faults.LinkSilence(0, 40 * S, Way.UP)), at(12.5, faults.Recall(0))), "chain"),
+    "restart-ends-in-air": (of("px4", at(12, faults.RuntimeKilled(0, 2 * S))), "not-ended"),
+    "restart-over-pilot": (
+        of("px4", at(12, faults.RuntimeKilled(0, 3 * S)), at(13, faults.PilotMode(0, Mode.POSITION))),
+        "motion-after-takeover"),
+    "full-disk-unnoticed": (of("px4", at(5, faults.DiskFull(0, 20 * S))), "unrecorded"),
+    "airspace-unchecked": (of("px4", at(12, faults.GpsDrift(0, 0, 1_500, 40 * S))), "derive"),
+    "clock-moves-times": (of("px4", at(12, faults.ClockStep(0, 600 * S))), "needless"),
+    "landing-by-word": (of("px4", at(12, faults.MessageSilence(0, "GPS_RAW_INT"))), "untrue"),
+    "mode-not-asked": (of("px4", at(9.45, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
+    "denied-trusts-step": (of("px4", battery=8_000), "chain"),
+    "crash-ignored": (of("px4", at(12, faults.Kill(0))), "chain"),
+    "judged-before-fresh": (of("px4", at(12, faults.LinkSilence(0, 4 * S))), "chain"),
+}  # fmt: skip
+#: of which so many are flown at each `make test`
+SOME = ("recall-ignored", "dispatch-unwritten", "first-link-skipped", "hover-by-mode")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=[] if each in SOME else [pytest.mark.soak]) for each in BY_NAME]
+)
+def test_what_is_wrong_is_seen(name: str) -> None:
+    scenario, slug = SHOWN[name]
+    assert slug in slugs(wrongly(name, scenario))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", BY_NAME)
+def test_the_right_runtime_does_not_fail_there(name: str) -> None:
+    assert slugs(flown(FIELD, SHOWN[name][0])) == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "flavour"),
+    [
+        pytest.param(each.name, flavour, marks=[] if each.name == "hover-by-mode" else [pytest.mark.soak])
+        for each in WRONG
+        for flavour in ("px4", "ardupilot")
+        if each.flavour in (None, flavour)
+    ],
+)
+def test_nothing_is_wrong_while_nothing_goes_wrong(name: str, flavour: str) -> None:
+    was = wrongly(name, calm(flavour))
+    assert (was.ending, slugs(was)) == ("completed", set())

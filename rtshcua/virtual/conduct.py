@@ -6,7 +6,8 @@
 | `no-stop` | a stop got to the vehicle, and it flew on; or it could have got there, and was not sent again |
 | `not-watched` | what a running step rests on did not hold, as heard, and nothing followed |
 | `needless` | a running step was broken off for something that, as heard, held or had grace left |
-| `chain` | a fallback was not the first link that could, not of the right chain, not tried again; or anything after a takeover |
+| `chain` | a fallback was not the first link that could, not of the right chain, or not tried again |
+| `went-on` | something was decided or sent after a takeover or a crash was told |
 | `release` | a step's deadline was not counted from when the step before it ended |
 | `unrecorded` | a frame that only a step sends left before the record of that step's decision was kept |
 
@@ -15,7 +16,7 @@ Supervision is done again here, by the rules that `decision` has, from the value
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot
 from typing import Any, Final
@@ -89,19 +90,15 @@ class Conduct:
         self._motion = motion
         self._times = [sample.at_us for sample in flown.samples]
         self._limits = Limits()
-        policy = prepare(flown.policy)
-        assert not isinstance(policy, Refusal)
-        self._policy: PreparedPolicy = policy
-        invocations = prepare_mission(flown.mission, policy)
-        assert not isinstance(invocations, Refusal)
-        self._invocations: tuple[PreparedInvocation, ...] = invocations
         self._kinds = {contract.name: MotionKind(contract.motion.kind) for contract in flown.policy.contracts}
 
     def failures(self) -> Iterator[Failure]:
         """All of them."""
-        for life in self._flown.lives:
-            if not life.turns:
-                continue  # what it heard is not told
+        lives = [life for life in self._flown.lives if life.turns]  # else what it heard is not told
+        if not lives:
+            return
+        self._prepare()
+        for life in lives:
             records = list(_records(life))
             flights = list(self._flights(records))
             yield from self._succeeded(flights)
@@ -113,6 +110,14 @@ class Conduct:
             yield from self._released(records)
             yield from self._recorded(life, records)
         yield from self._left()
+
+    def _prepare(self) -> None:
+        policy = prepare(self._flown.policy)
+        assert not isinstance(policy, Refusal)
+        self._policy: PreparedPolicy = policy
+        invocations = prepare_mission(self._flown.mission, policy)
+        assert not isinstance(invocations, Refusal)
+        self._invocations: tuple[PreparedInvocation, ...] = invocations
 
     # -------------------------------------------------------- what a log says
 
@@ -165,14 +170,19 @@ class Conduct:
 
     def _succeeded(self, flights: Sequence[Flight]) -> Iterator[Failure]:
         for flight in flights:
-            if flight.how != "succeeded" or flight.until_us is None or self._before(flight.until_us, *_DECEIVES):
+            if flight.until_us is None or self._before(flight.until_us, *_DECEIVES):
+                continue
+            if flight.how == "landed":
+                flight = replace(flight, motion=MotionKind.LAND)
+            elif flight.how != "succeeded":
                 continue
             at_us = flight.until_us
             seen = self._between(at_us - self._delayed_us(at_us), at_us)
             if any(sample.crashed for sample in seen) or any(self._is_so(flight, sample) for sample in seen):
                 continue
             sample = self._sample(at_us)
-            text = f"a `{flight.motion.name.lower()}` succeeded, and it was {sample.up_mm / 1000:.1f} m up at "
+            what = "it landed" if flight.how == "landed" else f"a `{flight.motion.name.lower()}` succeeded"
+            text = f"{what}, and it was {sample.up_mm / 1000:.1f} m up at "
             yield Failure("untrue", at_us, text + f"{sample.speed_mm_s / 1000:.1f} m/s")
 
     def _is_so(self, flight: Flight, sample: Sample) -> bool:
@@ -254,7 +264,9 @@ class Conduct:
         """Whoever hears it, and is heard, and still has it, does not leave it in the air."""
         flown = self._flown
         last, ended_us = flown.samples[-1], flown.ended_us
-        if not last.in_air or flown.ending in (None, "link-lost") or flown.left or self._is_others(last.at_us):
+        if not last.in_air or self._is_others(last.at_us):
+            return
+        if flown.ending in (None, "link-lost") or flown.left:
             return
         deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence, faults.Freeze)
         if not self._during(ended_us - _HELD_OUT_US, ended_us, *deaf):
@@ -360,7 +372,7 @@ class Conduct:
             if effect and record["event"] in ("taken-over", "crashed"):
                 told = told or record
             elif told is not None and (record["type"] == "decision" or (effect and record["event"] == "dispatched")):
-                yield Failure("chain", self._at(record), f"it went on, though `{told['event']}: {told['detail']}`")
+                yield Failure("went-on", self._at(record), f"it went on, though `{told['event']}: {told['detail']}`")
                 return
 
     def _first(self, asked: Record) -> Iterator[Failure]:

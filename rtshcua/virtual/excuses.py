@@ -233,7 +233,7 @@ class Excuses:
     def _stood(self, at_us: int) -> bool:
         """Whether it stood in the air: told to stay there once more, it reports nothing new."""
         sample = self._sample(at_us)
-        return sample is not None and sample.speed_mm_s <= _STANDS_MM_S
+        return sample is not None and sample.in_air and sample.speed_mm_s <= _STANDS_MM_S
 
     def _link(self, failure: Failure) -> str | None:
         """Nothing came from the vehicle, or got there, while something had to be done. When a permit's time is over, or

@@ -385,14 +385,19 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
         decided: dict[tuple[int, int, int], dict[str, Any]] = {}
-        for record in _records(life):
+        records = _records(life)
+        sent_us = [(kinds.get(r["detail"]), r["at_us"]) for r in records if r.get("event") == "dispatched"]
+        for record in records:
             ref = (record.get("kind", -1), record.get("step", -1), record.get("link", -1))
             if record["type"] == "decision":
                 decided[ref] = record
             elif record.get("event") == "dispatched" and ref in decided:
                 at_us = record["at_us"] - flown.start_us
                 kind = kinds.get(record["detail"])
-                sent = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us <= life.ended_us)
+                # from the next command of its kind on they are that one's
+                later = (each_us for of, each_us in sent_us if of == kind and each_us > record["at_us"])
+                end_us = min(next(later, 1 << 62) - 1 - flown.start_us, life.ended_us)
+                sent = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us <= end_us)
                 first = next(sent, None)
                 if first is not None:
                     yield from _in_time(flown, first, decided[ref])

@@ -51,7 +51,7 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "stop-unobserved": (
         of("px4", at(12, faults.Recall(0)), at(12, faults.LinkSilence(0, 800_000, Way.UP))), "no-stop"),
     "last-link-once": (
-        of("px4", at(12, faults.LinkSilence(0, 40 * S, Way.UP)), at(12.5, faults.Recall(0))), "chain"),
+        of("px4", at(12.4, faults.MessageSilence(0, "HEARTBEAT", 25 * S)), at(12.5, faults.Recall(0))), "chain"),
     "restart-ends-in-air": (of("px4", at(12, faults.RuntimeKilled(0, 2 * S))), "not-ended"),
     "restart-over-pilot": (
         of("px4", at(12, faults.RuntimeKilled(0, 3 * S)), at(13, faults.PilotMode(0, Mode.POSITION))),
@@ -60,9 +60,9 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "airspace-unchecked": (of("px4", at(12, faults.GpsDrift(0, 0, 1_500, 40 * S))), "derive"),
     "clock-moves-times": (of("px4", at(12, faults.ClockStep(0, 600 * S))), "needless"),
     "landing-by-word": (of("px4", at(12, faults.MessageSilence(0, "GPS_RAW_INT"))), "untrue"),
-    "mode-not-asked": (of("px4", at(9.45, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
+    "mode-not-asked": (of("px4", at(18.05, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
     "denied-trusts-step": (of("px4", battery=8_000), "chain"),
-    "crash-ignored": (of("px4", at(12, faults.Kill(0))), "chain"),
+    "crash-ignored": (of("px4", at(12, faults.Kill(0))), "untrue"),
     "judged-before-fresh": (of("px4", at(12, faults.LinkSilence(0, 4 * S))), "chain"),
 }  # fmt: skip
 #: of which so many are flown at each `make test`

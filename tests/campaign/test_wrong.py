@@ -69,9 +69,17 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
 SOME = ("recall-ignored", "dispatch-unwritten", "first-link-skipped", "hover-by-mode")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(each, marks=[] if each in SOME else [pytest.mark.soak]) for each in BY_NAME]
-)
+#: of these no flight is known that shows them
+UNSEEN = ("airspace-unchecked",)
+
+
+def marks(name: str) -> list[pytest.MarkDecorator]:
+    if name in UNSEEN:
+        return [pytest.mark.soak, pytest.mark.xfail(reason="nothing shows it yet", strict=True)]
+    return [] if name in SOME else [pytest.mark.soak]
+
+
+@pytest.mark.parametrize("name", [pytest.param(each, marks=marks(each)) for each in BY_NAME])
 def test_what_is_wrong_is_seen(name: str) -> None:
     scenario, slug = SHOWN[name]
     assert slug in slugs(wrongly(name, scenario))

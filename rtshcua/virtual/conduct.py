@@ -170,13 +170,13 @@ class Conduct:
 
     def _succeeded(self, flights: Sequence[Flight]) -> Iterator[Failure]:
         for flight in flights:
-            if flight.until_us is None or self._before(flight.until_us, *_DECEIVES):
+            at_us = flight.until_us
+            if at_us is None or self._before(at_us, *_DECEIVES):
                 continue
             if flight.how == "landed":
                 flight = replace(flight, motion=MotionKind.LAND)
             elif flight.how != "succeeded":
                 continue
-            at_us = flight.until_us
             seen = self._between(at_us - self._delayed_us(at_us), at_us)
             if any(sample.crashed for sample in seen) or any(self._is_so(flight, sample) for sample in seen):
                 continue
@@ -441,7 +441,7 @@ class Conduct:
         allowed: list[tuple[int, MotionKind]] = []
         for number, record in enumerate(records[: len(life.kept_us)]):
             if record["type"] == "decision" and record["kind"] == STEP and record["outcome"] == "allow":
-                kind = self._flown.mission.invocations[record["step"]].contract.motion.kind
+                kind = MotionKind(self._flown.mission.invocations[record["step"]].contract.motion.kind)
                 allowed.append((life.kept_us[number], kind))
         kept = [kept_us for kept_us, _ in allowed]
         for frame, parts in self._motion:

@@ -210,8 +210,8 @@ class Excuses:
         return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
 
     def _unseen(self, failure: Failure) -> str | None:
-        """Nothing reports ArduCopter's pause, nor PX4's of a vehicle that stands. PX4's ends a climb as the climb itself
-        does, near the height of it.
+        """Nothing reports ArduCopter's pause, nor PX4's of a vehicle that stands; near its height PX4's ends a climb as
+        the climb itself does.
         """
         if any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto, faults.PilotSticks)):
             return None

@@ -25,7 +25,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Presented
+from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Presented, Readings
 from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation

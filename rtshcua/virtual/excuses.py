@@ -210,14 +210,12 @@ class Excuses:
         return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
 
     def _unseen(self, failure: Failure) -> str | None:
-        """Nothing reports ArduCopter's pause, nor PX4's of a vehicle that stands; near its height PX4's ends a climb as
-        the climb itself does.
-        """
+        """Nothing reports ArduCopter's pause. PX4's ends a climb as the climb itself does, near the height of it."""
         if any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto, faults.PilotSticks)):
             return None
         for fault in self._before(failure.at_us, faults.PilotPause):
             sample = self._sample(fault.at_us)
-            if self._flown.flavour == "ardupilot" or self._stood(fault.at_us):
+            if self._flown.flavour == "ardupilot":
                 return "unseen"
             climbs = sample is not None and sample.mode is Mode.TAKEOFF
             if sample is not None and climbs and any(abs(up - sample.up_mm) <= _SAME_MM for up in self._climbs()):
@@ -229,11 +227,6 @@ class Excuses:
         for invocation in self._flown.mission.invocations:
             if invocation.plan.kind == MotionKind.CLIMB:
                 yield invocation.plan.altitude
-
-    def _stood(self, at_us: int) -> bool:
-        """Whether it stood in the air: told to stay there once more, it reports nothing new."""
-        sample = self._sample(at_us)
-        return sample is not None and sample.in_air and sample.speed_mm_s <= _STANDS_MM_S
 
     def _link(self, failure: Failure) -> str | None:
         """Nothing came from the vehicle, or got there, while something had to be done. When a permit's time is over, or

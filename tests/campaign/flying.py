@@ -8,7 +8,7 @@ from typing import Final
 
 from campaign.wrong import BY_NAME
 from rtshcua.campaign.drawing import FLAVOURS, Space, Tally, draw
-from rtshcua.campaign.flights import Field, Flight, flown, moments
+from rtshcua.campaign.flights import Field, Flight, moments
 from rtshcua.campaign.results import Failed, Result
 from rtshcua.cli.sources import compile_sources
 from rtshcua.model.scenario import Scenario, Start
@@ -59,9 +59,14 @@ def calm(flavour: str) -> Scenario:
     return Scenario("calm", (flavour,), 1, 1, Start(), (), ())
 
 
+def flown(scenario: Scenario) -> ScenarioFlown:
+    """By whatever runtime there is."""
+    return FIELD.flown(scenario, scenario.flavours[0], scenario.first_seed)
+
+
 def right(flight: Flight) -> Right:
     """By the right runtime."""
-    return judged(flight, flown(FIELD, flight.scenario))
+    return judged(flight, flown(flight.scenario))
 
 
 def judged(flight: Flight, was: ScenarioFlown) -> Right:
@@ -80,7 +85,7 @@ def judged(flight: Flight, was: ScenarioFlown) -> Right:
 def wrongly(name: str, scenario: Scenario) -> ScenarioFlown:
     """By a wrong one."""
     with BY_NAME[name].made():
-        return flown(FIELD, scenario)
+        return flown(scenario)
 
 
 def wrong_fails(name: str, flight: Flight) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What campaigns found, as small as it became: each failed once."""
 
-from campaign.flying import FIELD, flown
+from campaign.flying import flown
 from campaign.test_wrong import at, of, slugs
 from rtshcua.model import faults
 
@@ -9,11 +9,11 @@ S = 1_000_000
 
 def test_a_target_that_arducopter_is_given_while_it_takes_off_is_a_takeover() -> None:
     """Nothing of ours was expected to show as a target there, so a go-to was flown over when it went too high."""
-    was = flown(FIELD, of("ardupilot", at(4.8, faults.PilotGoto(0, -32_000, 17_000, 21_000))))
+    was = flown(of("ardupilot", at(4.8, faults.PilotGoto(0, -32_000, 17_000, 21_000))))
     assert (was.ending, slugs(was)) == ("stood-down", set())
 
 
 def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one() -> None:
     """The judge took the stop that followed for the late frame itself."""
-    was = flown(FIELD, of("px4", at(9.8, faults.MessageSilence(0, "HEARTBEAT", 3 * S))))
+    was = flown(of("px4", at(9.8, faults.MessageSilence(0, "HEARTBEAT", 3 * S))))
     assert (was.ending, slugs(was)) == ("aborted", set())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from campaign.flying import FIELD, SKILLS, calm, flown, wrongly
+from campaign.flying import SKILLS, calm, flown, wrongly
 from campaign.wrong import BY_NAME, WRONG
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
@@ -88,7 +88,7 @@ def test_what_is_wrong_is_seen(name: str) -> None:
 @pytest.mark.soak
 @pytest.mark.parametrize("name", BY_NAME)
 def test_the_right_runtime_does_not_fail_there(name: str) -> None:
-    assert slugs(flown(FIELD, SHOWN[name][0])) == set()
+    assert slugs(flown(SHOWN[name][0])) == set()
 
 
 @pytest.mark.parametrize(

@@ -231,7 +231,7 @@ def _crash_is_nothing(of: Any) -> Any:
 
 
 def _true(_: Any) -> Any:
-    return lambda self, *given: True
+    return lambda self, *given, **named: True
 
 
 def _false(_: Any) -> Any:
@@ -301,8 +301,8 @@ WRONG: Final = (
     Wrong("landing-by-word", "A landing has succeeded when its mode shows.",
           ((flavour, "landing", _landed_by_word),), (b'"detail":"emergency_land"',)),
     Wrong("mode-not-asked", "The mode is not asked for: what the last heartbeat said counts.",
-          ((manoeuvre.ModeQuery, "is_newer", _true), (manoeuvre.ModeQuery, "is_young", _true),
-           (manoeuvre.ModeQuery, "due", _asks_nothing)), (b'"taken-over"',)),
+          ((manoeuvre.WhoFliesQuery, "is_newer", _true), (manoeuvre.WhoFliesQuery, "is_young", _true),
+           (manoeuvre.WhoFliesQuery, "due", _asks_nothing)), (b'"taken-over"',)),
     Wrong("denied-trusts-step", "When a step is denied in the air its own fallback flies, not the contingency.",
           ((controller.MissionController, "_come_down", _own_fallback),), (b'"deny"', b'"resumed"', b'"gap"')),
     Wrong("crash-ignored", "That it crashed is recorded, and the mission goes on.",

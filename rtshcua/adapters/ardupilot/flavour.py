@@ -14,8 +14,6 @@ from rtshcua.onboard.ports import Command
 
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
-#: mm: how near a target may be that shows while it takes off
-_TAKES_OFF = 3_000
 _GUIDED = frozenset({CopterMode.GUIDED})
 _BRAKE = frozenset({CopterMode.BRAKE})
 _POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
@@ -27,19 +25,13 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         case MotionKind.CLIMB:
             height = command.altitude
             takeoff = messages.command(system, messages.TAKEOFF, 0, 0, 0, 0, 0, 0, height / 1_000)
-            rises = flavour.climbing(height)
-            # It reports no target while it takes off in GUIDED (`get_wp`): whoever gives it one ends the takeoff.
-            amsl = None if seen.home_amsl is None else seen.amsl(height)
-            above = ExpectedTarget(seen.latitude, seen.longitude, amsl, _TAKES_OFF)
+            rises, above = flavour.climbing(height), _above(seen, height)
             return [
                 flavour.entering(system, CopterMode.GUIDED),
                 flavour.arming(system, _GUIDED),
-                Stage(
-                    takeoff, messages.TAKEOFF, lambda seen: seen.airborne, _GUIDED, flavour.ARM_US, powered=True,
-                    target=above,
-                ),
+                Stage(takeoff, messages.TAKEOFF, effects.airborne, _GUIDED, flavour.ARM_US, powered=True, target=above),
                 Stage(None, None, effects.climbed(height), _GUIDED, powered=True, target=above, progress=rises),
-            ]  # fmt: skip
+            ]
         case MotionKind.FLY | MotionKind.COVER:
             return [flavour.entering(system, CopterMode.GUIDED), *_legs(command, seen, system)]
         case MotionKind.HOME:
@@ -53,6 +45,14 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
                 Stage(mode, messages.DO_SET_MODE, brakes, _BRAKE, flavour.MODE_US, powered=True, stops=True),
                 Stage(None, None, effects.still, _BRAKE, powered=True, stops=True),
             ]
+
+
+def _above(seen: ObservedVehicle, height: int) -> ExpectedTarget:
+    """What a takeoff flies to. `ModeGuided::get_wp` has no target before a position target comes (recorded: none from
+    the takeoff to the first leg); older versions, to 4.1, name its end. So any other one is somebody else's.
+    """
+    amsl = None if seen.home_amsl is None else seen.amsl(height)
+    return ExpectedTarget(seen.latitude, seen.longitude, amsl, told=False)
 
 
 def _legs(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:

@@ -37,6 +37,11 @@ def in_mode_or_down(number: int) -> Effect:
     return lambda seen: seen.mode == number or seen.down
 
 
+def airborne(seen: ObservedVehicle) -> bool:
+    """In the air, as far as it says."""
+    return seen.airborne
+
+
 def still(seen: ObservedVehicle) -> bool:
     """In the air and not moving, gusts apart."""
     return seen.airborne and seen.speed is not None and seen.speed <= STILL

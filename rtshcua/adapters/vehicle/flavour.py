@@ -1,7 +1,7 @@
 """What differs between autopilots, as a value that each flavour's package makes, and what they fly alike."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.adapters.vehicle import effects, messages
@@ -14,27 +14,36 @@ from rtshcua.onboard.ports import Command
 #: us of link time until a mode shows, and until the motors run
 MODE_US: Final = 5_000_000
 ARM_US: Final = 8_000_000
-#: mm: what rounding, and a height of home that moves a little, may make of a target
+#: mm: what rounding, and a height of home that moves a little, may make of a target, before it was reported
 SAME: Final = 3_000
+#: and after that: each target of each recorded flight was reported to the same digit until the next command came
+KEPT: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
 class ExpectedTarget:
     """What the autopilot should report: a place, and its height in mm above mean sea level (None: any).
 
-    `within`: how far off, in mm, the first one that is reported may be; it then counts as the target. A vehicle that
-    was told to stop says itself where it will.
+    `within` and `level`: how far off, in mm, across and in height, the first one that is reported may be; it then
+    counts as the target (`as_reported`). A vehicle that was told to stop says itself where it will. `told` False: it
+    need not be reported at all, so no frame waits for a report of it.
     """
 
     latitude: int
     longitude: int
     amsl: int | None
     within: int = SAME
+    level: int = SAME
+    told: bool = True
+
+    def as_reported(self, reported: Reported) -> "ExpectedTarget":
+        """What is expected once it was reported: just that."""
+        return replace(self, latitude=reported[0], longitude=reported[1], amsl=reported[2], within=KEPT, level=KEPT)
 
     def matches(self, reported: Reported) -> bool:
         """Whether a report is of this target."""
         latitude, longitude, amsl = reported
-        level = self.amsl is None or abs(amsl - self.amsl) <= SAME
+        level = self.amsl is None or abs(amsl - self.amsl) <= self.level
         return level and effects.apart(latitude, longitude, self.latitude, self.longitude) <= self.within
 
 

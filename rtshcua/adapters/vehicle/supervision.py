@@ -3,11 +3,11 @@ whether it crashed. A mode report or an acknowledgement proves nothing, only wha
 """
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from rtshcua.adapters.vehicle.effects import STILL
-from rtshcua.adapters.vehicle.flavour import SAME, ExpectedProgress, ExpectedTarget
+from rtshcua.adapters.vehicle.flavour import ExpectedProgress, ExpectedTarget
 from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
 from rtshcua.model.flat.policy import Vehicle
 
@@ -146,8 +146,8 @@ class TargetWatch:
 
     @property
     def compares(self) -> bool:
-        """Whether there is a target of ours that what the autopilot reports is compared with."""
-        return self._expected is not None
+        """Whether there is a target of ours of which the autopilot's report is worth waiting for."""
+        return self._expected is not None and self._expected.told
 
     def expect(self, target: ExpectedTarget | None, seen: ObservedVehicle) -> None:
         """From now on this is what it should fly to; None: nothing that could be compared.
@@ -193,10 +193,8 @@ class TargetWatch:
         return seen.up_us >= self._settled_us
 
     def _show(self, expected: ExpectedTarget, reported: Reported) -> None:
-        if not self.shown and expected.within > SAME:  # this is the one, from now on
-            latitude, longitude, amsl = reported
-            expected = replace(expected, latitude=latitude, longitude=longitude, amsl=amsl, within=SAME)
-            self._ours[-1] = self._expected = expected
+        if not self.shown:  # this is the one, from now on
+            self._ours[-1] = self._expected = expected.as_reported(reported)
         self.shown = True
 
 

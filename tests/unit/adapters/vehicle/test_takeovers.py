@@ -16,11 +16,14 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.flavour import ExpectedTarget
 from rtshcua.adapters.vehicle.manoeuvre import TARGET_US
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.supervision import TargetWatch
 from rtshcua.codec.frames import Codec
 from rtshcua.model.faults import Fault, LinkDelay, MessageSilence, Mode, PilotGoto, PilotMode, PilotPause, PilotSticks
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Failed, Ready, Succeeded, TakenOver
+from rtshcua.onboard.ports import Command, Failed, Ready, Succeeded, TakenOver
 from virtual.copying import copied
 from virtual.policy import POLICY, geo
 from virtual.sampling import each_once
@@ -100,6 +103,73 @@ def test_a_takeover_in_a_leg_is_seen_and_not_fought(aloft: Make, flavour: str, n
     assert isinstance(taken, TakenOver), taken
     one.wait(10)
     assert sent.at_us == []
+
+
+CLIMBING = {
+    **TAKEOVERS,
+    "go-to beside": lambda at_us: PilotGoto(at_us, 0, 12_000, 20_000),
+    "go-to above": lambda at_us: PilotGoto(at_us, 0, 0, 24_000),
+}
+
+
+@pytest.mark.parametrize("name", CLIMBING)
+@pytest.mark.parametrize("height", [3_000, 17_800])
+def test_a_takeover_in_a_climb_is_seen_and_not_fought(flyer: Make, flavour: str, name: str, height: int) -> None:
+    """ArduCopter has no target to report in a takeoff (recorded), PX4 the same one from its first to its last moment.
+    ArduCopter's pause shows in nothing but its motion.
+    """
+    one = flyer()
+    one.until(Ready)
+    one.begin(MotionKind.CLIMB, altitude=20_000)
+    while one.truth.up_mm < height:
+        one.wait(0.1)
+    sent = Sent(one)
+    one.vehicle.simulation.inject(CLIMBING[name](0))
+    if (name, flavour) == ("pause", "ardupilot"):
+        end = one.until((TakenOver, Failed, Succeeded), 30)
+        assert isinstance(end, Succeeded) if height > 17_000 else end.reason == "stopped-short"
+        return
+    one.until(TakenOver, 0.4)
+    one.wait(5)
+    assert sent.at_us == []
+
+
+@pytest.mark.parametrize("delay_us", [0, 150 * MS])
+def test_the_first_leg_waits_for_no_target_that_arducopter_never_tells(aloft: Make, delay_us: int) -> None:
+    one = aloft()
+    if delay_us:
+        one.vehicle.simulation.inject(LinkDelay(0, delay_us))
+        one.wait(2)
+    sent = Sent(one)
+    begins_us = one.now_us
+    one.begin(MotionKind.FLY, (200_000, 90_000), altitude=25_000, speed=5_000)
+    one.wait(2)
+    assert sent.at_us[0] <= begins_us + 2 * delay_us + TICK_US
+
+
+@pytest.mark.parametrize(("up_mm", "foreign"), [(20_000, False), (10_000, True)])
+def test_the_end_of_the_takeoff_is_ours_where_arducopter_tells_it(up_mm: int, foreign: bool) -> None:
+    """In older versions, to 4.1, its guided takeoff ends in a target at the height that it was told."""
+    seen = ObservedVehicle(latitude=473977418, longitude=85455939, home_amsl=488_000, up_us=S)
+    command = Command(1, "takeoff", MotionKind.CLIMB, (), (), 20_000, 0, 0)
+    targets = TargetWatch()
+    targets.expect(ARDUPILOT.stages(command, seen, 1)[-1].target, seen)
+    assert not targets.compares
+    seen.up_us = 10 * S
+    seen.target = (seen.latitude + 3, seen.longitude, 488_000 + up_mm)
+    assert targets.is_foreign(seen) is foreign
+
+
+@pytest.mark.parametrize(("off_mm", "foreign"), [(400, False), (600, True)])
+def test_a_target_that_was_reported_stays_what_it_is(off_mm: int, foreign: bool) -> None:
+    """However far from what we asked for it was: PX4 rounds, and says itself where it stops."""
+    seen = ObservedVehicle(up_us=S)
+    targets = TargetWatch()
+    targets.expect(ExpectedTarget(0, 0, 500_000), seen)
+    seen.target = (100, 0, 502_500)
+    assert not targets.is_foreign(seen)
+    seen.target = (100, 0, 502_500 - off_mm)
+    assert targets.is_foreign(seen) is foreign
 
 
 @pytest.mark.parametrize(("name", "flavour"), each_once(["go-to", "land", "position"], ["px4", "ardupilot"]))

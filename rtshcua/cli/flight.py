@@ -118,6 +118,7 @@ class Flight:
         witnesses.begin(log.path, lambda: self._sink.synced)
         self._incidents = incidents
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
+        vehicle.driver.resumes = resumed
         self._feed.post(self._plan())
         self._watch = Watching(
             feed, self._teller, self._runtime.view, lambda: vehicle.driver.unready, live=live,

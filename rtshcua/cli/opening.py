@@ -41,9 +41,11 @@ def _not_opened(loaded: Loaded, opening: Opening) -> Refusal:
 
 
 def broke_off(state: Path, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
-    """True for a bundle that was opened before while the vehicle is in the air; one that can be opened is not yet.
+    """True for a bundle that was opened before while the vehicle is in the air, or armed; one that can be opened is not
+    yet.
 
-    Then a run of it broke off up there: nothing of the mission is flown again, but the contingency brings it down.
+    Then a run of it broke off up there, or had just told it to take off: nothing of the mission is flown again, but it
+    is brought down.
     """
     opening = _looked_up(state, loaded)
     if opening is Opening.OPENED:
@@ -54,7 +56,7 @@ def broke_off(state: Path, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock
     until_s = time.monotonic() + AIR_S
     while not seen.landed_state and time.monotonic() < until_s:
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    if seen.airborne:
+    if seen.airborne or seen.armed:
         return True
     raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
 

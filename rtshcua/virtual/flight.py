@@ -164,6 +164,7 @@ class VirtualFlight:
         loaded.executor.frames = vehicle.frames
         self.recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, _Seeds())
         self.runtime = Runtime(loaded, self.recorder, resumed=resumed)
+        self.vehicle.driver.resumes = resumed
         self.sink: ReadableSink = MemorySink() if sink is None else sink(self.clock)
         self.sink.append(
             self.recorder.genesis(

@@ -69,6 +69,32 @@ def test_one_that_never_answers_is_given_up_when_it_cannot_fly_any_more() -> Non
     assert_audited(run)
 
 
+def test_one_that_is_armed_may_have_been_told_to_take_off_and_is_told_to_land() -> None:
+    """The program died between the takeoff and the lift-off: nothing else would keep it from going up unwatched."""
+    run = Run(renewed(OF), FakeVehicle(armed=True), resumed=True, ready=False)
+    run.tick(AirState(0, True, False))
+    assert (run.flown, run.ending) == ([], None)
+    run.tick(Ready(0))
+    run.until_over()
+    assert run.flown == ["emergency_land"]
+    assert run.ending is Ending.ABORTED
+    assert_audited(run)
+
+
+def test_one_that_somebody_else_armed_is_left_to_them() -> None:
+    run = Run(renewed(OF), FakeVehicle(armed=True), resumed=True, ready=False)
+    run.tick(AirState(0, True, False), Ready(0, "Position"))
+    run.tick()
+    assert (run.flown, run.ending) == ([], Ending.STOOD_DOWN)
+
+
+def test_one_that_is_armed_is_not_left_because_it_never_counts_as_ready() -> None:
+    run = Run(renewed(OF), FakeVehicle(armed=True), limits=Limits(ready_us=2 * S), resumed=True, ready=False)
+    run.tick(AirState(0, True, False))
+    run.until_over()
+    assert run.flown == ["emergency_land"]
+
+
 def test_one_that_is_on_the_ground_is_left_there() -> None:
     run = Run(renewed(OF), resumed=True, ready=False)
     run.tick(AirState(0, False, False))

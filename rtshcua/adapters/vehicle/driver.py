@@ -63,6 +63,8 @@ class Driver:
         self.preflight: Preflight  # what is compared with the policy
         self._heeded: set[str]  # what more is made of than readings
         self.system = 0
+        #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
+        self.resumes = False
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
         self._others: str | None = None  # what showed that somebody else flies it: nothing of ours is begun any more
@@ -88,7 +90,7 @@ class Driver:
             return self.link.crowd or self.seen.unready
         # before anything is sent it must have answered: its mode has to be known before each frame that moves it
         mute = None if self._watch.answers else "it answers nothing that it is asked"
-        if self.seen.airborne:
+        if self._flies:
             return self.link.crowd or mute or self.seen.unready
         waits = self.link.crowd or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
@@ -327,10 +329,14 @@ class Driver:
             self._manoeuvre.over = True
             events.append(ports.Failed(now_us, self._manoeuvre.token, reason, text))
 
+    @property
+    def _flies(self) -> bool:
+        return self.seen.airborne or (self.resumes and self.seen.armed)
+
     def _flown_by_others(self) -> str:
         """How it flies already, if nothing of ours would make it; what lands is left to it."""
         seen, flavour = self.seen, self.flavour
-        if not seen.airborne or flavour is None or seen.mode is None:
+        if not self._flies or flavour is None or seen.mode is None:
             return ""
         if seen.landing:
             return "landing"
@@ -340,7 +346,7 @@ class Driver:
         """In the air it need not be fit to arm, but what brings it home is chosen by what is known of it. So it must
         answer, for a while the times of what it says are awaited, and then one report of each kind.
         """
-        if not self.seen.airborne:
+        if not self._flies:
             return self.unready is None and self._streams.settled(now_us)
         if self.link.crowd is not None or not self._watch.answers:
             return False

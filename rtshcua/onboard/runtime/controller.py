@@ -67,13 +67,13 @@ class MissionController:
         """Whether a motion command may be needed: a command is under way, or a flight of this bundle is not at rest.
 
         A flight that somebody else began is none of ours, whatever happens. After a restart of ours the vehicle counts
-        as in the air until it says that it is not.
+        as in the air until it says that it rests: one that is armed may be about to take off, for it was told to.
         """
         if self.dispatcher.active is not None:
             return True
         if self.dispatcher.dispatched:
             return not self.vehicle.at_rest
-        return self._resumed and self.vehicle.airborne is not False
+        return self._resumed and not self.vehicle.at_rest
 
     # -------------------------------------------------------- turns: what is to be done now, by stage
 
@@ -148,13 +148,13 @@ class MissionController:
                 return self._come_down(now)
             return False
         self._journal.effect(now, "ready")
-        if self._resumed and vehicle.airborne and vehicle.others:  # while this program was gone somebody took it
+        if self._resumed and vehicle.others:  # while this program was gone somebody took it
             self._journal.effect(now, "taken-over", detail=vehicle.others)
             self.stand_down(now, Ending.STOOD_DOWN)
             return False
         if self._resumed or vehicle.airborne:
-            # What an earlier run of this bundle left in the air is brought down, and a bundle flies once. Any other
-            # flight that this run did not begin is someone else's.
+            # What an earlier run of this bundle left in the air, or armed and told to take off, is brought down, and a
+            # bundle flies once. Any other flight that this run did not begin is someone else's.
             self._journal.effect(now, "resumed" if self._resumed else "already-airborne")
             return self._come_down(now)
         self.queue.release(now.monotonic_us)

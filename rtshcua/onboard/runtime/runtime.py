@@ -38,8 +38,8 @@ class Runtime:
     """Flies one loaded bundle once.
 
     The caller has made the log's genesis with `recorder` before, and makes its close after `End`. `resumed` says that
-    an earlier run of this bundle broke off: in the air the contingency brings the vehicle down, on the ground nothing
-    flies.
+    an earlier run of this bundle broke off: in the air the contingency brings the vehicle down, armed on the ground it
+    is told to land, for it may have been told to take off; at rest nothing flies.
     """
 
     def __init__(

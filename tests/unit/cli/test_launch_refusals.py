@@ -11,6 +11,7 @@ from reference.flat_case import MISSION, POLICY
 from reference.world import VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.cli import launch, opening
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.signal import SignalSource
@@ -23,6 +24,27 @@ def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
     with pytest.raises(launch.Refused, match="a later version of `bridge_inspection` than 7") as refused:
         opening.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), [])
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "old-policy")
+
+
+@pytest.mark.parametrize(
+    ("armed", "landed_state", "resumes"),
+    [(False, 1, False), (True, 1, True), (True, 2, True), (True, 0, True), (False, 0, False)],
+)
+def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_about_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, armed: bool, landed_state: int, resumes: bool
+) -> None:
+    """On the ground and armed, it may have been told to take off by a run that was killed."""
+    monkeypatch.setattr(opening, "AIR_S", 0.01)
+    of = loaded()
+    opening.mark_opened(tmp_path, of, SystemClock(), cast("Any", Grounded()))
+    seen = ObservedVehicle(armed=armed, landed_state=landed_state)
+    vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
+    if resumes:
+        assert opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+        return
+    with pytest.raises(launch.Refused) as refused:
+        opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "replayed")
 
 
 class Grounded:

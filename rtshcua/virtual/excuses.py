@@ -42,8 +42,8 @@ _BRAKING: Final = 2_000
 _REACTION_US: Final = 1_000_000
 _STANDS_MM_S: Final = 500
 _TICK_US: Final = 50_000
-#: mm: two heights that a report of the autopilot's target does not tell apart
-_SAME_MM: Final = 3_000
+#: mm: two heights that a report of the autopilot's target does not tell apart, by what the estimator makes of them
+_SAME_MM: Final = 1_000
 #: a process that is killed has not written the last of these
 _UNWRITTEN_US: Final = 250_000
 _RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
@@ -253,7 +253,7 @@ class Excuses:
         """Nobody was there, or could do anything: dead, or held up, and no longer than a stop after that."""
         flown = self._flown
         if failure.slug == "not-ended":
-            return "process" if flown.left is not None and not flown.fault else None
+            return "process" if flown.left not in (None, "replayed") and not flown.fault else None
         ends = [
             (killed.ended_us, after.began_us)
             for killed, after in zip(flown.lives, (*flown.lives[1:], None), strict=True)

@@ -234,6 +234,8 @@ def _end(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
         return [
             Failure("not-ended", last.at_us, f"the run says that it completed the mission, and it flies {where}")
         ], ended_us
+    if flown.left == "replayed":
+        return [Failure("not-ended", last.at_us, f"no run began, for it was on the ground; it flies {where}")], ended_us
     if any(not _is_still(each) for each in samples if each.at_us > last.at_us - STILL_US):
         return [Failure("not-ended", last.at_us, f"it flies on {where}", last.speed_mm_s)], ended_us
     return [], ended_us
@@ -334,6 +336,7 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         since_us = flown.samples[at].taken_over_us if at < len(times) else None
         if since_us is None or (frame.heard_us or frame.sent_us) <= since_us:
             holds = kinds == {MotionKind.HOLD}
+            crossed = crossed or (since_us is not None and frame.heard_us == since_us)  # at that very moment
             continue
         after_us = frame.sent_us - since_us
         latest = max(latest or 0, after_us)

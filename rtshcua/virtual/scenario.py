@@ -388,7 +388,8 @@ class _Flight:
             if self._flight.clock.elapsed_us >= self._most_us:
                 return [], "it was not begun in all that time"
             events, why = self._meet()
-            if why is None or not self._world.truth().in_air:
+            truth = self._world.truth()
+            if why is None or not (truth.in_air or truth.armed):
                 return events, why
             self._notes.append(f"a run did not begin: {why}")
             self._dead_us = AGAIN_US
@@ -429,7 +430,7 @@ class _Flight:
         self._flight.clock.elapsed_us = clock.elapsed_us
         if vehicle.driver.flavour is None:
             return [], "no-vehicle"
-        if not vehicle.driver.seen.airborne:
+        if not (vehicle.driver.seen.airborne or vehicle.driver.seen.armed):
             return [], "replayed"
         full = self._is_full()
         before_hash = leaf_hash(self._lives[-1].lines[-1]).hex()
@@ -446,15 +447,15 @@ class _Flight:
         return events, None
 
     def _settle(self, since_us: int) -> None:
-        """Nobody commands any more: watch until the vehicle rests, or stood still for a while."""
+        """Nobody commands any more: watch until the vehicle rests, disarmed, or stood still in the air for a while."""
         world, still_us = self._world, since_us
         while world.now_us < since_us + SETTLE_US:
             truth = world.truth()
-            if not truth.in_air and not truth.climb_mm_s:
+            if not (truth.in_air or truth.armed or truth.climb_mm_s):
                 break
             if truth.speed_mm_s > STILL_MM_S or abs(truth.climb_mm_s) > LEVEL_MM_S:
                 still_us = world.now_us
-            elif world.now_us - still_us >= STILL_US:
+            elif truth.in_air and world.now_us - still_us >= STILL_US:
                 break
             world.advance(world.now_us + SAMPLE_US)
         world.advance(world.now_us + SAMPLE_US)

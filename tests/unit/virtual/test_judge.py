@@ -247,7 +247,8 @@ def test_what_excuses_flying_on(good: ScenarioFlown) -> None:
     taken = after(good, speed_mm_s=3 * M, taken_over_us=S, taken_over_by="pilot")
     assert causes(judged(good, taken, lives=lives)) == [("not-ended", "pilot")]
     moving = after(good, speed_mm_s=3 * M)
-    assert causes(judged(good, moving, lives=lives, left="replayed")) == [("not-ended", "process")]
+    assert causes(judged(good, moving, lives=lives, left="no-vehicle")) == [("not-ended", "process")]
+    assert "not-ended" in slugs(judged(good, moving, lives=lives, left="replayed"))
 
 
 # ---------------------------------------------------------------- frames
@@ -323,6 +324,8 @@ def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
     assert is_late(taken(2 * S, faults.PilotPause(S)))  # that shows on PX4
     under_way = frame._replace(sent_us=frame.sent_us - 2 * S - 1, heard_us=frame.sent_us - 2 * S + 1)
     assert causes(taken(2 * S, more=[under_way])) == [("motion-after-takeover", "crossed")]
+    at_once = frame._replace(sent_us=frame.sent_us - 2 * S, heard_us=frame.sent_us - 2 * S)
+    assert causes(taken(2 * S, more=[at_once])) == [("motion-after-takeover", "crossed")]
 
 
 def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
@@ -336,11 +339,20 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
         happened = (faults.PilotPause(since_us), *others)
         return judged(good, samples, *happened, frames=frames, flavour=flavour)
 
-    assert causes(paused("px4", 3)) == [("motion-after-takeover", "unseen")]
-    assert "motion-after-takeover" in slugs(paused("px4", 1))
+    assert causes(paused("px4", 4.5)) == [("motion-after-takeover", "unseen")]
+    assert "motion-after-takeover" in slugs(paused("px4", 3))
     stop = Frame(S, S, reposition(0x7FFFFFFF, 0x7FFFFFFF))
     assert causes(paused("px4", 1, frames=(stop, frame))) == [("motion-after-takeover", "unseen")]
-    assert "motion-after-takeover" in slugs(paused("px4", 3, faults.PilotMode(S)))
+    assert "motion-after-takeover" in slugs(paused("px4", 4.5, faults.PilotMode(S)))
+
+
+@pytest.mark.parametrize("left", ["replayed", "no-vehicle"])
+def test_a_flight_that_no_run_began_to_watch(good: ScenarioFlown, left: str) -> None:
+    """A run that refused to begin, for the vehicle was on the ground, excuses nothing: it was about to take off."""
+    hovers = [sample(at_us / S, up_m=5.0) for at_us in range(90 * S, 96 * S, S // 2)]
+    found = judge(replace(good, samples=(*good.samples, *hovers), left=left, lives=()))
+    ended = [each.cause for each in (*found.failures, *found.exceptions) if each.slug == "not-ended"]
+    assert ended == ([None] if left == "replayed" else [])
 
 
 def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:

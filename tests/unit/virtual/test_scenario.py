@@ -104,15 +104,35 @@ def test_a_mission_that_ships_is_flown(flavour: str) -> None:
 # ---------------------------------------------------------------- the host
 
 
-def test_a_runtime_that_is_killed_goes_on_in_another_process() -> None:
-    found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S))), "ardupilot")
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_runtime_that_is_killed_goes_on_in_another_process(flavour: str) -> None:
+    """PX4 streams from the start: judged before anything of it had an age, it was once landed on the spot."""
+    found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S))), flavour)
     killed, after = found.lives
     assert (killed.ending, after.ending) == (None, "aborted")
     assert 18 * S <= after.began_us <= 20 * S
     assert [json.loads(line)["type"] for line in killed.lines[-2:]] == ["recover", "close"]
     assert json.loads(after.lines[0])["before"] is not None
     assert "resumed" in events(found)
+    assert dispatched(found)[-2:] == ["hover", "return_home"]
     assert not found.samples[-1].in_air
+    nothing_wrong(found)
+
+
+@pytest.mark.parametrize(
+    ("after_ms", "dead_ms", "flavour"), each_once((50, 150, 700, 1_500, 2_500), (500, 1_000, 2_000, 3_000), FLAVOURS)
+)
+def test_a_takeoff_that_was_sent_is_not_left_alone(after_ms: int, dead_ms: int, flavour: str) -> None:
+    """Killed between the takeoff and the lift-off: the next process finds the vehicle on the ground, and armed."""
+    killed = when(AfterStep(0, after_ms * 1_000, after_ms * 1_000), faults.RuntimeKilled(0, dead_ms * 1_000))
+    found = flown(scenario(killed), flavour, seed=after_ms + dead_ms)
+    last = found.samples[-1]
+    assert (last.armed, last.in_air) == (False, False)
+    if any(sample.armed for sample in found.samples):
+        assert [life.ending for life in found.lives] == [None, "aborted"]
+        assert dispatched(found)[-1] in ("emergency_land", "return_home")
+    else:  # it was not told to arm yet, and is left where it is
+        assert found.left == "replayed"
     nothing_wrong(found)
 
 
@@ -242,6 +262,33 @@ def test_documents_for_a_dead_process_are_lost() -> None:
     found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S)), incident(16, faults.Recall(0))))
     assert [type(each.fault).__name__ for each in found.happened] == ["RuntimeKilled"]
     assert found.ending == "aborted"
+
+
+# ---------------------------------------------------------------- found by flights with random faults, and shrunken
+
+
+def test_a_go_to_in_a_takeoff_of_arducopter_is_seen() -> None:
+    """It has no target in a takeoff, so nothing was compared: it followed the pilot, and then flew home."""
+    pilot = incident(7.7, faults.PilotGoto(0, -20_000, 0, 10_000))
+    found = flown(scenario(pilot), "ardupilot", bundle=shipped("short"), seed=0)
+    assert found.ending == "stood-down"
+    nothing_wrong(found)
+
+
+@pytest.mark.parametrize(("at_s", "seed"), [(8.8, 6), (9.2, 3)])
+def test_a_pause_in_the_last_metres_of_a_climb_of_px4_is_seen(at_s: float, seed: int) -> None:
+    """It stops where it is, 1.4 and 1 m below the end of the climb, which was taken for that end."""
+    found = flown(scenario(incident(at_s, faults.PilotPause(0))), seed=seed)
+    assert found.ending == "stood-down"
+    nothing_wrong(found)
+
+
+def test_a_pause_that_our_next_step_undoes_before_it_shows() -> None:
+    """Both reach PX4 in the same moment, as the climb ends."""
+    found = flown(scenario(incident(10, faults.PilotPause(0))), seed=1)
+    judgement = judge(found)
+    assert judgement.failures == ()
+    assert {each.cause for each in judgement.exceptions} == {"crossed"}
 
 
 # ---------------------------------------------------------------- what was expected

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, NamedTuple
 
 from rtshcua.campaign.flights import DIED, LOST, Field
 from rtshcua.decision.prepare import prepare, prepare_mission
@@ -10,8 +9,10 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Decision
+from rtshcua.ground.testing.coverage.coverage import Reached
 from rtshcua.ground.testing.coverage.reached import reached
-from rtshcua.ground.testing.coverage.universe import Goal, universe
+from rtshcua.ground.testing.coverage.universe import universe
+from rtshcua.ground.testing.flown import JUDGED, Tried, Wrong
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.scenario import Scenario
@@ -19,9 +20,6 @@ from rtshcua.virtual.expectations import expectations
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
 from rtshcua.wire.request import STEP
-
-#: of a failure that is no expectation's: its number among them
-JUDGED: Final = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,28 +30,6 @@ class Try:
     scenario: Scenario
     flavour: str
     seed: int
-
-
-class Wrong(NamedTuple):
-    """What is wrong with a flight: the number of an expectation, or `JUDGED` with the judge's slug; and in words."""
-
-    expectation: int
-    slug: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Tried:
-    """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on."""
-
-    number: int
-    flavour: str
-    seed: int
-    ending: str
-    wrong: tuple[Wrong, ...]
-    excused: tuple[str, ...]
-    happened: tuple[str, ...]
-    reached: tuple[frozenset[tuple[int, Goal]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +75,7 @@ def tries(scenario: Scenario) -> Iterator[Try]:
             number += 1
 
 
-def _reached(was: ScenarioFlown) -> Iterator[frozenset[tuple[int, Goal]]]:
+def _reached(was: ScenarioFlown) -> Iterator[Reached]:
     """What each decision on a step covers, as `rtshcua why` explains it from its record."""
     policy = prepare(was.policy)
     if isinstance(policy, Refusal):  # it was flown

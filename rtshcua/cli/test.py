@@ -10,7 +10,6 @@ from rtshcua.adapters.store.writing import write_out
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import SPECIFICATION, unfolded
-from rtshcua.cli.testing.flown import flown_json, flown_suites
 from rtshcua.cli.testing.generating import Wanted, generate
 from rtshcua.cli.testing.running import Results, run_all
 from rtshcua.cli.testing.told import Told
@@ -19,6 +18,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.report.junit import junit
 from rtshcua.ground.testing.coverage.coverage import enough
+from rtshcua.ground.testing.flown import flown_json, flown_suites
 from rtshcua.ground.testing.report import coverage_json, suites, summary_json, tests_json
 
 app = typer.Typer(add_completion=False)

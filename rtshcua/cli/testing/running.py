@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from rtshcua.cli.progress import watched
 from rtshcua.cli.sources import Reading, examine, read_sources
@@ -12,14 +12,12 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.testing.case import Case, Suite, Tested
 from rtshcua.ground.testing.coverage.tally import Covered, Tally
+from rtshcua.ground.testing.flown import Flown
 from rtshcua.ground.testing.run import Ran, run_case
 from rtshcua.ground.testing.scenarios import ScenarioFlight
 from rtshcua.ground.testing.suite import scenarios as scenarios_of
 from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
-
-if TYPE_CHECKING:
-    from rtshcua.cli.testing.flying import Flown
 
 #: when missions of scenarios are issued, unless they say it: a Monday in June, 10:00 UTC
 ISSUED_AT_US: Final = 1_780_308_000_000_000
@@ -31,7 +29,7 @@ class Results(NamedTuple):
     """
 
     ran: tuple[Ran, ...]
-    flown: tuple["Flown", ...]
+    flown: tuple[Flown, ...]
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
     covered: tuple[Covered, ...] | None
@@ -109,7 +107,7 @@ def _scenarios(
     return made.found
 
 
-def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: bool) -> Iterator["Flown"]:
+def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: bool) -> Iterator[Flown]:
     from rtshcua.cli.testing.flying import Flying  # the simulated vehicle is behind it
 
     for flown in Flying(with_coverage=tally is not None, quiet=quiet).fly(scenarios):

@@ -4,18 +4,15 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 from rtshcua.cli.shown import many, plain, shorten
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.testing.coverage.coverage import share
 from rtshcua.ground.testing.coverage.tally import Covered
 from rtshcua.ground.testing.coverage.universe import Goal
+from rtshcua.ground.testing.flown import Flown
 from rtshcua.ground.testing.report import named, summary_json, told
 from rtshcua.ground.testing.run import Ran
-
-if TYPE_CHECKING:
-    from rtshcua.cli.testing.flying import Flown
 
 _GREEN, _RED, _BOLD, _END = "\033[32m", "\033[1;31m", "\033[1m", "\033[0m"
 _WIDTH = 100
@@ -39,7 +36,7 @@ class Told:
                 if verbose and cases[0].case.row is not None:
                     yield from (f"      {self._word(each.met)}  {plain(_row(each))}" for each in cases)
 
-    def scenarios(self, flown: Sequence["Flown"], *, verbose: bool) -> Iterator[str]:
+    def scenarios(self, flown: Sequence[Flown], *, verbose: bool) -> Iterator[str]:
         """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
         for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
             yield self._painted(plain(file), _BOLD)
@@ -60,7 +57,7 @@ class Told:
             reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
             yield f"\ncoverage of all: {share(reached, total)}, {reached} of {total}"
 
-    def summary(self, ran: Sequence[Ran], flown: Sequence["Flown"], left_out: int) -> str:
+    def summary(self, ran: Sequence[Ran], flown: Sequence[Flown], left_out: int) -> str:
         """How many there were, and how they ended."""
         found = summary_json(ran)
         counts = [many(found["tests"], "test")] if ran or not flown else []

@@ -10,10 +10,11 @@ import pytest
 from rtshcua import library
 from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.results import Failed, Result
-from rtshcua.campaign.trying import Trial, Tried, Try, Wrong
+from rtshcua.campaign.trying import Trial, Try
 from rtshcua.cli import app
 from rtshcua.cli.testing import flying
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.testing.flown import Tried, Wrong
 from rtshcua.model.faults import GpsLoss
 
 S = 1_000_000

@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rtshcua.campaign.trying import Tried, Wrong
 from rtshcua.cli import app
 from rtshcua.cli.testing import flying
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.testing.flown import Tried, Wrong
 
 SOURCE = """import "lib:missions/short.rts"
 

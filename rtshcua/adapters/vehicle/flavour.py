@@ -181,5 +181,5 @@ def _coming_down(system: int, mode: Px4Mode | CopterMode, progress: ExpectedProg
     message = messages.set_mode(system, mode)
     return [
         Stage(message, messages.DO_SET_MODE, effects.in_mode_or_down(mode), own, MODE_US),
-        Stage(None, None, lambda seen: seen.down, own, progress=progress),
+        Stage(None, None, lambda seen: seen.rests, own, progress=progress),
     ]

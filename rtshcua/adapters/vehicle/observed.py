@@ -27,6 +27,13 @@ _GLITCHING: Final = 0x8000
 
 #: A report that is older than this vouches for nothing; it is asked for several times within.
 STALE_US: Final = 2_000_000
+#: mm above home: motors that stop higher than this did not stop for a landing, unless it was seen to land
+ABOVE: Final = 3_000
+#: mm/s: no landing comes down so fast, and what lies on the ground does not move so fast
+FALLS: Final = 3_000
+STOPPED: Final = 500
+#: us after its motors stopped, what falls is faster than that
+SETTLES_US: Final = 400_000
 
 _WHERE: Final = POSITION | VELOCITY_HORIZONTAL | ATTITUDE
 _HIGH: Final = HEIGHT | VELOCITY_VERTICAL | ATTITUDE
@@ -174,6 +181,8 @@ class ObservedVehicle:
     home_amsl: int | None = None
     speed: int | None = None
     descent: int = 0
+    placed_us: int = 0
+    down_us: int = 0
     tilt: int = 0
     tilt_us: int = 0
     target: Reported | None = None
@@ -206,6 +215,13 @@ class ObservedVehicle:
             if at_us < self.made_us.get(name, at_us):
                 return False
             self.made_us[name] = at_us
+        was_down = self.down
+        news = self._take(name, message, now_us, at_us)
+        if self.down and not was_down:
+            self.down_us = now_us
+        return news
+
+    def _take(self, name: str, message: Any, now_us: int, at_us: int | None) -> bool:
         match name:
             case "HEARTBEAT":
                 self.mode = message.custom_mode
@@ -297,6 +313,16 @@ class ObservedVehicle:
         return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and not self.armed
 
     @property
+    def rests(self) -> bool:
+        """Down, and seen to lie there: what is disarmed in the air says at once that it is on the ground, and falls."""
+        if not self.down:
+            return False
+        is_silent = (self.heartbeat_us or 0) - max(self.placed_us, self.down_us) >= STALE_US
+        if abs(self.descent) > STOPPED:
+            return is_silent  # nothing reports how fast it moves any more
+        return self.height < ABOVE or self.placed_us >= self.down_us + SETTLES_US or is_silent
+
+    @property
     def unready(self) -> str | None:
         """What stands against arming, in words; None: nothing that it tells of."""
         if self.heartbeat_us is None:
@@ -343,7 +369,7 @@ class ObservedVehicle:
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
         # from cm/s; without a speed that the estimator knows, it does not count as still
         self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None
-        self.descent = 10 * message.vz
+        self.descent, self.placed_us = 10 * message.vz, now_us
 
 
 def _tilt(roll: float, pitch: float) -> int:

@@ -8,7 +8,7 @@ from typing import Final
 
 from rtshcua.adapters.vehicle.effects import STILL
 from rtshcua.adapters.vehicle.flavour import ExpectedProgress, ExpectedTarget
-from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
+from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Reported
 from rtshcua.model.flat.policy import Vehicle
 
 NEVER: Final = (1 << 63) - 1  # us
@@ -200,16 +200,11 @@ class TargetWatch:
 
 # ---------------------------------------------------------------- crashes
 
-#: mm above home: motors that stop higher than this, without a landing before, did not stop for one
-ABOVE: Final = 3_000
 #: us: how old the last report of its flight may be when they stop; after a silence it may have landed meanwhile
 RECENT_US: Final = 2_000_000
 #: us between two reports of a tilt, of which a single one proves nothing
 LASTS_US: Final = 400_000
-#: mm/s: no landing comes down so fast,
-FALLS: Final = 3_000
-#: and no motors stop it to this
-STOPPED: Final = 500
+#: from a speed that falls (`FALLS`), no motors stop it to one that stands (`STOPPED`)
 #: within this time, in us, between two reports of its speed.
 AT_ONCE_US: Final = 400_000
 #: us from there until it says that it lies on the ground, or that its motors are off
@@ -265,9 +260,11 @@ class CrashWatch:
         if seen.descent >= FALLS:
             self._fell, self._impact = (now_us, seen.descent), None
         elif self._fell is not None:
-            if abs(seen.descent) <= STOPPED and now_us - self._fell[0] <= AT_ONCE_US:
-                self._impact = self._fell
-            self._fell = None
+            # an estimator takes some reports to believe that it stands
+            if now_us - self._fell[0] > AT_ONCE_US:
+                self._fell = None
+            elif abs(seen.descent) <= STOPPED:
+                self._impact, self._fell = self._fell, None
         if self._impact is None or now_us - self._impact[0] > LIES_WITHIN_US:
             return None
         if seen.airborne and seen.armed:

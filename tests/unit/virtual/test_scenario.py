@@ -349,3 +349,14 @@ def test_each_kind_of_host_and_agent_is_tried() -> None:
 def test_nothing_goes_wrong_whenever_it_happens(kind: type[Fault], at_s: int, flavour: str) -> None:
     found = flown(scenario(incident(at_s, SECOND_LONG[kind])), flavour)
     assert judge(found).failures == ()
+
+
+@pytest.mark.parametrize(("flavour", "at_s"), [("ardupilot", 50.4), ("px4", 41.35), ("px4", 36.98)])
+def test_motors_that_stop_on_the_way_down_are_no_landing(flavour: str, at_s: float) -> None:
+    """Disarmed in the air a vehicle says at once that it is on the ground, also while it lands."""
+    found = flown(scenario(incident(at_s, faults.Kill(0))), flavour, bundle=shipped("short"))
+    before = next(each for each in found.samples if each.at_us >= round(at_s * S) - 50_000)
+    assert before.up_mm > 3 * M
+    assert before.mode is faults.Mode.RETURN
+    assert found.ending == "crashed"
+    assert judge(found).failures == ()

@@ -360,3 +360,12 @@ def test_motors_that_stop_on_the_way_down_are_no_landing(flavour: str, at_s: flo
     assert before.mode is faults.Mode.RETURN
     assert found.ending == "crashed"
     assert judge(found).failures == ()
+
+
+def test_a_run_that_dies_in_its_first_record_has_no_log_to_be_judged() -> None:
+    killed = scenario(incident(0, faults.RuntimeKilled(0, 3 * S)))
+    torn = [
+        of for of in (flown(killed, seed=seed) for seed in range(1, 7)) if not of.lives[0].lines[-1].endswith(b"\n")
+    ]
+    assert torn
+    assert {each.slug for of in torn for each in judge(of).failures} == set()

@@ -8,13 +8,13 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause; PX4's where it stands anyway, or ends a climb |
+| `unseen` | motion after a takeover | ArduCopter's pause, and sticks that nudge; PX4's pause that stands, or ends a climb |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
 | `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
 | `link` | a collision, a late reaction | nothing came from the vehicle, or nothing got there |
 | `process` | a collision, flying on, an unlogged effect | our process was dead, or did not get to run |
-| `disk` | an incomplete log, an unlogged effect | the disk was full |
+| `disk` | an incomplete log, what it does not have | the disk was full |
 """
 
 from collections.abc import Callable, Iterator
@@ -82,6 +82,7 @@ class Excuses:
             "late": (self._link,),
             "log": (self._disk,),
             "unlogged-effect": (self._disk, self._killed),
+            "not-watched": (self._disk,),
         }  # fmt: skip
 
     def judged(self, failure: Failure) -> Failure:
@@ -210,13 +211,18 @@ class Excuses:
         return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
 
     def _unseen(self, failure: Failure) -> str | None:
-        """Nothing reports ArduCopter's pause. PX4's ends a climb as the climb itself does, near the height of it."""
-        if any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto, faults.PilotSticks)):
+        """Nothing reports ArduCopter's pause, nor sticks that nudge it where it lands. PX4's pause ends a climb as the
+        climb itself does, near the height of it.
+        """
+        if any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)):
+            return None
+        if self._flown.flavour == "ardupilot":
+            silent = any(self._before(failure.at_us, faults.PilotPause, faults.PilotSticks))
+            return "unseen" if silent else None
+        if any(self._before(failure.at_us, faults.PilotSticks)):
             return None
         for fault in self._before(failure.at_us, faults.PilotPause):
             sample = self._sample(fault.at_us)
-            if self._flown.flavour == "ardupilot":
-                return "unseen"
             climbs = sample is not None and sample.mode is Mode.TAKEOFF
             if sample is not None and climbs and any(abs(up - sample.up_mm) <= _SAME_MM for up in self._climbs()):
                 return "unseen"

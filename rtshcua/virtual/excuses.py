@@ -8,7 +8,7 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause, and sticks that nudge; PX4's pause that stands, or ends a climb |
+| `unseen` | motion after a takeover | ArduCopter's pause, sticks that nudge; PX4's where it stands, or ends a climb |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
 | `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |

@@ -265,14 +265,3 @@ def _value(chance: Random, kind: type[Fault], name: str, space: Space) -> object
         return chance.choice(space.roles or ("supervisor",))
     span = RANGES.get((kind, name)) or RANGES[None, name]
     return span.draw(chance)
-
-
-def undrawn() -> list[str]:
-    """The parameters of kinds that no range is stated for: none, or a campaign does not know what to draw."""
-    words = {"at_us", "way", "held", "mode", "message", "role"}
-    return [
-        f"{kind.__name__}.{each.name}"
-        for kind in set(faults.KINDS.values())
-        for each in fields(kind)
-        if each.name not in words and (kind, each.name) not in RANGES and (None, each.name) not in RANGES
-    ]

@@ -25,7 +25,7 @@ _LARGEST: Final = 1 << 16
 class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What makes a campaign the same one: a flight of this number is drawn and flown alike wherever all of it is equal.
 
-    `bundle` is the SHA-256 of what is flown, `version` that of this program.
+    `bundle` is the SHA-256 of what is flown, `kinds` those of faults that are drawn, `version` that of this program.
     """
 
     mission: str
@@ -33,6 +33,7 @@ class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bundle: str
     seed: int
     flavours: tuple[str, ...]
+    kinds: tuple[str, ...]
     version: str
 
 
@@ -59,12 +60,16 @@ class Folder:
         write_new(self.path / "campaign.json", msgspec.json.format(msgspec.json.encode(identity)) + b"\n")
 
     def past(self) -> dict[int, Result]:
-        """What was flown so far."""
+        """What was flown so far. A last line that was torn is ended, so that the next result has a line of its own."""
+        path = self.path / "results.jsonl"
         try:
-            with open_regular(self.path / "results.jsonl") as file:
-                return results.read(file)
+            with open_regular(path) as file:
+                lines = file.readlines()
         except FileNotFoundError:
             return {}
+        if lines and not lines[-1].endswith(b"\n"):
+            append(path, b"\n")
+        return results.read(lines)
 
     def keep(self, result: Result) -> None:
         """Keep a result, on the disk."""

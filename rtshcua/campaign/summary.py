@@ -44,6 +44,7 @@ class Summary(msgspec.Struct, frozen=True):
     mission: str
     campaign: int
     flights: int
+    failed: int
     flown_us: int
     took_us: int
     endings: dict[str, dict[str, int]]
@@ -53,11 +54,6 @@ class Summary(msgspec.Struct, frozen=True):
     kinds: dict[str, dict[str, int]]
     near: dict[str, dict[str, int]]
     """How often a kind of fault was near a state change."""
-
-    @property
-    def failed(self) -> int:
-        """How many flights failed."""
-        return sum(each.flights for each in self.failures)
 
 
 def summarise(mission: str, campaign: int, results: Mapping[int, Result], scenarios: Mapping[str, str]) -> Summary:
@@ -77,6 +73,7 @@ def summarise(mission: str, campaign: int, results: Mapping[int, Result], scenar
         mission,
         campaign,
         len(ordered),
+        sum(bool(each.failures) for each in ordered),
         sum(each.flown_us for each in ordered),
         sum(each.took_us for each in ordered),
         _plain(endings),
@@ -129,4 +126,4 @@ def _margins(results: Sequence[Result]) -> Iterable[Margin]:
 def as_json(summary: Summary) -> dict[str, Any]:
     """For a program."""
     made: dict[str, Any] = msgspec.to_builtins(summary)
-    return made | {"failed": summary.failed}
+    return made

@@ -76,7 +76,10 @@ def tries(scenario: Scenario) -> Iterator[Try]:
 
 
 def _reached(was: ScenarioFlown) -> Iterator[Reached]:
-    """What each decision on a step covers, as `rtshcua why` explains it from its record."""
+    """What each decision on a step covers, as `rtshcua why` explains it from its record.
+
+    One that was not decided as the step that was compiled would be is of a replacement, which covers nothing.
+    """
     policy = prepare(was.policy)
     if isinstance(policy, Refusal):  # it was flown
         return
@@ -92,4 +95,5 @@ def _reached(was: ScenarioFlown) -> Iterator[Reached]:
             if record.step < len(invocations):
                 invocation = invocations[record.step]
                 found = trace(invocation, state_of(record), policy, context_of(record), now_of(record))
-                yield reached(goals, invocation, found)
+                if (found.decision.outcome.name.lower(), found.decision.reason) == (record.outcome, record.reason):
+                    yield reached(goals, invocation, found)

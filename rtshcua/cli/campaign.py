@@ -32,6 +32,7 @@ from rtshcua.model.faults import KINDS
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario, Start
+from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import Kind
 from rtshcua.virtual import development
 from rtshcua.virtual.flight import LATER_US
@@ -95,24 +96,25 @@ def campaign(
         return findings.finish(exit_code(compiled.diagnostics))
     field = Field(development.seal(compiled.policy, compiled.mission), development.root(issued_us))
     identity = Identity(
-        compiled.mission.name, issued_us, sha256(field.bundle).hexdigest(), seed, flavours, __version__
+        compiled.mission.name, issued_us, sha256(field.bundle).hexdigest(), seed, flavours,
+        tuple(sorted(kind.__name__ for kind in kinds)), __version__,
     )  # fmt: skip
-    if begun is None:
-        folder.begin(identity)
-    elif begun != identity:
+    if begun is not None and begun != identity:
         return findings.end(_other(folder, begun, identity))
+    space = _space(field, compiled.policy, compiled.mission, flavours, kinds)
+    if isinstance(space, Refusal):
+        return findings.end(space)
     try:
         workers: Workers = Cluster(cluster) if cluster is not None else _here(jobs or cores())
     except ImportError:
         help = "install it with the extra: `pip install 'rtshcua[cluster]'`"
         return findings.refuse(ExitCode.USAGE, "usage", "`--cluster` needs Dask, which is not installed", help)
-    space = _space(field, compiled.policy, compiled.mission, flavours, kinds)
-    if isinstance(space, Refusal):
-        return findings.end(space)
-    order = Order(seed, flights, space)
-    past = folder.past()
-    progress = _Progress(flights, quiet=as_json_)
     with closing(workers):
+        if begun is None:
+            folder.begin(identity)
+        order = Order(seed, flights, space)
+        past = folder.past()
+        progress = _Progress(flights, sum(number < flights for number in past), quiet=as_json_)
         try:
             flying.fly(order, field, workers, past, lambda result: progress.flown(result, folder))
         finally:
@@ -120,7 +122,7 @@ def campaign(
             folder.tell(_summary(identity, past, flights, folder))
     wanted = {number: past[number] for number in range(flights)}
     if not quickly:
-        _shrink(order, field, wanted, past, folder, _imported(source, folder), issued_us, progress)
+        _shrink(order, field, wanted, past, folder, identity, _imported(source, folder), progress)
     summary = _summary(identity, past, flights, folder)
     folder.tell(summary)
     if not as_json_:
@@ -143,12 +145,14 @@ def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
 
 def _other(folder: Folder, begun: Identity, asked: Identity) -> Refusal:
     words = {
-        "bundle": "bundle (its sources changed)",
-        "version": "version of this program",
-        "issued_at_us": "time of issue",
+        "bundle": "another bundle (its sources changed)",
+        "flavours": "other kinds of autopilots",
+        "kinds": "other kinds of faults",
+        "version": "another version of this program",
+        "issued_at_us": "another time of issue",
     }
     differ = [name for name in Identity.__struct_fields__ if getattr(begun, name) != getattr(asked, name)]
-    what = " and ".join(f"another {words.get(name, name)}" for name in differ)
+    what = " and ".join(words.get(name, f"another {name}") for name in differ)
     help = "give another folder with `-o`, or take this one away"
     return Refusal("usage", f"`{folder.path}` holds a campaign with {what}", help)
 
@@ -160,10 +164,12 @@ def _space(
     lasts = {}
     for each in flavours:
         calm = field.fly(Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), (), ())))
-        if calm.failures:
-            first = calm.failures[0]
+        wrong = f"fails even if nothing goes wrong: {calm.failures[0].text}" if calm.failures else None
+        if wrong is None and calm.ending != Ending.COMPLETED:
+            wrong = f"ends as `{calm.ending}` even if nothing goes wrong"
+        if wrong is not None:
             help = "see it with `rtshcua run`; a campaign looks for what faults do to a flight that is good without"
-            return Refusal("usage", f"on {each} the mission fails even if nothing goes wrong: {first.text}", help)
+            return Refusal("usage", f"on {each} the mission {wrong}", help)
         lasts[each] = calm.flown_us
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
     roles = sorted({policy.roles[rule.approver] for rule in policy.rules if rule.approver >= 0})
@@ -181,8 +187,8 @@ def _imported(source: Path, folder: Folder) -> str:
 
 
 def _shrink(
-    order: Order, field: Field, wanted: Mapping[int, Result], past: Mapping[int, Result], folder: Folder, imported: str,
-    issued_us: int, progress: "_Progress",
+    order: Order, field: Field, wanted: Mapping[int, Result], past: Mapping[int, Result], folder: Folder,
+    identity: Identity, imported: str, progress: "_Progress",
 ) -> None:  # fmt: skip
     """Keep the smallest flight of each failure as a scenario, if none is kept yet."""
     first: dict[str, int] = {}
@@ -199,18 +205,11 @@ def _shrink(
             return any(each.slug == slug for each in field.fly(Flight(number, candidate)).failures)
 
         small, _ = shrink(scenario, order.space.skills, still)
-        small = replace(small, start=replace(small.start, utc_us=issued_us + LATER_US))
+        small = replace(small, start=replace(small.start, utc_us=identity.issued_at_us + LATER_US))
         failed = next(each for each in wanted[number].failures if each.slug == slug)
         comment = f"{slug}: {failed.text}\nFlight {number} of campaign {order.seed}, as small as it still fails."
-        folder.save(slug, scenario_text(small, wanted_mission(folder), imported, comment))
+        folder.save(slug, scenario_text(small, identity.mission, imported, comment))
     progress.clear()
-
-
-def wanted_mission(folder: Folder) -> str:
-    """The name of the mission that the folder's campaign flies."""
-    identity = folder.identity()
-    assert isinstance(identity, Identity)
-    return identity.mission
 
 
 def _summary(identity: Identity, past: Mapping[int, Result], flights: int, folder: Folder) -> Summary:
@@ -244,12 +243,15 @@ class _Progress:
     """How far it is, for a person who waits: on a terminal a line that changes, else one for each tenth."""
 
     flights: int
+    before: int
+    """How many were flown when it began."""
     quiet: bool
     failed: int = 0
     done: int = 0
     told: int = 0
 
     def __post_init__(self) -> None:
+        self.told = self.before * 10 // self.flights
         self._began_s = time.monotonic()
         self._shows = not self.quiet and sys.stderr is not None
         self._changes = self._shows and sys.stderr.isatty()
@@ -259,7 +261,7 @@ class _Progress:
         folder.keep(result)
         self.done += 1
         self.failed += bool(result.failures)
-        reached = result.number + 1
+        reached = self.before + self.done
         if self._changes or (self._shows and reached * 10 // self.flights > self.told):
             self.told = reached * 10 // self.flights
             self._say(f"{reached}/{self.flights} flights, {self.failed} failed, {self._left(reached)} left")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from rtshcua import library
 from rtshcua.campaign.flights import Field, Flight
@@ -165,6 +166,48 @@ def test_another_campaign_in_the_folder_is_refused(
     code, _, err = run(capsys, "--flights", "1", "-o", "made")
     assert code == ExitCode.INPUT
     assert "is not what a campaign left" in err
+
+
+def test_a_campaign_of_other_faults_does_not_go_on_in_its_folder(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(good)
+    assert run(capsys, "--flights", "1", "-o", "made", "--fault", "wind")[0] == ExitCode.OK
+    code, _, err = run(capsys, "--flights", "2", "-o", "made")
+    assert code == ExitCode.USAGE
+    assert "`made` holds a campaign with other kinds of faults" in err
+
+
+def test_a_flight_whose_line_was_torn_is_flown_again_and_no_other_is_lost(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(good)
+    assert run(capsys, "--flights", "3", "-o", "made")[0] == ExitCode.OK
+    results = Path("made/results.jsonl")
+    results.write_bytes(results.read_bytes()[:-20])
+    assert run(capsys, "--flights", "5", "-o", "made")[0] == ExitCode.OK
+    kept = [line for line in results.read_bytes().splitlines() if line.endswith(b"}")]
+    assert sorted(json.loads(line)["number"] for line in kept) == [0, 1, 2, 3, 4]
+
+
+def test_a_flight_that_fails_in_two_ways_is_one_that_failed(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    both = Failed("collision", "flew into it"), Failed("late", "came late")
+    flies(lambda _, flight: told(flight, *both) if flight.scenario.incidents else told(flight))
+    code, out, _ = run(capsys, "--flights", "2", "--no-shrink", "--json")
+    assert code == ExitCode.TESTS
+    assert json.loads(out)["campaign"]["failed"] == 2
+
+
+def test_a_mission_that_does_not_fly_without_faults_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(lambda _, flight: replace(told(flight), ending="refused"))
+    code, _, err = run(capsys)
+    assert code == ExitCode.USAGE
+    assert "on px4 the mission ends as `refused` even if nothing goes wrong" in err
+    assert not Path("runs").exists()
 
 
 def test_a_mission_that_fails_without_faults_is_refused(

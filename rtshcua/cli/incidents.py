@@ -9,7 +9,9 @@ from dataclasses import replace
 from heapq import heappop, heappush
 from pathlib import Path
 
-from rtshcua.adapters.simulator import Simulator
+from msgspec import structs
+
+from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.sources import read_sources
 from rtshcua.decision.prepare import PreparedPolicy
@@ -86,7 +88,7 @@ class Incidents:
 
     def begin(self, policy: PreparedPolicy, mission: Mission, simulator: Simulator) -> None:
         """The run begins, of this mission. Raises `Refused` where it is not the scenario's."""
-        if (mission.name, policy.policy) != (self._flight.mission.name, self._of_scenario()):
+        if _flown(mission, policy.policy) != _flown(self._flight.mission, self._of_scenario()):
             text = f"the scenario flies another mission than the bundle's `{mission.name}`, or under another policy"
             help = "the mission that it `flies` makes the bundle: compile it again from the same sources"
             raise Refused(ExitCode.USAGE, "usage", text, help)
@@ -120,5 +122,20 @@ class Incidents:
         while self._agenda and self._agenda[0][0] <= at_us:
             _, number = heappop(self._agenda)
             incident = self.scenario.incidents[number]
-            self.happened.append(f"{at_us / 1_000_000:.2f} s {incident.text}")
-            self._simulator.inject(fault_words(replace(incident.fault, at_us=0)))
+            told = f"{at_us / 1_000_000:.2f} s {incident.text}"
+            try:
+                self._simulator.inject(fault_words(replace(incident.fault, at_us=0)))
+            except SimulatorError as error:  # the run finds out by itself, as it would of any vehicle that is gone
+                told += f": {error}"
+            self.happened.append(told)
+
+
+def _flown(mission: Mission, policy: Policy) -> tuple[object, ...]:
+    """What two missions have in common that fly alike: a scenario's is not bound, so it has no ids; nor does it matter
+    what the files are called.
+    """
+    steps = [
+        (each.skill, each.phase, each.source, each.role, each.arguments, each.on_inadmissible)
+        for each in mission.invocations
+    ]
+    return mission.name, steps, structs.replace(policy, sources=())

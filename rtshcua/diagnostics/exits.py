@@ -25,7 +25,11 @@ class ExitCode(IntEnum):
     INCOMPLETE = 10, "incomplete", "the log verifies as far as it goes, but lacks its close, or the anchor asked for"
     DECISION = 11, "decision", "the log is whole and signed, but a decision does not derive or a command had no record"
     ANCHOR = 12, "anchor", "the log contradicts what a witness cosigned: it was rewritten or cut"
-    TESTS = 13, "tests", "a test of the sources fails, none was found, or they cover less than is asked"
+    TESTS = (
+        13,
+        "tests",
+        "a test, a scenario or a flight of a campaign fails, no test was found, or they cover less than is asked",
+    )
     CRASHED = 14, "crashed", "the vehicle came down as no landing does; nothing more was sent to it"
     FAULT = 70, "fault", "an internal fault, never your input: please report it"
     FULL = 74, "io", "writing failed: disk full, device error, or a closed pipe"

@@ -298,7 +298,7 @@ class Conduct:
             if runs and step is not None and supervisor is None:
                 supervisor = Supervisor(self._invocations[step.step], self._policy, step.since_us + start_us)
                 found, stood_us = None, None
-            silent = any(since_us <= at_us < until_us for since_us, until_us in silences)
+            silent = any(since_us <= at_us < until_us for since_us, until_us, _ in silences)
             if runs and silent and stood_us is None:
                 stood_us = at_us
             if runs and not silent and stood_us is not None and supervisor is not None:
@@ -316,8 +316,10 @@ class Conduct:
             if found is None:
                 found = supervisor.violated(monitor.state(now.monotonic_us), now)
             ended_us = step.until_us
-            if found is not None and (ended_us is None or ended_us > at_us + bound_us):
-                if ended_us is not None or life.ended_us > at_us + bound_us:
+            late_us = at_us + bound_us
+            late_us += sum(more_us for _, until_us, more_us in silences if step.since_us < until_us <= at_us)
+            if found is not None and (ended_us is None or ended_us > late_us):
+                if ended_us is not None or life.ended_us > late_us:
                     end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
                     if not self._excused(at_us, silences, bound_us):
                         yield Failure("not-watched", at_us, f"step {step.step} rests on `{found}`, and {end}")
@@ -325,22 +327,27 @@ class Conduct:
             elif ended_us == at_us and step.how == "violated" and found is None:
                 yield Failure("needless", at_us, f"step {step.step} was broken off, and as heard holds: {step.detail}")
 
-    def _excused(self, at_us: int, silences: Sequence[tuple[int, int]], bound_us: int) -> bool:
-        return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in silences)
+    def _excused(self, at_us: int, silences: Sequence[tuple[int, int, int]], bound_us: int) -> bool:
+        return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us, _ in silences)
 
-    def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int]]:
-        """From when a link was lost until state was judged again."""
+    def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int, int]]:
+        """From when a link was lost until state was judged again, and for how long after that what was not reported yet
+        may still be waited for.
+        """
         since_us: int | None = None
+        back_us = 0
         for record in records:
             if record["type"] != "effect":
                 continue
             if record["event"] == "link-lost" and since_us is None:
                 since_us = self._at(record)
+            elif record["event"] == "link-back":
+                back_us = self._at(record)
             elif record["event"] in ("fresh", "not-fresh") and since_us is not None:
-                yield since_us, self._at(record)
+                yield since_us, self._at(record), max(0, back_us + self._limits.fresh_us - self._at(record))
                 since_us = None
         if since_us is not None:
-            yield since_us, 1 << 60
+            yield since_us, 1 << 60, 0
 
     # -------------------------------------------------------- chains
 
@@ -389,7 +396,7 @@ class Conduct:
         """A step that goes nowhere near home ends at once."""
         bound_us = self._flown.wait_us + 2 * self._flown.tick_us
         silent = any(
-            since_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in self._silences(records)
+            since_us <= at_us + bound_us and at_us <= until_us for since_us, until_us, _ in self._silences(records)
         )
         for flight in flights:
             if flight.kind != STEP or flight.motion in _HOMEWARD or silent:

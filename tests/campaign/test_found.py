@@ -1,5 +1,7 @@
 """What campaigns found, as small as it became: each failed once."""
 
+import json
+
 from campaign.flying import flown
 from campaign.test_wrong import at, of, slugs
 from rtshcua.model import faults
@@ -18,3 +20,11 @@ def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one()
     """The judge took the stop that followed for the late frame itself."""
     was = flown(of("px4", at(9.8, faults.MessageSilence(0, "HEARTBEAT", 3 * S))))
     assert (was.ending, slugs(was)) == ("aborted", set())
+
+
+def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_as_much_later() -> None:
+    """The judge let a grace run on as soon as all but what was frozen at the source was fresh."""
+    was = flown(of("px4", at(9.5, faults.Freeze(0)), at(13.2, faults.Stall(0, 5_300_000, 638))))
+    events = {json.loads(line).get("event") for life in was.lives for line in life.lines}
+    assert {"fresh", "violated"} <= events
+    assert slugs(was) == set()

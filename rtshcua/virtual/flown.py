@@ -103,6 +103,8 @@ class ScenarioFlown:
     root: bytes
     """The name of the key that signed the trust root: what an audit is pinned to."""
     start_us: int
+    utc_us: int
+    """What time it really was at the simulation's start, whatever any clock showed."""
     tick_us: int
     wait_us: int
     lives: tuple[Life, ...]

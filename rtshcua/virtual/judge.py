@@ -6,7 +6,7 @@ whether their decisions are derived again; what the logs say is then held agains
 
 | slug | is a failure |
 |---|---|
-| `outside-fence` | it was outside the policy's airspace. Zones that exist at times only are left out |
+| `outside-fence` | it was outside the policy's airspace, of which each zone counts while it is there |
 | `collision` | it flew into something, or came down too hard |
 | `motion-after-takeover` | a frame that moves it was sent later than W (docs/adr/0034) after somebody took over |
 | `not-ended` | at the end it neither rests on the ground nor stands still in the air |
@@ -26,7 +26,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, inf, sqrt
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -143,21 +143,55 @@ def _rings(zone: Zone) -> list[list[tuple[int, int]]]:
     return rings
 
 
-def airspace_mm(policy: Policy, x: float, y: float, up: float) -> float:
-    """How far inside the airspace a point is, in mm; negative: outside. Infinite where there is none."""
-    airspace = policy.airspace
-    if airspace is None:
-        return inf
-    inside = [zone for number in airspace.inside if not _at_times(zone := policy.zones[number])]
-    outside = [zone for number in airspace.outside if not _at_times(zone := policy.zones[number])]
-    return min(
-        (*(inside_mm(zone, x, y, up) for zone in inside), *(-inside_mm(zone, x, y, up) for zone in outside)),
-        default=inf,
+class Airspace(NamedTuple):
+    """The zones that must be kept, and those that must be kept out of."""
+
+    inside: tuple[Zone, ...]
+    outside: tuple[Zone, ...]
+
+
+def airspace(policy: Policy, utc_us: int) -> Airspace:
+    """Those that are there at a time. Within a second of its first or last moment a zone is there if it must be kept,
+    and is not there if it must be kept out of: no clock is truer than that.
+    """
+    stated = policy.airspace
+    if stated is None:
+        return Airspace((), ())
+
+    def there(number: int, slack_us: int) -> bool:
+        zone = policy.zones[number]
+        return _exists(zone, utc_us, policy.vehicle.utc_offset_us, slack_us)
+
+    return Airspace(
+        tuple(policy.zones[number] for number in stated.inside if there(number, _SLACK_US)),
+        tuple(policy.zones[number] for number in stated.outside if there(number, -_SLACK_US)),
     )
 
 
-def _at_times(zone: Zone) -> bool:
-    return bool(zone.daily or zone.dates)
+_SLACK_US: Final = 1_000_000
+_DAY_US: Final = 86_400_000_000
+
+
+def _exists(zone: Zone, utc_us: int, utc_offset_us: int, slack_us: int) -> bool:
+    if zone.dates and not zone.dates[0] - slack_us <= utc_us <= zone.dates[1] + slack_us:
+        return False
+    if not zone.daily:
+        return True
+    start, end = zone.daily
+    begins_us = start - slack_us
+    lasts_us = (end - start) % _DAY_US + 2 * slack_us
+    return (utc_us + utc_offset_us - begins_us) % _DAY_US <= lasts_us
+
+
+def airspace_mm(there: Airspace, x: float, y: float, up: float) -> float:
+    """How far inside the airspace a point is, in mm; negative: outside. Infinite where there is none."""
+    return min(
+        (
+            *(inside_mm(zone, x, y, up) for zone in there.inside),
+            *(-inside_mm(zone, x, y, up) for zone in there.outside),
+        ),
+        default=inf,
+    )
 
 
 def local_mm(policy: Policy, latitude: int, longitude: int) -> tuple[float, float]:
@@ -174,6 +208,11 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
     Between two places that are d apart the distance to an edge changes by d at most: what is far inside for sure is
     not worked out.
     """
+    stated = flown.policy.airspace
+    if stated is None:
+        return [], None
+    timed = any(zone.daily or zone.dates for zone in (flown.policy.zones[n] for n in (*stated.inside, *stated.outside)))
+    there = airspace(flown.policy, flown.utc_us)
     worst, found = inf, list[Failure]()
     x0 = y0 = up0 = 0.0
     known = -inf  # how far inside it was at x0, y0, up0
@@ -182,11 +221,18 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
             break
         if not sample.in_air:
             continue
+        if timed and (now := airspace(flown.policy, flown.utc_us + sample.at_us)) != there:
+            there, known = now, -inf
+        if len(there.inside) < len(stated.inside):
+            found.append(
+                Failure("outside-fence", sample.at_us, "it is in the air while a zone that it must keep is not there")
+            )
+            continue
         x, y = local_mm(flown.policy, sample.latitude, sample.longitude)
         if known - hypot(x - x0, y - y0, sample.up_mm - up0) > max(worst, 0):
             continue
         x0, y0, up0 = x, y, float(sample.up_mm)
-        known = airspace_mm(flown.policy, x, y, up0)
+        known = airspace_mm(there, x, y, up0)
         worst = min(worst, known)
         if known < 0:
             place = f"{x / 1000:.1f} m east and {y / 1000:.1f} m north of home, {up0 / 1000:.1f} m up"

@@ -470,6 +470,7 @@ class _Flight:
             mission=bundle.mission,
             root=cose.unverified(self._root, limit=MAX_ROOT).kid,
             start_us=START.monotonic_us,
+            utc_us=self._utc_us,
             tick_us=self._tick_us,
             wait_us=WAIT_US,
             lives=tuple(self._lives),

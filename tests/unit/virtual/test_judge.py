@@ -114,11 +114,50 @@ def test_outside_the_airspace(good: ScenarioFlown) -> None:
     assert slugs(judged(good, [sample(10, 700, in_air=False)])) == []
 
 
-def test_a_zone_that_is_only_there_at_times_is_left_out(good: ScenarioFlown) -> None:
+HOUR = 3_600 * S
+NOON = 1_780_315_200 * S  # UTC; the policy's local time is that of its offset
+
+
+def _with_times(good: ScenarioFlown, number: int, **times: tuple[int, int]) -> Any:
     zones = list(good.policy.zones)
-    zones[case.flat.SCHOOL] = with_fields(zones[case.flat.SCHOOL], daily=(0, 1))
-    policy = with_fields(good.policy, zones=tuple(zones))
-    assert slugs(judged(good, [sample(10, north_m=250)], policy=policy)) == []
+    zones[number] = with_fields(zones[number], **times)
+    vehicle = with_fields(good.policy.vehicle, utc_offset_us=2 * HOUR)
+    return with_fields(good.policy, zones=tuple(zones), vehicle=vehicle)
+
+
+@pytest.mark.parametrize(
+    ("times", "there"),
+    [
+        ({"daily": (13 * HOUR, 15 * HOUR)}, True),
+        ({"daily": (11 * HOUR, 13 * HOUR)}, False),
+        ({"daily": (22 * HOUR, 15 * HOUR)}, True),  # over midnight
+        ({"daily": (15 * HOUR, 13 * HOUR)}, False),
+        ({"daily": (14 * HOUR + 11 * S, 15 * HOUR)}, False),  # a second from now
+        ({"daily": (14 * HOUR + 8 * S, 15 * HOUR)}, True),
+        ({"dates": (NOON, NOON + HOUR)}, True),
+        ({"dates": (NOON + HOUR, NOON + 2 * HOUR)}, False),
+        ({"dates": (NOON, NOON + HOUR), "daily": (13 * HOUR, 15 * HOUR)}, True),
+        ({"dates": (NOON, NOON + HOUR), "daily": (11 * HOUR, 13 * HOUR)}, False),
+    ],
+)
+def test_a_zone_is_kept_out_of_while_it_is_there(good: ScenarioFlown, times: Any, there: bool) -> None:
+    policy = _with_times(good, case.flat.SCHOOL, **times)
+    found = slugs(judged(good, [sample(10, north_m=250)], policy=policy, utc_us=NOON))
+    assert found == ["outside-fence"] * there
+
+
+def test_it_counts_when_a_zone_comes_while_it_flies(good: ScenarioFlown) -> None:
+    policy = _with_times(good, case.flat.SCHOOL, dates=(NOON + 20 * S, NOON + HOUR))
+    samples = [sample(at_s, north_m=250) for at_s in (10, 15, 22, 25)]
+    found = judged(good, samples, policy=policy, utc_us=NOON).failures
+    assert [(each.slug, each.at_us) for each in found] == [("outside-fence", 22 * S)]
+
+
+def test_whoever_flies_while_a_zone_that_must_be_kept_is_not_there_is_outside(good: ScenarioFlown) -> None:
+    (inside,) = good.policy.airspace.inside  # type: ignore[union-attr]
+    policy = _with_times(good, inside, dates=(NOON, NOON + 15 * S))
+    found = judged(good, [sample(10), sample(20)], policy=policy, utc_us=NOON).failures
+    assert [(each.slug, each.at_us) for each in found] == [("outside-fence", 20 * S)]
 
 
 @pytest.mark.parametrize(

@@ -279,8 +279,22 @@ class Conduct:
         decision = next((record for record in records if record["type"] == "decision"), None)
         if not steps or not life.turns or decision is None:
             return
-        ahead_us = decision["utc_us"] - decision["at_us"]
         silences = list(self._silences(records))
+        judged = [(since_us, until_us) for since_us, until_us, _ in silences]
+        waited = [(since_us, until_us + more_us) for since_us, until_us, more_us in silences]
+        late = self._supervised(life, decision, steps, waited)
+        early = late if judged == waited else self._supervised(life, decision, steps, judged)
+        if early is late:
+            yield from late
+        else:
+            yield from (each for each in late if each.slug == "not-watched")
+            yield from (each for each in early if each.slug == "needless")
+
+    def _supervised(
+        self, life: Life, decision: Record, steps: Sequence[Flight], silences: Sequence[tuple[int, int]]
+    ) -> Iterator[Failure]:
+        """What the steps rest on, by what was heard; nothing is judged in the silences."""
+        ahead_us = decision["utc_us"] - decision["at_us"]
         monitor = StateMonitor(self._policy)
         queue = iter(steps)
         step = next(queue, None)
@@ -298,7 +312,7 @@ class Conduct:
             if runs and step is not None and supervisor is None:
                 supervisor = Supervisor(self._invocations[step.step], self._policy, step.since_us + start_us)
                 found, stood_us = None, None
-            silent = any(since_us <= at_us < until_us for since_us, until_us, _ in silences)
+            silent = any(since_us <= at_us < until_us for since_us, until_us in silences)
             if runs and silent and stood_us is None:
                 stood_us = at_us
             if runs and not silent and stood_us is not None and supervisor is not None:
@@ -316,10 +330,8 @@ class Conduct:
             if found is None:
                 found = supervisor.violated(monitor.state(now.monotonic_us), now)
             ended_us = step.until_us
-            late_us = at_us + bound_us
-            late_us += sum(more_us for _, until_us, more_us in silences if step.since_us < until_us <= at_us)
-            if found is not None and (ended_us is None or ended_us > late_us):
-                if ended_us is not None or life.ended_us > late_us:
+            if found is not None and (ended_us is None or ended_us > at_us + bound_us):
+                if ended_us is not None or life.ended_us > at_us + bound_us:
                     end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
                     if not self._excused(at_us, silences, bound_us):
                         yield Failure("not-watched", at_us, f"step {step.step} rests on `{found}`, and {end}")
@@ -327,8 +339,8 @@ class Conduct:
             elif ended_us == at_us and step.how == "violated" and found is None:
                 yield Failure("needless", at_us, f"step {step.step} was broken off, and as heard holds: {step.detail}")
 
-    def _excused(self, at_us: int, silences: Sequence[tuple[int, int, int]], bound_us: int) -> bool:
-        return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us, _ in silences)
+    def _excused(self, at_us: int, silences: Sequence[tuple[int, int]], bound_us: int) -> bool:
+        return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in silences)
 
     def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int, int]]:
         """From when a link was lost until state was judged again, and for how long after that what was not reported yet

@@ -5,6 +5,8 @@ import json
 from campaign.flying import flown
 from campaign.test_wrong import at, of, slugs
 from rtshcua.model import faults
+from rtshcua.model.faults import Way
+from rtshcua.virtual.flown import ScenarioFlown
 
 S = 1_000_000
 
@@ -24,7 +26,14 @@ def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one()
 
 def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_as_much_later() -> None:
     """The judge let a grace run on as soon as all but what was frozen at the source was fresh."""
-    was = flown(of("px4", at(9.5, faults.Freeze(0)), at(13.2, faults.Stall(0, 5_300_000, 638))))
-    events = {json.loads(line).get("event") for life in was.lives for line in life.lines}
-    assert {"fresh", "violated"} <= events
-    assert slugs(was) == set()
+    for_good = flown(of("px4", at(9.5, faults.Freeze(0)), at(13.2, faults.Stall(0, 5_300_000, 638))))
+    assert {"fresh", "violated"} <= events(for_good)
+    assert slugs(for_good) == set()
+    silence = at(50.1, faults.LinkSilence(0, 1_500_000, Way.BOTH, held=True))
+    for_a_while = flown(of("ardupilot", silence, at(50, faults.Freeze(0, 7 * S))))
+    assert "fresh" in events(for_a_while)
+    assert slugs(for_a_while) == set()
+
+
+def events(was: ScenarioFlown) -> set[str]:
+    return {json.loads(line).get("event") for life in was.lives for line in life.lines}

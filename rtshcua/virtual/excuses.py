@@ -214,7 +214,9 @@ class Excuses:
         """Nothing reports ArduCopter's pause, nor sticks that nudge it where it lands. PX4's pause ends a climb as the
         climb itself does, near the height of it.
         """
-        if any(self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)):
+        since_us = failure.at_us - failure.amount - _TICK_US  # what a pilot told it before changed nothing
+        told = self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)
+        if any(fault.at_us >= since_us for fault in told):
             return None
         if self._flown.flavour == "ardupilot":
             silent = any(self._before(failure.at_us, faults.PilotPause, faults.PilotSticks))

@@ -382,7 +382,10 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
     assert "motion-after-takeover" in slugs(paused("px4", 3))
     stop = Frame(S, S, reposition(0x7FFFFFFF, 0x7FFFFFFF))
     assert causes(paused("px4", 1, frames=(stop, frame))) == [("motion-after-takeover", "unseen")]
-    assert "motion-after-takeover" in slugs(paused("px4", 4.5, faults.PilotMode(S)))
+    assert "motion-after-takeover" in slugs(paused("px4", 4.5, faults.PilotMode(frame.sent_us - 4 * S)))
+    assert causes(paused("px4", 4.5, faults.PilotGoto(S, 0, 0, 0))) == [
+        ("motion-after-takeover", "unseen")
+    ]  # before the pause
 
 
 @pytest.mark.parametrize("left", ["replayed", "no-vehicle"])

@@ -452,22 +452,23 @@ class Conduct:
                     yield Failure("release", self._at(record), text, abs(given - released))
 
     def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[Failure]:
-        """What only steps send leaves after the record of such a step's decision was kept."""
+        """What only steps send leaves after the record of the last such step's decision was kept."""
         policy = self._flown.policy
         links = {policy.contracts[link.skill].motion.kind for link in policy.contingency}
         links |= {policy.contracts[link.skill].motion.kind for c in policy.contracts for link in c.fallback}
         links |= {policy.contracts[r.target.skill].motion.kind for r in policy.rules if r.target is not None}
-        allowed: list[tuple[int, MotionKind]] = []
+        allowed: list[tuple[int, int, MotionKind]] = []  # when it was decided, when that was kept, what then flies
         for number, record in enumerate(records[: len(life.kept_us)]):
             if record["type"] == "decision" and record["kind"] == STEP and record["outcome"] == "allow":
                 kind = MotionKind(self._flown.mission.invocations[record["step"]].contract.motion.kind)
-                allowed.append((life.kept_us[number], kind))
-        kept = [kept_us for kept_us, _ in allowed]
+                allowed.append((self._at(record), life.kept_us[number], kind))
+        decided = [decided_us for decided_us, _, _ in allowed]
         for frame, parts in self._motion:
             if not life.began_us <= frame.sent_us <= life.ended_us or not parts or not parts <= _ONLY_STEPS - links:
                 continue
-            at = bisect_right(kept, frame.sent_us) - 1
-            if at < 0 or allowed[at][1] not in parts:
+            at = bisect_right(decided, frame.sent_us) - 1
+            _, kept_us, kind = allowed[at] if at >= 0 else (0, frame.sent_us + 1, MotionKind.HOLD)
+            if kept_us > frame.sent_us or kind not in parts:
                 text = "a frame of a step was sent before the record of its decision was kept"
                 yield Failure("unrecorded", frame.sent_us, text)
                 return

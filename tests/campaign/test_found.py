@@ -37,3 +37,9 @@ def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_a
 
 def events(was: ScenarioFlown) -> set[str]:
     return {json.loads(line).get("event") for life in was.lives for line in life.lines}
+
+
+def test_motors_that_stop_low_in_a_takeoff_are_no_landing_before_it_lies_there() -> None:
+    """Below 3 m it counted as landed as soon as it was slow, which what rises is before it falls."""
+    for kills_s in (6.3, 6.68, 7.3):
+        assert slugs(flown(of("ardupilot", at(kills_s, faults.Kill(0))))) == set()

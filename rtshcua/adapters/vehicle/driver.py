@@ -234,11 +234,20 @@ class Driver:
             case _ if name in _OF_PREFLIGHT and self._is_for_us(message):
                 send += self.preflight.take(name, message, self.system, now_us)
         if new and self.seen.landed_state:
-            air = (self.seen.armed, self.seen.airborne)
-            if air != self._was_air:
-                self._was_air = air
-                events.append(ports.AirState(now_us, *air))
+            self._tell_air(now_us, events)
         return new or (name != "ATTITUDE" and self._asks)
+
+    def _tell_air(self, now_us: int, events: list[Event]) -> None:
+        """Whether it is armed and in the air. What is disarmed in the air says at once that it is on the ground: it
+        counts as in the air until it is seen to lie there.
+        """
+        seen, was = self.seen, self._was_air
+        if was is not None and was[1] and seen.down and not seen.rests:
+            return
+        air = (seen.armed, seen.airborne)
+        if air != was:
+            self._was_air = air
+            events.append(ports.AirState(now_us, *air))
 
     @property
     def _asks(self) -> bool:

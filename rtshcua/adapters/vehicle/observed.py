@@ -320,7 +320,7 @@ class ObservedVehicle:
         is_silent = (self.heartbeat_us or 0) - max(self.placed_us, self.down_us) >= STALE_US
         if abs(self.descent) > STOPPED:
             return is_silent  # nothing reports how fast it moves any more
-        return self.height < ABOVE or self.placed_us >= self.down_us + SETTLES_US or is_silent
+        return self.placed_us >= self.down_us + SETTLES_US or is_silent
 
     @property
     def unready(self) -> str | None:

@@ -53,7 +53,7 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
     (11, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
     (7, (faults.Obstacle, faults.Pillar)),
     (12, (faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotSticks, faults.Kill)),
-    (12, (faults.RuntimeKilled, faults.HostStall, faults.DiskFull, faults.ClockStep)),
+    (12, (faults.RuntimeKilled, faults.HostStall, faults.DiskFull, faults.DiskStall, faults.ClockStep)),
     (12, (faults.Approval, faults.Disapproval, faults.Recall, faults.Replacement, faults.Babble)),
 )  # fmt: skip
 
@@ -110,6 +110,7 @@ RANGES: Final[Mapping[tuple[type[Fault] | None, str], Range]] = {
     (faults.Pillar, "speed_mm_s"): Range(0, 2_000, 500),
     (faults.RuntimeKilled, "for_us"): Range(500_000, 20 * S, 500_000, by_ratio=True),
     (faults.HostStall, "for_us"): Range(100_000, 8 * S, 100_000, by_ratio=True),
+    (faults.DiskStall, "for_us"): Range(100_000, 20 * S, 100_000, by_ratio=True),
     (faults.Stall, "for_us"): Range(200_000, 20 * S, 100_000, by_ratio=True),
     (faults.StaleSource, "delay_us"): Range(200_000, 8 * S, 100_000, by_ratio=True),
     (faults.Babble, "copies"): Range(5, 200, 5, by_ratio=True),

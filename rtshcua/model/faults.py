@@ -355,6 +355,15 @@ class DiskFull(HostFault):
 
 
 @dataclass(frozen=True, slots=True)
+class DiskStall(HostFault):
+    """The disk takes records and does not get on with them, as a memory card may for seconds: none is kept before it is
+    over.
+    """
+
+    for_us: int
+
+
+@dataclass(frozen=True, slots=True)
 class ClockStep(HostFault):
     """The machine's time of day is set: ahead by this much, or back."""
 
@@ -431,6 +440,7 @@ KINDS: Mapping[str, type[Fault]] = {
     "runtime-killed": RuntimeKilled,
     "host-stall": HostStall,
     "disk-full": DiskFull,
+    "disk-stall": DiskStall,
     "clock-step": ClockStep,
     "approve": Approval,
     "refuse": Disapproval,

@@ -14,7 +14,7 @@
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
 | `link` | a collision, a late reaction | nothing came from the vehicle, or nothing got there |
 | `process` | a collision, flying on, an unlogged effect | our process was dead, or did not get to run |
-| `disk` | an incomplete log, what it does not have | the disk was full |
+| `disk` | an incomplete log, what it does not have | the disk was full, or took its time |
 """
 
 from collections.abc import Callable, Iterator
@@ -318,8 +318,8 @@ class Excuses:
     def _disk(self, failure: Failure) -> str | None:
         if failure.slug == "log" and not failure.text.startswith("incomplete"):
             return None
-        for fault in self._before(failure.at_us, faults.DiskFull):
-            assert isinstance(fault, faults.DiskFull)
+        for fault in self._before(failure.at_us, faults.DiskFull, faults.DiskStall):
+            assert isinstance(fault, faults.DiskFull | faults.DiskStall)
             if fault.for_us is None or failure.at_us <= fault.at_us + fault.for_us:
                 return "disk"
         return None

@@ -44,11 +44,11 @@ class ReadableSink(EvidenceSink, Protocol):
 
 
 class MemorySink:
-    """Evidence in a list; `full` makes it refuse, keeping the lines as the file does."""
+    """Evidence in a list; `full` makes it refuse, keeping the lines as the file does; `slow`, wait for `keep`."""
 
     def __init__(self) -> None:
         self.lines: list[bytes] = []
-        self.full = False
+        self.full = self.slow = False
         self._waiting: list[bytes] = []
 
     @property
@@ -63,20 +63,27 @@ class MemorySink:
         self._waiting.append(line)
         if self.full:
             raise OSError(ENOSPC, "no space left on device")
+        if not self.slow:
+            self.keep()
+        return len(self.lines) + len(self._waiting)
+
+    def keep(self) -> None:
+        """What waits is kept."""
         self.lines += self._waiting
         self._waiting.clear()
-        return len(self.lines)
 
     def trouble(self) -> str | None:
         """None: nothing is written behind one's back."""
         return None
 
     def late(self) -> str | None:
-        """None: nothing takes time."""
+        """None: nothing is promised."""
         return None
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Waits until all is kept that can be."""
+        if not self.full:
+            self.keep()
 
 
 @dataclass

@@ -16,6 +16,7 @@ from traceback import format_exception
 from typing import Any, Final
 
 from rtshcua.adapters.clock import StepWatch
+from rtshcua.adapters.files.writer import Lateness
 from rtshcua.adapters.packs import manoeuvres, packs_of
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.recovery import RECOVERABLE, Examination, ending
@@ -96,12 +97,22 @@ class _Sink(MemorySink):
         self.written = 0  # lines that were kept before the last turn
         self.kept_us: list[int] = []
         self._clock = clock
+        self._lateness = Lateness()
 
     def append(self, line: bytes, durability: int) -> int:
-        try:
-            return super().append(line, durability)
-        finally:
-            self.kept_us += [self._clock.elapsed_us] * (self.kept - len(self.kept_us))
+        given = super().append(line, durability)
+        self._lateness.given(given, durability)
+        return given
+
+    def keep(self) -> None:
+        super().keep()
+        self.kept_us += [self._clock.elapsed_us] * (self.kept - len(self.kept_us))
+
+    def trouble(self) -> str | None:
+        return self._lateness.stuck(self.kept, self._clock.elapsed_us / SECOND)
+
+    def late(self) -> str | None:
+        return self._lateness.late(self.kept, self._clock.elapsed_us / SECOND)
 
 
 class _Watched(Simulation):
@@ -163,6 +174,7 @@ class _Flight:
         self._configs: list[SimulationConfig] = []
         self._stepped_us = 0  # by how much the machine's time of day was set
         self._full_until_us: int | None = 0  # None: for good
+        self._slow_until_us = 0
         self._lives: list[Life] = []
         self._happened: list[Happened] = []
         self._notes: list[str] = []
@@ -292,7 +304,10 @@ class _Flight:
     def _check_disk(self) -> _Sink:
         sink = self._flight.sink
         assert isinstance(sink, _Sink)
-        sink.full = self._is_full()
+        sink.full, was_slow = self._is_full(), sink.slow
+        sink.slow = self._flight.clock.elapsed_us < self._slow_until_us
+        if was_slow and not sink.slow and not sink.full:
+            sink.keep()
         return sink
 
     def _is_full(self) -> bool:
@@ -338,6 +353,9 @@ class _Flight:
                 self._flight.vehicle.stand_still(for_us)
             case faults.DiskFull(at_us, for_us):
                 self._full_until_us = None if for_us is None else at_us + for_us
+                self._check_disk()
+            case faults.DiskStall(at_us, for_us):
+                self._slow_until_us = at_us + for_us
                 self._check_disk()
             case faults.ClockStep(_, by_us):
                 self._stepped_us += by_us
@@ -401,7 +419,7 @@ class _Flight:
             at_us, number = heappop(self._agenda)
             incident = self._scenario.incidents[number]
             fault = replace(incident.fault, at_us=at_us)
-            if isinstance(fault, faults.DiskFull | faults.ClockStep):
+            if isinstance(fault, faults.DiskFull | faults.DiskStall | faults.ClockStep):
                 self._happened.append(Happened(number, at_us, fault, incident.text))
                 self._hurt(fault)
         self._babble = []

@@ -25,7 +25,7 @@ from rtshcua.model.scenario import (
 )
 from rtshcua.virtual.expectations import expectations
 from rtshcua.virtual.flown import ScenarioFlown
-from rtshcua.virtual.judge import judge
+from rtshcua.virtual.judge import judge, moves
 from virtual import case
 from virtual.once import once
 from virtual.sampling import each_once
@@ -178,6 +178,19 @@ def test_a_full_disk() -> None:
     a_while = flown(scenario(incident(17, faults.DiskFull(0, 2 * S))))
     assert {"gap", "gap-over"} <= set(events(a_while))
     nothing_wrong(a_while)
+
+
+def test_a_step_waits_for_a_disk_that_takes_its_time() -> None:
+    slow = flown(scenario(incident(17, faults.DiskStall(0, 2 * S))))
+    (life,) = slow.lives
+    assert slow.ending == "completed"
+    assert len(life.kept_us) == len(life.lines)
+    waited = [each for each in life.kept_us if 17 * S <= each < 20 * S]
+    (kept_us,) = set(waited)
+    assert kept_us >= 19 * S
+    sent = [frame.sent_us for frame in slow.frames if (moves(frame.octets, "px4") or ()) and frame.sent_us > 17 * S]
+    assert sent[0] >= kept_us, "the step that came due waits"
+    nothing_wrong(slow)
 
 
 def test_a_clock_that_is_set_moves_nothing_and_is_told() -> None:

@@ -52,6 +52,11 @@ def measuring(config: pytest.Config) -> Any:
     return getattr(config.pluginmanager.getplugin("_cov"), "cov_controller", None)
 
 
+def deals_out(config: pytest.Config) -> bool:
+    """Whether this process runs no test itself, but has others run them."""
+    return not hasattr(config, "workerinput") and bool(config.getoption("numprocesses", None))
+
+
 #: folders of what is installed that no process imports from
 NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "test", "tests")
 
@@ -84,12 +89,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """pytest-cov begins twice in a test process of xdist; what it measures first, nobody reads. End that one.
+    """With xdist pytest-cov begins once too often in a test process, and also where none is run. End those.
 
-    It would take over wherever a test is not to be measured, so that all were traced, at three times the price.
+    The first would take over wherever a test is not to be measured, so that all were traced, at three times the price;
+    the other traces whoever deals out the tests and reads the reports.
     """
     controller = measuring(session.config)
-    if hasattr(session.config, "workerinput") and controller is not None:
+    if controller is not None and (hasattr(session.config, "workerinput") or deals_out(session.config)):
         controller.cov.stop()
 
 
@@ -113,16 +119,49 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 def collected(session: pytest.Session) -> Generator[None, object, object]:
     """Collect, measuring no more than what is covered."""
     controller = measuring(session.config)
-    if controller is None:
+    if controller is None or deals_out(session.config):
         return (yield)
     for package in map(import_module, COVERED):
         for module in walk_packages(package.__path__, f"{package.__name__}."):
             import_module(module.name)
     controller.pause()
-    try:
-        return (yield)
-    finally:
-        controller.resume()
+    session.config.pluginmanager.register(Measured(controller.cov))
+    return (yield)
+
+
+class Measured:
+    """Measures tests that cover, and the fixtures that are made for them, but not what runs them.
+
+    To begin and to end is cheap; pytest itself, traced, takes longer than most of these tests.
+    """
+
+    def __init__(self, coverage: Any) -> None:
+        self._coverage = coverage
+        self._wanted = False
+        self._begun = False
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        self._wanted = item.get_closest_marker("unmeasured") is None
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self) -> Generator[None, object, object]:
+        return (yield from self._measured())
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_pyfunc_call(self) -> Generator[None, object, object]:
+        return (yield from self._measured())
+
+    def _measured(self) -> Generator[None, object, object]:
+        if self._begun or not self._wanted:  # a fixture may ask for another one
+            return (yield)
+        self._begun = True
+        self._coverage.start()
+        try:
+            return (yield)
+        finally:
+            self._coverage.stop()
+            self._begun = False
 
 
 class Turned(pytest.Dir):
@@ -170,7 +209,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     covering = {path for path in places if any(path.is_relative_to(tests / folder) for folder in COVERING)}
     for item in items:
         if item.path not in covering or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
-            item.add_marker("no_cover")
+            item.add_marker("unmeasured")
 
 
 @pytest.fixture

@@ -270,7 +270,7 @@ def test_a_replacement_whose_kept_steps_differ_is_not_signed() -> None:
         sign_replacement(mission, over=OF.bundle, kept=2, key=MISSION_KEY)
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_one_flight_takes_so_many_replacements_and_no_more() -> None:
     of = flight()
     for number in range(MAX_REPLACEMENTS):

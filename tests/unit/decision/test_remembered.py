@@ -57,7 +57,7 @@ def prepared() -> Any:
     return policy
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_answers_are_those_of_a_policy_that_was_never_asked() -> None:
     chance = Random(3)
     asked = prepared()

@@ -98,7 +98,7 @@ def test_by_hand(given: tuple[Ring, ...], expected: str | None) -> None:
     assert found == expected or (expected is not None and found is not None and found.startswith(expected))
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_a_long_zig_zag_is_well_formed() -> None:
     ring = zig_zag(2_000)
     assert len(ring) == 4_000

@@ -127,7 +127,7 @@ def test_what_the_state_says_of_monitors_is_not_looked_at() -> None:
     assert observe(memory, policy, windy("T"), now(4))[1] == (1, 2)
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_memory_does_not_grow() -> None:
     kinds = [(FOR, MAX_WINDOW), (WITHIN, MAX_WINDOW), (RISING, 0), (FALLING, 0)] * (MAX_MONITORS // 4)
     policy = policy_of(*(Monitor(kind, window_us, CALM) for kind, window_us in kinds))

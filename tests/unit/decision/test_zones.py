@@ -225,7 +225,7 @@ def test_the_largest_coordinates_stay_within_64_bits() -> None:
     assert 2 * (2 * far) * (2 * far) <= 1 << 61
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_many_vertices_are_read_a_band_at_a_time() -> None:
     count, radius = 4_096, 1_000_000
     ring = [(round(radius * cos(2 * pi * n / count)), round(radius * sin(2 * pi * n / count))) for n in range(count)]

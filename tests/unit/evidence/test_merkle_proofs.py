@@ -84,7 +84,7 @@ def test_every_inclusion_proof_is_that_of_the_definition(stored: StoredTree) -> 
             assert verify_inclusion(LEAVES[index], index, size, proof, root)
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_every_consistency_proof_is_that_of_the_definition(stored: StoredTree) -> None:
     for second in range(1, MOST):
         for first in range(1, second + 1):

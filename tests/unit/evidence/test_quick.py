@@ -99,7 +99,7 @@ def test_by_octets_alone_it_says_less(log: Log) -> None:
     assert found.root == b""
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_no_octet_can_be_changed_unseen(log: Log) -> None:
     data = b"".join(log.lines)
     for at in range(0, len(data), 7):

@@ -59,7 +59,7 @@ def test_a_log_that_ends_between_two_records_is_kept_whole(lines: list[bytes]) -
     assert examined(log).state is State.CLOSED
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_wherever_it_is_cut_what_is_whole_is_kept(lines: list[bytes]) -> None:
     whole, data = 0, b"".join(lines)
     for end in range(len(lines[0]), len(data), 61):

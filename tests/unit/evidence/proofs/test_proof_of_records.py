@@ -86,7 +86,7 @@ def test_anchors_in_records_are_found() -> None:
     assert list(anchored([*log.lines, line, said, b',"event":"anchored"\n'])) == [note]
 
 
-@pytest.mark.no_cover
+@pytest.mark.unmeasured
 def test_every_record_is_proven_under_the_first_signed_one_after_it(log: SealedLog) -> None:
     for number, line in enumerate(log.lines):
         data = proof(prove_inclusion(lambda: log.lines, number))

@@ -1,6 +1,8 @@
 """What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
 
 import gc
+import gzip
+import json
 import os
 import stat
 import sys
@@ -15,6 +17,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal import charmap
 from hypothesis.internal.conjecture import providers
 
 from virtual import once
@@ -39,6 +42,20 @@ def same_examples() -> None:
     two in each process. `make soak` draws them too.
     """
     providers._get_local_constants = lambda: providers._local_constants
+
+
+def every_character() -> None:
+    """Tell Hypothesis what UTF-8 can encode: all characters but the surrogates.
+
+    In a new checkout each process would find that out by trying all of them, for five seconds.
+    """
+    made = charmap.charmap_file("codec-v2-utf-8")
+    if not made.exists():
+        charmap.charmap()  # keeps it in the same folder, which it makes
+        known = [[[0, 0xD7FF], [0xE000, sys.maxunicode]], []]
+        written = made.with_suffix(f".{os.getpid()}")
+        written.write_bytes(gzip.compress(json.dumps(known).encode(), mtime=1))
+        written.replace(made)
 
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
@@ -106,6 +123,8 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     What is collected stays for as long as the process: looking for garbage in it, time and again, took a third of
     collecting. What the tests make is looked through as ever, but for that in it that was there before them.
     """
+    if not hasattr(session.config, "workerinput"):
+        every_character()
     gc.disable()
     try:
         return (yield from collected(session))

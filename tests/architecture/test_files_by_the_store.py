@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from virtual.rows import rows
+
 PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 
 #: who opens or writes files by other means, besides the store itself
@@ -69,7 +71,7 @@ def _is_mode(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str) and set(node.value) <= set("rwxabt+")
 
 
-@pytest.mark.parametrize(
+@rows(
     "way",
     [
         "from tempfile import mkstemp", "from os import replace", "from shutil import move",

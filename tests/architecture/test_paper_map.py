@@ -8,13 +8,14 @@ import pytest
 
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.mission import Invocation
+from virtual.rows import rows
 
 ROOT = Path(__file__).parents[2]
 ROW = re.compile(r"^\|(?:[^|]*\|)? `([A-Z][\w.]*)` \| `(rtshcua/[\w/]+\.py)` \|", re.MULTILINE)
 ROWS = ROW.findall((ROOT / "docs" / "paper-map.md").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(("name", "file"), ROWS, ids=[name for name, _ in ROWS])
+@rows(("name", "file"), ROWS, ids=[name for name, _ in ROWS])
 def test_every_name_exists_in_its_file(name: str, file: str) -> None:
     module = importlib.import_module(file.removesuffix(".py").replace("/", "."))
     owner, _, field = name.partition(".")

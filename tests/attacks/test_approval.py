@@ -32,6 +32,7 @@ from rtshcua.onboard.ports import Ending
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.response import Answer
+from virtual.rows import rows
 
 OF = low()
 
@@ -130,7 +131,7 @@ def entitled(**fields: object) -> Loaded:
     return renewed(OF, root)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "slug"),
     [
         ({"roles": ("operator",)}, "wrong-role"),
@@ -157,7 +158,7 @@ def test_a_root_that_has_expired_meanwhile() -> None:
     assert presented(of, approval(of)).slug == "root-expired"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("changed", "slug"),
     [
         ({"role": "operator"}, "wrong-role"),

@@ -10,6 +10,7 @@ from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import BACKWARDS, MISSION_OVER, OUT_OF_TURN
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.response import Answer, Status, decode
+from virtual.rows import rows
 
 AT = START.monotonic_us
 
@@ -43,7 +44,7 @@ def test_the_fallback_of_an_earlier_step_is_not_decided() -> None:
     assert answer_to(of, request_for(of, 1, 0, 0)) is Status.NOT_CURRENT
 
 
-@pytest.mark.parametrize(
+@rows(
     ("kind", "step", "link"),
     [(0, 4, -1), (0, -1, -1), (0, 0, 0), (1, 0, 9), (1, 4, 0), (1, -1, 0), (2, 0, 0), (2, -1, 3), (2, -1, -1)],
 )

@@ -20,6 +20,7 @@ from rtshcua.ground.auditor.sent import Nature, nature
 from rtshcua.ground.auditor.sent import read as read_frame
 from virtual import case
 from virtual.flight import Flight
+from virtual.rows import rows
 
 NAN = float("nan")
 
@@ -119,16 +120,16 @@ def test_what_was_sent_is_what_was_recorded(kind: str) -> None:
     assert judged(lines, list(entries)) is None
 
 
-@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-@pytest.mark.parametrize("name", BEFORE)
+@rows("kind", ["px4", "ardupilot"])
+@rows("name", BEFORE)
 def test_a_command_before_anything_was_permitted(kind: str, name: str) -> None:
     frame = COMMANDS[name]
     assert beside(kind, frame, before_takeoff) in ("frames/unrecorded", "frames/early")
     assert beside(kind, frame, at_the_end) == "frames/unrecorded"
 
 
-@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-@pytest.mark.parametrize("name", COMMANDS)
+@rows("kind", ["px4", "ardupilot"])
+@rows("name", COMMANDS)
 def test_another_command_than_the_one_that_is_permitted(kind: str, name: str) -> None:
     later = name == "return" and kind == "px4"  # which the last step permits, but not yet
     assert beside(kind, COMMANDS[name], on_the_way) == ("frames/early" if later else "frames/other-command")
@@ -167,7 +168,7 @@ def test_a_dispatch_that_the_log_no_longer_has(kind: str, what: str) -> None:
     assert found.slug == "frames/unrecorded"
 
 
-@pytest.mark.parametrize(
+@rows(
     "frame",
     [
         ours(mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 4, 6, 0, 0, 0, 0), component=190),
@@ -198,9 +199,9 @@ def test_before_any_vehicle_was_heard_every_system_counts_as_ours() -> None:
     assert found.slug == "frames/unrecorded"
 
 
-@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-@pytest.mark.parametrize("late", [False, True])
-@pytest.mark.parametrize("autopilot", [3, 12])
+@rows("kind", ["px4", "ardupilot"])
+@rows("late", [False, True])
+@rows("autopilot", [3, 12])
 def test_the_heartbeat_of_another_system_makes_nobody_blind(kind: str, late: bool, autopilot: int) -> None:
     """Whoever reaches the link can send one: our frames are still held against the log."""
     lines, entries = told(kind)

@@ -11,6 +11,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.permit import open_permit
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
+from virtual.rows import rows
 
 AT = START.monotonic_us
 AUTOPILOT, ADAPTER = Codec(1, 1), Codec(1, OURS)
@@ -41,7 +42,7 @@ def test_nothing_moves_before_the_first_permit() -> None:
     assert out(heard()) == set()
 
 
-@pytest.mark.parametrize("bit", range(0, 8 * 56, 7))
+@rows("bit", range(0, 8 * 56, 7))
 def test_a_forged_permit_lets_nothing_out(bit: int) -> None:
     of = heard()
     permit = bytearray(allowed(of))

@@ -3,10 +3,9 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.ground.language.load import load
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PROPOSAL = json.loads((CHECKOUT / "missions" / "proposal.json").read_text(encoding="utf-8"))
@@ -31,7 +30,7 @@ def reading(read: list[str], proposal: bytes = b"") -> object:
     return bytes_of
 
 
-@pytest.mark.parametrize("path", [*ESCAPES, "lib:agent/loose.rts", "lib:tests/loose.rts", "lib:loose.rts"])
+@rows("path", [*ESCAPES, "lib:agent/loose.rts", "lib:tests/loose.rts", "lib:loose.rts"])
 def test_a_specification_imports_from_the_shelves_of_the_library_only(path: str) -> None:
     read: list[str] = []
     text = json.dumps(PROPOSAL | {"imports": [path]}).encode()
@@ -40,8 +39,8 @@ def test_a_specification_imports_from_the_shelves_of_the_library_only(path: str)
     assert read == ["proposal.json"]
 
 
-@pytest.mark.parametrize("path", ESCAPES)
-@pytest.mark.parametrize("what", ['import "{}"', 'zone yard from "{}"'])
+@rows("path", ESCAPES)
+@rows("what", ['import "{}"', 'zone yard from "{}"'])
 def test_no_source_leaves_the_library(path: str, what: str) -> None:
     read: list[str] = []
 

@@ -11,6 +11,7 @@ from reference.verifiers import ROOT_KEY, WORDS
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.evidence.witnessing.anchors import notes
 from rtshcua.ground.auditor.audit import Auditor
+from virtual.rows import rows
 
 ONE, TWO, THREE = WITNESSES
 LINES = log(genesis(), effect(10), seal(20, 1), effect(30), seal(40, 2), effect(50), close(60))
@@ -105,7 +106,7 @@ def test_an_anchor_of_another_log() -> None:
     assert (report.verdict, report.anchored) == (Verdict.VERIFIED, 0)
 
 
-@pytest.mark.parametrize("at", [0, 4, 11, 12, 40, 75])
+@rows("at", [0, 4, 11, 12, 40, 75])
 def test_a_forged_cosignature(at: int) -> None:
     """Key id, time or signature changed: it anchors nothing, and nothing is said against the log. For the files of
     anchors are signed by nobody: whoever can write there would make a sound log fail.

@@ -18,6 +18,7 @@ from reference.forgery import (
 )
 from reference.resealing import resealed
 from rtshcua.evidence.report import Verdict
+from virtual.rows import rows
 
 LINES = flight()
 SIGNED = signers(LINES)
@@ -53,14 +54,14 @@ def test_the_thief_signs_what_a_verifier_takes() -> None:
     assert prove(by_the_thief(list(LINES))).report.verdict is Verdict.VERIFIED
 
 
-@pytest.mark.parametrize("number", BEFORE)
+@rows("number", BEFORE)
 def test_earlier_epochs_cannot_be_rewritten(number: int) -> None:
     """Whatever is changed before, its epoch was sealed by a key that is gone."""
     seal = next(each for each in SIGNED if each > number)
     assert expect(by_the_thief(edited(number))) == ("seal/root", seal)
 
 
-@pytest.mark.parametrize("number", BEFORE)
+@rows("number", BEFORE)
 def test_nothing_can_be_taken_out_of_earlier_epochs(number: int) -> None:
     seal = next(each for each in SIGNED if each > number)
     assert expect(by_the_thief([*LINES[:number], *LINES[number + 1 :]])) == ("seal/size", seal - 1)

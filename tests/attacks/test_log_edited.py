@@ -17,6 +17,7 @@ from reference.forgery import (
 )
 from reference.resealing import resealed
 from rtshcua.evidence.report import Verdict
+from virtual.rows import rows
 
 LINES = flight()
 FIRST = next(number for number, line in enumerate(LINES) if read(line)["type"] == "decision")
@@ -41,13 +42,13 @@ EDITS = {
 }
 
 
-@pytest.mark.parametrize("field", EDITS)
+@rows("field", EDITS)
 def test_an_edited_answer(field: str) -> None:
     changed = with_fields(FIRST, **{field: EDITS[field]})
     assert expect(changed) == ("chain/broken", FIRST)
 
 
-@pytest.mark.parametrize("field", EDITS)
+@rows("field", EDITS)
 def test_an_edited_answer_that_was_rehashed(field: str) -> None:
     """The chain is whole again; the seal of the epoch is not, whether it counts right or not."""
     changed = with_fields(FIRST, **{field: EDITS[field]})
@@ -55,7 +56,7 @@ def test_an_edited_answer_that_was_rehashed(field: str) -> None:
     assert expect(rewritten(changed)) == ("seal/root", FIRST_SEAL)
 
 
-@pytest.mark.parametrize("field", EDITS)
+@rows("field", EDITS)
 def test_an_edited_answer_that_the_key_holder_signed_again(field: str) -> None:
     """All is sealed; but the decision does not follow from its inputs."""
     changed = signed(with_fields(FIRST, **{field: EDITS[field]}))
@@ -93,7 +94,7 @@ def test_a_signed_record_that_counts_otherwise(fields: dict[str, object], slug: 
         assert expect(by_the_holder) == (slug, number)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "slug"),
     [
         ({"mode": "none"}, "decision/mode"),

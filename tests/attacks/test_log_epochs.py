@@ -27,6 +27,7 @@ from reference.verifiers import careful
 from rtshcua.evidence.report import Verdict
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
+from virtual.rows import rows
 
 LINES = flight()
 SIGNED = signers(LINES)
@@ -130,7 +131,7 @@ def test_a_signature_stripped_from_any_signed_record() -> None:
             assert expect(stripped) == ("seal/note", number)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("change", "slug"),
     [
         (lambda n, text: text.replace(f"\n{n}\n", f"\n{n + 1}\n"), "seal/size"),

@@ -2,9 +2,8 @@
 
 from base64 import b64decode, b64encode
 
-import pytest
-
 from reference.forgery import edit, expect, flight, other_flight, read, rewritten, signed
+from virtual.rows import rows
 
 LINES = flight()
 GENESIS = read(LINES[0])
@@ -20,7 +19,7 @@ def flipped(field: str, at: int) -> str:
     return b64encode(bytes(data)).decode()
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "slug"),
     [
         ({"vehicle": "quad-08"}, "trust/bundle-wrong-vehicle"),
@@ -39,7 +38,7 @@ def test_a_forged_field(fields: dict[str, object], slug: str) -> None:
     assert expect(begun(**fields)) == ("seal/key" if "vehicle" in fields else "seal/self", 0)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "slug"),
     [
         ({"format": "rtshcua/diary"}, "genesis/format"),
@@ -56,12 +55,12 @@ def test_a_field_that_no_genesis_has(fields: dict[str, object], slug: str) -> No
     assert expect(begun(**fields)) == (slug, 0)
 
 
-@pytest.mark.parametrize("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
+@rows("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
 def test_one_bit_of_the_bundle(at: int) -> None:
     assert expect(signed(begun(bundle=flipped("bundle", at))))[0].startswith("trust/bundle-")
 
 
-@pytest.mark.parametrize("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
+@rows("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
 def test_one_bit_of_the_root(at: int) -> None:
     assert expect(signed(begun(root=flipped("root", at))))[0].startswith("trust/root-")
 

@@ -14,11 +14,12 @@ from rtshcua.evidence.records import LARGEST
 from rtshcua.ground.auditor.audit import Auditor
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty
+from virtual.rows import rows
 
 LINES = flight()
 
 
-@pytest.mark.parametrize(
+@rows(
     "line",
     [
         b"\x00" * 1000 + b"\n",

@@ -1,9 +1,8 @@
 """A runtime that waits for no disk: its log says so, and the audit names the first decision that went out unkept."""
 
-import pytest
-
 from reference.forgery import edit, expect, flight, prove, read, signed
 from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
+from virtual.rows import rows
 
 
 def decisions() -> list[tuple[int, int, str, int]]:
@@ -25,8 +24,8 @@ def test_what_arms_is_on_the_disk_first_and_the_rest_soon() -> None:
     assert prove(flight()).report.failure is None
 
 
-@pytest.mark.parametrize("number", [0, 1, 2])
-@pytest.mark.parametrize("claimed", [BUFFERED, WRITTEN, SYNCED, SYNCED_FIRST])
+@rows("number", [0, 1, 2])
+@rows("claimed", [BUFFERED, WRITTEN, SYNCED, SYNCED_FIRST])
 def test_a_decision_that_was_kept_less_well_or_says_so(number: int, claimed: int) -> None:
     record, _, _, durability = decisions()[number]
     lines = list(flight())

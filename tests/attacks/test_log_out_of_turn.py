@@ -8,6 +8,7 @@ import pytest
 
 from reference.forgery import edit, expect, read, signed
 from reference.world import LOG_KEY, ROOT_KEY, Run, loaded
+from virtual.rows import rows
 
 STEP, FALLBACK, CONTINGENCY = 0, 1, 2
 
@@ -80,7 +81,7 @@ def test_the_chain_of_a_step_that_is_over() -> None:
     assert found(sent_after(at, (FALLBACK, 0, 0, "emergency_land"))) == ("dispatch/lapsed", at + 1)
 
 
-@pytest.mark.parametrize(
+@rows(
     "link",
     [
         (CONTINGENCY, -1, 77, "hover"),

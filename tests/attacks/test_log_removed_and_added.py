@@ -1,8 +1,7 @@
 """Threat: records are deleted, inserted, duplicated or reordered, with and without renumbering and rehashing."""
 
-import pytest
-
 from reference.forgery import edit, expect, flight, read, rehashed, renumbered, rewritten, signed, signers
+from virtual.rows import rows
 
 LINES = flight()
 LAST = len(LINES) - 1
@@ -15,7 +14,7 @@ def deleted(number: int) -> list[bytes]:
     return [*LINES[:number], *LINES[number + 1 :]]
 
 
-@pytest.mark.parametrize("number", range(1, LAST))
+@rows("number", range(1, LAST))
 def test_deleted(number: int) -> None:
     assert expect(deleted(number)) == ("chain/sequence", number)
     assert expect(rehashed(deleted(number))) == ("chain/sequence", number)
@@ -38,7 +37,7 @@ def test_the_head_cut_off() -> None:
     assert expect(rewritten(LINES[1:])) == ("genesis/missing", 0)
 
 
-@pytest.mark.parametrize("number", range(1, LAST))
+@rows("number", range(1, LAST))
 def test_duplicated(number: int) -> None:
     twice = [*LINES[: number + 1], LINES[number], *LINES[number + 1 :]]
     assert expect(twice) == ("chain/sequence", number + 1)
@@ -63,7 +62,7 @@ def test_inserted() -> None:
     assert expect(rewritten(inserted)) == ("seal/size", SEAL + 1)
 
 
-@pytest.mark.parametrize("number", range(1, LAST - 1))
+@rows("number", range(1, LAST - 1))
 def test_reordered(number: int) -> None:
     swapped = list(LINES)
     swapped[number], swapped[number + 1] = swapped[number + 1], swapped[number]

@@ -1,21 +1,20 @@
 """Threat: the end of the log is cut off, in a record, between two, or all of it."""
 
-import pytest
-
 from reference.forgery import edit, expect, flight, prove, read, rewritten, signers
 from rtshcua.evidence.report import Verdict
+from virtual.rows import rows
 
 LINES = flight()
 LAST = len(LINES) - 1
 
 
-@pytest.mark.parametrize("count", range(1, LAST + 1))
+@rows("count", range(1, LAST + 1))
 def test_cut_between_records(count: int) -> None:
     assert expect(LINES[:count]) == ("close/missing", count)
     assert prove(LINES[:count]).report.verdict is Verdict.INCOMPLETE
 
 
-@pytest.mark.parametrize("kept", [1, 10, 40, 74, 200, -2, -1])
+@rows("kept", [1, 10, 40, 74, 200, -2, -1])
 def test_cut_inside_a_record(kept: int) -> None:
     for number in (1, 2, LAST):
         cut = [*LINES[:number], LINES[number][: kept if kept < 0 else min(kept, len(LINES[number]) - 1)]]

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from reference.forgery import expect, flight, leaf, read, rehashed
+from virtual.rows import rows
 
 LINES = flight()
 NUMBER = next(number for number, line in enumerate(LINES) if read(line)["type"] == "decision")
@@ -18,7 +19,7 @@ def with_line(line: str | bytes) -> list[bytes]:
     return [*LINES[:NUMBER], data, *LINES[NUMBER + 1 :]]
 
 
-@pytest.mark.parametrize(
+@rows(
     "line",
     [
         " " + TEXT,
@@ -54,7 +55,7 @@ def test_a_duplicate_key_that_was_rehashed() -> None:
     assert expect(forged) == ("record/not-canonical", NUMBER)
 
 
-@pytest.mark.parametrize("junk", [b"\n", b" ", b"{}\n", b"\x00" * 100, LINES[-1], LINES[1], b"x" * 70_000 + b"\n"])
+@rows("junk", [b"\n", b" ", b"{}\n", b"\x00" * 100, LINES[-1], LINES[1], b"x" * 70_000 + b"\n"])
 def test_junk_after_the_end(junk: bytes) -> None:
     assert expect([*LINES, junk]) == ("close/junk-after", len(LINES))
 

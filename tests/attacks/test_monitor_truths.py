@@ -15,6 +15,7 @@ from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.wire.response import Answer, Status
+from virtual.rows import rows
 
 BREEZE = clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M)))
 
@@ -40,7 +41,7 @@ def claiming(of: Loaded, *monitors: int) -> bytes:
     return request_for(of, state=state)
 
 
-@pytest.mark.parametrize("monitors", [(), (1, 1), (1,) * 13, (0,), (3,), (5,), (7,), (255,)])
+@rows("monitors", [(), (1, 1), (1,) * 13, (0,), (3,), (5,), (7,), (255,)])
 def test_what_is_no_truth_of_each_monitor_is_no_request(monitors: tuple[int, ...]) -> None:
     of = armed()
     assert answer_to(of, claiming(of, *monitors)) is Status.MALFORMED

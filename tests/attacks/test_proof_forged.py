@@ -3,8 +3,6 @@
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 
-import pytest
-
 from reference.proof_parts import (
     OTHER,
     consistency,
@@ -16,6 +14,7 @@ from reference.sealed_log import PIN
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.check import check_proof
 from rtshcua.wire import cbor
+from virtual.rows import rows
 
 
 def test_what_is_put_together_again_is_believed() -> None:
@@ -69,7 +68,7 @@ def parts_of_path(length: int) -> str:
     return b64encode(bytes(length)).decode()
 
 
-@pytest.mark.parametrize("change", [lambda path: path[:-1], lambda path: path[1:], lambda path: path[::-1],
+@rows("change", [lambda path: path[:-1], lambda path: path[1:], lambda path: path[::-1],
     lambda path: [*path, path[-1]], lambda path: [path[0], *path], lambda _: []])  # fmt: skip
 def test_the_path_is_another(change: Callable[[list[str]], list[str]]) -> None:
     parts = inclusion(3)

@@ -30,6 +30,7 @@ from rtshcua.onboard.ports import Dispatch, Ending, LinkBack, LinkLost, Presente
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.response import Status
+from virtual.rows import rows
 
 OF = low()
 STRANGER = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.APPROVAL, development=True)
@@ -167,7 +168,7 @@ def test_a_key_that_the_root_does_not_let_recall(fields: dict[str, object], slug
 POLICY_DIGEST = OF.bundle.policy_digest
 
 
-@pytest.mark.parametrize(
+@rows(
     ("changed", "slug"),
     [
         ({"vehicle": "quad-08"}, "wrong-vehicle"),

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pytest
-
 from reference.proof_parts import (
     LOG,
     OTHER,
@@ -14,6 +12,7 @@ from reference.proof_parts import (
     slug_of_receipt,
 )
 from rtshcua.wire import cbor
+from virtual.rows import rows
 
 
 def test_receipts_that_are_forged() -> None:
@@ -39,7 +38,7 @@ def test_receipts_that_are_forged() -> None:
     assert slug_of_receipt(receipt(protected={15: {1: "elsewhere", 2: "6"}}, sign_it=True)) == "proof/origin"
 
 
-@pytest.mark.parametrize(
+@rows(
     "fields",
     [
         {"protected": {1: -8}}, {"protected": {395: 2}}, {"protected": {2: (395,)}},

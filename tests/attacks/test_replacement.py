@@ -37,6 +37,7 @@ from rtshcua.wire.document import DocumentError, sign_document
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.replacement import MAX_REPLACEMENTS, ReplacementDocument, sign_replacement
 from rtshcua.wire.response import Answer, Status
+from virtual.rows import rows
 
 OF = low()
 STRANGER = SigningKey.from_seed(bytes([98]) * 32, duty=Duty.MISSION, development=True)
@@ -198,7 +199,7 @@ def test_whose_binding_is_not_over_its_fields() -> None:
 STAYS = shorter(OF).invocations[1]
 
 
-@pytest.mark.parametrize(
+@rows(
     "changed",
     [
         replace(STAYS, arguments=(0, 0, 8 * M), plan=replace(STAYS.plan, path=(0, 0))),
@@ -228,7 +229,7 @@ def test_what_stays_may_have_moved_in_its_source() -> None:
     assert presented(fresh(), forged(OF, replace(shorter(OF), invocations=(first, moved, last)))).accepted
 
 
-@pytest.mark.parametrize(
+@rows(
     ("mission", "kept", "slug"),
     [
         (shorter(OF), -1, "already-released"),
@@ -361,7 +362,7 @@ def test_what_was_considered_in_time_may_have_expired(keys: int | None, root: in
     assert presented(of, document).slug == "time-went-back"
 
 
-@pytest.mark.parametrize(
+@rows(
     "document",
     [
         b"",

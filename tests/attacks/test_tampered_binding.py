@@ -9,9 +9,10 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.response import NO_TARGET, Answer
+from virtual.rows import rows
 
 
-@pytest.mark.parametrize("bit", range(0, 256, 17))
+@rows("bit", range(0, 256, 17))
 def test_a_step_under_another_binding_is_denied(bit: int) -> None:
     of = loaded()
     changed = bytearray(of.bundle.mission.invocations[0].binding)

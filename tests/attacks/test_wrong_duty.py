@@ -11,6 +11,7 @@ from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.key_file import dump_signing_key, load_signing_key
 from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
 from rtshcua.wire.trust import TrustRoot, open_root
+from virtual.rows import rows
 
 ARTEFACTS = {
     Duty.ROOT: names.ROOT,
@@ -42,7 +43,7 @@ def refusal(envelope, duty, keys=TRUSTED):
     return refused.value.slug
 
 
-@pytest.mark.parametrize("duty", list(Duty))
+@rows("duty", list(Duty))
 def test_the_right_key_passes_and_so_does_the_forger_s_tool(duty):
     """The twin of all that follows: with nothing crossed, the same hand-made bytes are what we make and accept."""
     key, content_type = KEYS[duty], ARTEFACTS[duty].content_type
@@ -51,7 +52,7 @@ def test_the_right_key_passes_and_so_does_the_forger_s_tool(duty):
     assert cose.open1(envelope, keys=TRUSTED, duty=duty, content_type=content_type).payload == PAYLOAD
 
 
-@pytest.mark.parametrize(("has", "wanted"), CROSSED)
+@rows(("has", "wanted"), CROSSED)
 def test_our_own_tools_refuse(has, wanted):
     with pytest.raises(WrongDuty):
         KEYS[has].sign(PAYLOAD, duty=wanted)
@@ -61,7 +62,7 @@ def test_our_own_tools_refuse(has, wanted):
         load_signing_key(dump_signing_key(KEYS[has], passphrase=None), duty=wanted, passphrase=None)
 
 
-@pytest.mark.parametrize(("has", "wanted"), CROSSED)
+@rows(("has", "wanted"), CROSSED)
 def test_forged_envelopes_are_refused(has, wanted):
     key, content_type = KEYS[has], ARTEFACTS[wanted].content_type
     # all claims as wanted, but the key's own name
@@ -74,7 +75,7 @@ def test_forged_envelopes_are_refused(has, wanted):
     assert refusal(cose.sign1(PAYLOAD, key=relabelled, duty=wanted, content_type=content_type), wanted) == "unknown-key"
 
 
-@pytest.mark.parametrize(("has", "wanted"), CROSSED)
+@rows(("has", "wanted"), CROSSED)
 def test_a_genuine_envelope_serves_no_other_duty(has, wanted):
     genuine = cose.sign1(PAYLOAD, key=KEYS[has], duty=has, content_type=ARTEFACTS[has].content_type)
     assert refusal(genuine, wanted) == "wrong-content-type"

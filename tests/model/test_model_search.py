@@ -13,6 +13,7 @@ from model.searching import Found, Search
 from model.small import ALL, LIMITS, TINY, UNIT, Small
 from reference.flat_case import S
 from rtshcua.onboard.runtime.limits import falling_us, run_us
+from virtual.rows import rows
 
 #: after every so many transitions, a state that counts as one with another is held against it
 DOUBLE_OF = 101
@@ -59,7 +60,7 @@ def test_every_state_of_a_small_run(of: Small) -> None:
     check(of)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("edges", "times", "endless"),
     [
         ([[]], [0], []),

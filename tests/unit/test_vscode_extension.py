@@ -9,13 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.parse import parse
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 EXTENSION = CHECKOUT / "editors" / "vscode"
@@ -111,7 +110,7 @@ def test_the_grammar_has_the_words_of_the_language_and_no_others() -> None:
     assert {"local", "inadmissible", "grow", "circle", "difference", "abs", "repeat", "rising"} <= phrased
 
 
-@pytest.mark.parametrize("path", [*SOURCES, SAMPLE], ids=lambda path: path.stem)
+@rows("path", [*SOURCES, SAMPLE], ids=lambda path: path.stem)
 def test_everything_in_a_source_has_a_scope(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     found = list(tokens(text))
@@ -119,7 +118,7 @@ def test_everything_in_a_source_has_a_scope(path: Path) -> None:
     assert not [part for part, scope in found if part.strip() and not scope]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "part", "scope"),
     [
         ("policy p version 7 {", "p", "entity.name.type"),
@@ -174,7 +173,7 @@ def expanded(body: str) -> str:
 SNIPPETS = read("snippets/rtshcua.json")
 
 
-@pytest.mark.parametrize("name", SNIPPETS)
+@rows("name", SNIPPETS)
 def test_a_snippet_parses_as_it_is(name: str) -> None:
     body = SNIPPETS[name]["body"]
     text = expanded("\n".join(body) if isinstance(body, list) else body)

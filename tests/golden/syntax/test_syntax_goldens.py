@@ -6,11 +6,10 @@
 import os
 from pathlib import Path
 
-import pytest
-
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.parse import parse
+from virtual.rows import rows
 
 CASES = sorted(Path(__file__).parent.glob("*.rts"))
 
@@ -29,7 +28,7 @@ def rendering(source: Source, found: Diagnostic) -> str:
     return "\n".join(lines)
 
 
-@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+@rows("path", CASES, ids=lambda path: path.stem)
 def test_golden(path: Path) -> None:
     source = Source(path.name, path.read_bytes().decode())
     found = "\n\n".join(rendering(source, each) for each in parse(source).diagnostics) + "\n"
@@ -39,7 +38,7 @@ def test_golden(path: Path) -> None:
     assert found == golden.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+@rows("path", CASES, ids=lambda path: path.stem)
 def test_style(path: Path) -> None:
     for found in parse(Source(path.name, path.read_bytes().decode())).diagnostics:
         assert found.message[0] == "`" or found.message[0].islower()

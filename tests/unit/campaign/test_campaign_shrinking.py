@@ -1,12 +1,11 @@
 """A failing scenario becomes small: only what is needed is left, and what is left is round."""
 
-import pytest
-
 from rtshcua.campaign.drawing import Moment, Space, Tally, draw
 from rtshcua.campaign.shrinking import shrink
 from rtshcua.campaign.written import incident_text, scenario_text
 from rtshcua.model.faults import Fault, GpsLoss, LinkSilence, WindStep
 from rtshcua.model.scenario import AtTime, Incident, Scenario, Start
+from virtual.rows import rows
 
 S = 1_000_000
 SKILLS = ("takeoff", "goto", "goto", "return_home")
@@ -51,7 +50,7 @@ def test_it_becomes_as_weak_and_as_round_as_it_may() -> None:
     assert [each.text for each in small.incidents] == ["at 30 s link_silence(for = 4 s)"]
 
 
-@pytest.mark.parametrize("number", range(40))
+@rows("number", range(40))
 def test_it_comes_to_an_end_whatever_was_drawn(number: int) -> None:
     scenario = draw(3, number, SPACE, Tally({"px4": [Moment("landed", 9 * S)]})).scenario
     small, flown = shrink(scenario, SKILLS, lambda _: True, most=2_000)
@@ -59,7 +58,7 @@ def test_it_comes_to_an_end_whatever_was_drawn(number: int) -> None:
     assert flown < 100
 
 
-@pytest.mark.parametrize("number", range(40))
+@rows("number", range(40))
 def test_the_smallest_of_one_fault_is_not_smaller_than_itself(number: int) -> None:
     scenario = draw(3, number, SPACE, Tally()).scenario
     many = len(scenario.incidents)

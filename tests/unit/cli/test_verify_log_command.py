@@ -19,6 +19,7 @@ from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.wire.keys import Duty
 from virtual import case
+from virtual.rows import rows
 
 ROOT = case.KEYS[Duty.ROOT]
 
@@ -361,7 +362,7 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
     assert "chain" in slugs
 
 
-@pytest.mark.parametrize(
+@rows(
     ("slug", "code"),
     [
         ("trust/log-key", ExitCode.UNTRUSTED),

@@ -2,11 +2,11 @@
 
 from random import Random
 
-import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec, decode, kind_of, maker
 from rtshcua.mavlink.framing import checksum
+from virtual.rows import rows
 
 NOT_MADE = ("_header", "_payload", "_msgbuf", "_crc")
 
@@ -76,7 +76,7 @@ def test_every_message_of_numbers_is_made_as_its_constructor_makes_it() -> None:
             assert all(getattr(ours, name) == vars(theirs)[name] for name in vars(theirs) if name not in NOT_MADE)
 
 
-@pytest.mark.parametrize("bit", range(8 * 14))
+@rows("bit", range(8 * 14))
 def test_a_wrong_checksum_is_no_message(bit: int) -> None:
     kind = kind_of(0)
     assert kind is not None

@@ -20,6 +20,7 @@ from rtshcua.codec.tunnel import (
     messages,
     name_of,
 )
+from virtual.rows import rows
 
 NAME = b"12345678"
 
@@ -44,7 +45,7 @@ def head(index: int, count: int, name: bytes = NAME) -> bytes:
     return b"\1" + name + index.to_bytes(2, "little") + count.to_bytes(2, "little")
 
 
-@pytest.mark.parametrize("length", [1, CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK, 1_000, LONGEST])
+@rows("length", [1, CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK, 1_000, LONGEST])
 def test_there_and_back(length: int) -> None:
     data = bytes(n % 251 for n in range(length))
     assembler = Assembler()
@@ -80,7 +81,7 @@ def test_lost_repeated_and_out_of_order(data: bytes, seed: int) -> None:
     assert whole == Whole(1, NAME, data)
 
 
-@pytest.mark.parametrize(
+@rows(
     "frame",
     [
         crafted(b""),

@@ -20,6 +20,7 @@ from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import NUMBER, Signal
 from rtshcua.model.flat.situation import State
+from virtual.rows import rows
 
 NORTH, EAST, DOWN = (flat.SLOTS + number for number in range(3))
 STALE = 2 * S
@@ -145,7 +146,7 @@ def unkept(state: State, policy: PreparedPolicy = POLICY) -> list[tuple[str, int
     return [(text, truth) for text, truth in watch(ready(STEP, policy), state, policy, NOW) if "area" not in text]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("east", "speed", "age_us", "breaks"),
     [
         (480 * M - 2, 8 * M, 0, False),  # it stands 2 mm before the border; 1 mm is for rounding
@@ -198,7 +199,7 @@ def test_without_braking_it_is_where_it_was_measured() -> None:
     assert unkept(moving((499 * M, 0, 20 * M), (None, None, None)), policy) == []
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "problem"),
     [
         ({"braking": -1}, "vehicle: braking"),

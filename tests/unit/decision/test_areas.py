@@ -2,7 +2,6 @@
 
 from random import Random
 
-import pytest
 from hypothesis import given
 
 from reference import worlds
@@ -12,6 +11,7 @@ from rtshcua.decision.outline import MOST, REPEATS, Bands, Slabs, edges
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.zone import MAX_COORDINATE
+from virtual.rows import rows
 
 T, F = TRUE, FALSE
 SQUARE: Ring = ((0, 0), (100, 0), (100, 100), (0, 100))
@@ -20,7 +20,7 @@ ISLAND: Ring = ((48, 48), (52, 48), (52, 52), (48, 52))
 AREA = PreparedZone(0, area([SQUARE, HOLE, ISLAND]))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("place", "answer"),
     [
         ((20, 50), T),
@@ -43,7 +43,7 @@ def test_places(place: tuple[int, int], answer: int) -> None:
     assert AREA.along(place, (0, 0, 0, 0)) == answer
 
 
-@pytest.mark.parametrize(
+@rows(
     ("path", "box", "answer"),
     [
         ((20, 50), (-5, -5, 5, 5), T),

@@ -15,6 +15,7 @@ from rtshcua.decision.tree import parse, scope_of, slots_read
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, members, point
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Op
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
+from virtual.rows import rows
 
 SCOPE = scope_of(flat.POLICY)
 INSPECTING = SCOPE.about(flat.CONTRACTS[INSPECT])
@@ -95,12 +96,12 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("code", "problem"), REFUSED)
+@rows(("code", "problem"), REFUSED)
 def test_refused(code: tuple[int, ...], problem: str) -> None:
     assert parse(code, INSPECTING) == problem
 
 
-@pytest.mark.parametrize(
+@rows(
     "code",
     [
         YES,
@@ -159,7 +160,7 @@ def evaluated(node: object, slots: dict[int, Value] | None = None, arguments: di
 B = {BATTERY: interval(2, 5)}
 
 
-@pytest.mark.parametrize(
+@rows(
     ("code", "slots", "truth"),
     [
         (apply(Op.LE, signal(BATTERY), const(5)), B, T),
@@ -232,7 +233,7 @@ def test_what_code_reads() -> None:
 H = flat.H
 
 
-@pytest.mark.parametrize(
+@rows(
     ("window", "spans", "error", "truth"),
     [
         ((8 * H, 18 * H), [(8 * H, 8 * H)], (0, 0), T),

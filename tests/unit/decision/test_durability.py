@@ -12,6 +12,7 @@ from rtshcua.model.flat.contract import Contract, MotionKind
 from rtshcua.model.flat.situation import Approval, Context
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from virtual.rows import rows
 
 ALLOW, DENY, DEFER, FALLBACK = Outcome
 
@@ -21,7 +22,7 @@ def contract(motion: MotionKind, *record: str) -> Contract:
     return replace(hover, motion=replace(hover.motion, kind=int(motion)), record=("decision", "state", *record))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("motion", "record", "outcome", "approved", "kind", "expected"),
     [
         (MotionKind.HOLD, (), ALLOW, False, STEP, SYNCED),

@@ -1,6 +1,5 @@
 """What stands against waiting in the air."""
 
-import pytest
 from msgspec.structs import replace
 
 from reference import flat_case as flat
@@ -8,6 +7,7 @@ from reference.asking import POLICY, STEP, loaded, ready
 from reference.flat_case import BATTERY, HEIGHT, NOW, POSITION_X, POSITION_Y, M
 from rtshcua.decision.values import FALSE, UNKNOWN
 from rtshcua.decision.watch import WAY_HOME, holding
+from virtual.rows import rows
 
 DEGRADE = flat.RULES[-1].text
 AIRSPACE = "airspace inside city outside school"
@@ -16,7 +16,7 @@ AWAY: dict[int, int | None] = {POSITION_X: 300 * M, POSITION_Y: 0}
 ENOUGH = 1_232
 
 
-@pytest.mark.parametrize(
+@rows(
     ("values", "unkept"),
     [
         ({}, []),

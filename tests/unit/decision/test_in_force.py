@@ -21,6 +21,7 @@ from rtshcua.wire.keys import Duty
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.replacement import MAX_REPLACEMENTS, ReplacementDocument, sign_replacement
 from rtshcua.wire.trust import TrustRoot
+from virtual.rows import rows
 
 OF = low()
 STEP = OF.bundle.mission.invocations[ASKED]
@@ -65,7 +66,7 @@ OUTLINES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("document", OUTLINES)
+@rows("document", OUTLINES)
 def test_bytes_without_the_outline_of_an_envelope_are_malformed(document: bytes) -> None:
     assert take(flight(), document).slug == "malformed"
 
@@ -105,7 +106,7 @@ def test_an_approval_that_expired_may_be_given_again() -> None:
     assert take(of, approval(OF, now=later(10 * MIN)), later(10 * MIN)).accepted
 
 
-@pytest.mark.parametrize(
+@rows(
     ("changed", "slug"),
     [
         ({"granted": 2}, "malformed"),
@@ -145,7 +146,7 @@ def test_a_recall_of_all_under_the_policy_is_accepted() -> None:
     assert take(flight(), recall(OF, mission=b"", policy=OF.bundle.policy_digest)).accepted
 
 
-@pytest.mark.parametrize(
+@rows(
     ("changed", "slug"),
     [
         ({"mission": b""}, "malformed"),
@@ -226,7 +227,7 @@ def test_only_the_last_replacements_considered_ahead_are_kept() -> None:
 STAYS, LAST = shorter(OF).invocations[1:]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("document", "slug"),
     [
         (forged(shorter(OF), supersedes=bytes(32)), "superseded"),

@@ -12,6 +12,7 @@ from rtshcua.decision.links import DEGRADE, START, choose_contingency, choose_fa
 from rtshcua.decision.values import FALSE, MISSING, UNKNOWN, Sets, interval, maybe, point
 from rtshcua.decision.watch import WAY_HOME, watch
 from rtshcua.model.flat.policy import RuleKind
+from virtual.rows import rows
 
 INSPECTION = ready(STEP, POLICY)
 
@@ -21,7 +22,7 @@ def chosen(values: dict[int, int | None], after: int = START, policy: Any = POLI
     return None if choice is None else (choice.index, choice.link.skill)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("values", "after", "choice"),
     [
         ({}, START, (0, HOVER)),
@@ -52,7 +53,7 @@ def test_contingency(values: dict[int, int | None], after: int, choice: int | No
     assert found is None or found.link is flat.POLICY.contingency[found.index]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("values", "home"),
     [
         ({}, True),
@@ -133,7 +134,7 @@ NEAR, LOW = "position inside grow(area, 15 m)", "height <= altitude + 5 m"
 DEGRADE_TEXT, AIRSPACE_TEXT = flat.RULES[6].text, "airspace inside city outside school"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("values", "found"),
     [
         ({}, []),

@@ -10,6 +10,7 @@ from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import DAY, MAX_TOTAL_VERTICES, MAX_VALUE
 from rtshcua.model.flat.zone import AREA, LOWEST, MAX_COORDINATE, MAX_RINGS, Zone
+from virtual.rows import rows
 
 SQUARE = ((-9, -9), (9, -9), (9, 9), (-9, 9))
 HOLE = ((-5, -5), (-5, 5), (5, 5), (5, -5))
@@ -53,7 +54,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("zone", "what"), REFUSED, ids=[what for _, what in REFUSED])
+@rows(("zone", "what"), REFUSED, ids=[what for _, what in REFUSED])
 def test_refused(zone: Zone, what: str) -> None:
     answer = found(zone)
     assert isinstance(answer, Refusal)

@@ -23,6 +23,7 @@ from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP, MAX_MONITORS, MAX_PHASE_NAMES, MAX_WINDOW
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, RuleKind
 from rtshcua.model.outcome import Outcome, Reason
+from virtual.rows import rows
 
 T, F, U = 1, 2, 4
 FOR, WITHIN, RISING, FALLING = MonitorKind
@@ -51,7 +52,7 @@ SCOPE = scope_of(P)
 INNER = SCOPE.about(flat.CONTRACTS[INSPECT]).inside_monitor(1)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("code", "scope", "found"),
     [
         ((Op.MONITOR, 2, 0), SCOPE, Monitored(2)),
@@ -80,7 +81,7 @@ def observing(*monitors: Monitor) -> Policy:
     return replace(flat.POLICY, monitors=monitors)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("policy", "what"),
     [
         (observing(*[CALM_FOR_3_S] * (MAX_MONITORS + 1)), "number of monitors 33 is not in 0..32"),
@@ -176,7 +177,7 @@ def asked(policy: PreparedPolicy, said: tuple[int, ...] = (T, T, T), **state: An
     return decision
 
 
-@pytest.mark.parametrize(
+@rows(
     ("said", "outcome", "reason"),
     [
         ((T, F, U), Outcome.ALLOW, Reason.ADMITTED),

@@ -3,7 +3,6 @@
 from random import Random
 from typing import Any
 
-import pytest
 from hypothesis import given, settings
 from msgspec.structs import replace
 
@@ -25,6 +24,7 @@ from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.outcome import Outcome, Reason
+from virtual.rows import rows
 
 
 def found(
@@ -45,7 +45,7 @@ AT_NIGHT = replace(NOW, utc_us=flat.ISSUED + 4 * flat.H)  # 21:06:40
 LATE = replace(STEP, issued_at_us=AT_NIGHT.utc_us - flat.S)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("given", "reason", "answers"),
     [
         ({}, Reason.ADMITTED, []),
@@ -163,7 +163,7 @@ def test_where_arguments_stay_the_signal_is_changed() -> None:
     assert bounds(code, signals_only=True) == [(False, WIND, None, 1_000)]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("code", "goal", "answer"),
     [
         (flat.apply(Op.LE, A(1), N(30)), True, [(True, 1, None, 30)]),
@@ -223,7 +223,7 @@ def test_what_is_missing_beside_it_leaves_no_answer() -> None:
     assert changes(code, values={WIND: None}) is None
 
 
-@pytest.mark.parametrize(
+@rows(
     ("change", "value", "answer"),
     [
         (Change(False, 0, 5, 9, None), point(7), 9),

@@ -22,6 +22,7 @@ from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STA
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, LeftOut, Policy, RuleKind
 from rtshcua.model.flat.zone import CIRCLE, MAX_COORDINATE, MAX_VERTICES, POLYGON, Zone
+from virtual.rows import rows
 
 P = flat.POLICY
 
@@ -209,7 +210,7 @@ POLICIES: list[tuple[Policy, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("policy", "what"), POLICIES, ids=[what for _, what in POLICIES])
+@rows(("policy", "what"), POLICIES, ids=[what for _, what in POLICIES])
 def test_a_malformed_policy(policy: Policy, what: str) -> None:
     found = prepare(policy)
     assert isinstance(found, Refusal)
@@ -313,14 +314,14 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("invocation", "what"), INVOCATIONS, ids=[what for _, what in INVOCATIONS])
+@rows(("invocation", "what"), INVOCATIONS, ids=[what for _, what in INVOCATIONS])
 def test_a_malformed_invocation(invocation: Invocation, what: str) -> None:
     found = prepare_invocation(invocation, POLICY, flat.MISSION.phases)
     assert isinstance(found, Refusal)
     assert found.text.startswith(what)
 
 
-@pytest.mark.parametrize(
+@rows(
     "tighter",
     [
         S.contract,
@@ -358,7 +359,7 @@ def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: i
     assert isinstance(prepare_mission(phases(step, bits), POLICY), tuple)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("mission", "what"),
     [
         (replace(MISSION, policy="other"), "policy `other` is not the policy's, `bridge_inspection`"),

@@ -29,6 +29,7 @@ from rtshcua.decision.links import DEGRADE
 from rtshcua.decision.prepare import prepare_mission
 from rtshcua.model.flat.mission import Plan
 from rtshcua.model.outcome import Outcome, Reason
+from virtual.rows import rows
 
 HIGHER = replace(STEP, arguments=(flat.BRIDGE, 40 * M, 0, 4 * M), plan=replace(STEP.plan, altitude=40 * M))
 TRACKING = flat.invocation(2, flat.INSPECTION, TRACK, Plan(0, (), 0, 0))
@@ -55,7 +56,7 @@ CASES: dict[str, tuple[dict[str, Any], Outcome, Reason]] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@rows("name", CASES)
 def test_reference_case(name: str) -> None:
     given, outcome, reason = CASES[name]
     decision = ask(**given)

@@ -10,6 +10,7 @@ from reference import worlds
 from reference.naive_geometry import well_formed
 from reference.outlines import Ring, rings, zig_zag
 from rtshcua.decision.checks.zones import rings as problems
+from virtual.rows import rows
 
 SQUARE: Ring = ((0, 0), (10, 0), (10, 10), (0, 10))
 HOLE: Ring = ((2, 2), (2, 8), (8, 8), (8, 2))
@@ -66,7 +67,7 @@ def test_any_outlines(outlines: list[Ring]) -> None:
     agree(outlines)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("given", "expected"),
     [
         ((SQUARE,), None),

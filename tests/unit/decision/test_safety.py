@@ -34,6 +34,7 @@ from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Airspace, RuleKind
 from rtshcua.model.flat.zone import LOWEST
 from rtshcua.model.outcome import Outcome, Reason
+from virtual.rows import rows
 
 ALLOW, DENY, DEFER, FALLBACK = Outcome
 T, F, U = 1, 2, 4
@@ -41,7 +42,7 @@ T, F, U = 1, 2, 4
 # ------------------------------------------------------------------------------------------------------ 6 state
 
 
-@pytest.mark.parametrize(
+@rows(
     ("values", "outcome", "clause_"),
     [
         ({}, ALLOW, None),
@@ -57,7 +58,7 @@ def test_state(values: dict[int, int | None], outcome: Outcome, clause_: Any) ->
     assert (decision.outcome, decision.clause) == (outcome, clause_)
 
 
-@pytest.mark.parametrize("slot", range(flat.SLOTS))
+@rows("slot", range(flat.SLOTS))
 def test_a_slot_that_is_missing_stale_or_beyond_sense_is_unknown(slot: int) -> None:
     stale = next(s.stale_us for s in flat.SIGNALS if s.slot in (slot, slot - (s.kind == 2)))
     assert ask(values={slot: None}).outcome is DEFER
@@ -88,7 +89,7 @@ def test_a_plan_faster_than_the_vehicle() -> None:
     assert decision.step == 7
 
 
-@pytest.mark.parametrize(
+@rows(
     ("start", "to", "altitude", "reason"),
     [
         ((110, -20), (150, 20), 20, Reason.ADMITTED),
@@ -127,7 +128,7 @@ def test_no_airspace_is_no_limit() -> None:
     assert ask(goto(600 * M, 300 * M), policy=policy).outcome is ALLOW
 
 
-@pytest.mark.parametrize(
+@rows(
     ("values", "reason", "clause_"),
     [
         ({POSITION_X: 89 * M}, Reason.ADMITTED, None),  # 15 m around the bridge, less the position error
@@ -205,7 +206,7 @@ def volume(near: int, far: int, gap: int = 0) -> Volume:
     return Volume(UNKNOWN_VOLUME.place, (0, 0, gap, None), (near, far))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("battery", "planned", "truth"),
     [
         (point(9_000), volume(0, 0), T),
@@ -262,7 +263,7 @@ START = [point(100), point(200), point(5_000), MISSING]
 BOX = (-3, -3, 3, 3)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("kind", "path", "altitude", "parts", "heights"),
     [
         (MotionKind.HOLD, (), None, [((100, 200), 5_000, 5_000)], (5_000, 5_000)),

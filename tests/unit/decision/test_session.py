@@ -18,6 +18,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Status
+from virtual.rows import rows
 
 LOADED = world.loaded()
 ALLOW, DENY, DEFER, FALLBACK = Outcome.ALLOW, Outcome.DENY, Outcome.DEFER, Outcome.FALLBACK
@@ -141,7 +142,7 @@ def test_where_nothing_is_enforced_a_denied_step_is_the_current_one() -> None:
 # ------------------------------------------------------------------------------------------- links
 
 
-@pytest.mark.parametrize(
+@rows(
     ("ref", "before", "during", "after"),
     [
         (Ref(STEP, 0, 0), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
@@ -173,7 +174,7 @@ def test_what_may_be_asked_for_before_a_step_during_it_and_in_the_next(
     assert of.session.refusal(ref) is after
 
 
-@pytest.mark.parametrize(
+@rows(
     ("ref", "values", "skill"),
     [
         (Ref(FALLBACK_LINK, 2, 0), {}, HOVER),
@@ -210,10 +211,8 @@ def test_where_neither_a_rule_nor_the_chain_has_a_link_there_is_no_target() -> N
     assert of.link(Ref(FALLBACK_LINK, 2, DEGRADE), {FIX: 2}).outcome is FALLBACK
 
 
-@pytest.mark.parametrize(
-    "ref", [Ref(FALLBACK_LINK, 0, 0), Ref(FALLBACK_LINK, 0, DEGRADE), Ref(CONTINGENCY_LINK, -1, 0)]
-)
-@pytest.mark.parametrize("values", [{}, {FIX: 2}])
+@rows("ref", [Ref(FALLBACK_LINK, 0, 0), Ref(FALLBACK_LINK, 0, DEGRADE), Ref(CONTINGENCY_LINK, -1, 0)])
+@rows("values", [{}, {FIX: 2}])
 def test_a_link_under_another_binding_is_denied(ref: Ref, values: dict[int, int | None]) -> None:
     of = Asked()
     of.step(0)

@@ -16,6 +16,7 @@ from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.outcome import Outcome, Reason
+from virtual.rows import rows
 
 ALLOW, DENY, DEFER, FALLBACK = Outcome
 
@@ -62,7 +63,7 @@ def test_an_invocation_prepared_under_another_policy_is_of_another_version() -> 
 E = 20_000  # the clock's error
 
 
-@pytest.mark.parametrize(
+@rows(
     ("utc", "outcome", "reason"),
     [
         (flat.ISSUED - E - 1, DENY, Reason.ISSUED_IN_FUTURE),
@@ -92,8 +93,8 @@ def test_an_error_below_zero_is_no_better_than_none() -> None:
 # -------------------------------------------------------------------------------------------------- 3 authority
 
 
-@pytest.mark.parametrize("source", SourceKind)
-@pytest.mark.parametrize("timing_class", TimingClass)
+@rows("source", SourceKind)
+@rows("timing_class", TimingClass)
 def test_which_source_may_use_which_class(source: SourceKind, timing_class: TimingClass) -> None:
     may = {
         SourceKind.AGENT: {TimingClass.SEMANTIC, TimingClass.TACTICAL},
@@ -115,7 +116,7 @@ WITHOUT_WIND = {flat.WIND: None}  # makes MAYBE unknown
 PERMIT, FORBID, CONFIRM = RuleKind.PERMIT, RuleKind.FORBID, RuleKind.CONFIRM
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "outcome", "reason", "deciding"),
     [
         ([(PERMIT, YES)], DEFER, Reason.STATE_UNKNOWN, None),  # authority passed; the wind is then missed in step 6
@@ -143,7 +144,7 @@ def test_authority(rules: list[Any], outcome: Outcome, reason: Reason, deciding:
         assert decision.step == 3
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "reason"),
     [
         ({"skills": (INSPECT,)}, Reason.ADMITTED),
@@ -198,7 +199,7 @@ def low(**given: Any) -> Any:
     return ask(LOW, values=given.pop("values", None) or {flat.HEIGHT: 8_000}, **given)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("approvals", "released", "outcome", "reason"),
     [
         ((), RELEASED, DEFER, Reason.AWAITING_APPROVAL),
@@ -274,7 +275,7 @@ def test_a_refusal_outweighs_what_is_awaited() -> None:
 # ------------------------------------------------------------------------------------------------------ 4 phase
 
 
-@pytest.mark.parametrize(
+@rows(
     ("phases", "current", "outcome", "reason"),
     [
         (0b010, 1, ALLOW, Reason.ADMITTED),
@@ -299,7 +300,7 @@ def test_phase(phases: int, current: int, outcome: Outcome, reason: Reason) -> N
 # ----------------------------------------------------------------------------------------------------- 5 timing
 
 
-@pytest.mark.parametrize(
+@rows(
     ("elapsed", "remaining", "outcome"),
     [
         (0, 2 * S, ALLOW),
@@ -338,7 +339,7 @@ def answers(sets: Sets, policy: Any = POLICY, invocation: Any = STEP, **context:
 ADMITTED = (ALLOW, Reason.ADMITTED)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "expected"),
     [
         ({}, {ADMITTED}),
@@ -404,7 +405,7 @@ def test_the_last_moment_of_a_deadline(monotonic: tuple[int, int], expected: set
     assert answers(all_of(monotonic_us=monotonic), released_us=AT, remaining_us=0) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "wind", "expected"),
     [
         ([(FORBID, MAYBE), (PERMIT, YES)], interval(-1, 1), {ADMITTED, (DENY, Reason.FORBIDDEN)}),

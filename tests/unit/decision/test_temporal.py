@@ -22,6 +22,7 @@ from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP, MAX_MONITORS, MAX_WINDOW
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import Now, State
+from virtual.rows import rows
 
 LETTERS = {1: "T", 2: "F", 4: "U"}
 CALM = clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M)))
@@ -59,7 +60,7 @@ HALF = S // 2
 EVERY_HALF = [number * HALF for number in range(20)]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("kind", "window_us", "times", "observed", "said"),
     [
         # the window reaches exactly back to the first observation, not before

@@ -6,18 +6,19 @@ from hypothesis import strategies as st
 
 from rtshcua.decision.evaluate import known
 from rtshcua.decision.values import ABSENT, AND, EVERYWHERE, FALSE, MAYBE, NOT, OR, PRESENT, TRUE, UNKNOWN, singles
+from virtual.rows import rows
 
 T, F, U = TRUE, FALSE, UNKNOWN
 KLEENE_AND = {(T, T): T, (T, F): F, (T, U): U, (F, F): F, (F, U): F, (U, U): U}
 KLEENE_OR = {(T, T): T, (T, F): T, (T, U): T, (F, F): F, (F, U): U, (U, U): U}
 
 
-@pytest.mark.parametrize(("pair", "result"), KLEENE_AND.items())
+@rows(("pair", "result"), KLEENE_AND.items())
 def test_and(pair: tuple[int, int], result: int) -> None:
     assert AND[pair[0]][pair[1]] == AND[pair[1]][pair[0]] == result
 
 
-@pytest.mark.parametrize(("pair", "result"), KLEENE_OR.items())
+@rows(("pair", "result"), KLEENE_OR.items())
 def test_or(pair: tuple[int, int], result: int) -> None:
     assert OR[pair[0]][pair[1]] == OR[pair[1]][pair[0]] == result
 
@@ -33,9 +34,7 @@ def test_sets_hold_what_their_members_give_and_no_more(a: int, b: int) -> None:
     assert set(singles(NOT[a])) == {NOT[x] for x in singles(a)}
 
 
-@pytest.mark.parametrize(
-    ("truth", "result"), [(T, T), (F, F), (U, U), (T | F, F), (T | U, U), (F | U, F), (T | F | U, F)]
-)
+@rows(("truth", "result"), [(T, T), (F, F), (U, U), (T | F, F), (T | U, U), (F | U, F), (T | F | U, F)])
 def test_false_and_unknown_together_are_false_everywhere(truth: int, result: int) -> None:
     assert EVERYWHERE[truth] == result
 

@@ -20,6 +20,7 @@ from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.outcome import Outcome, Reason
+from virtual.rows import rows
 
 T, F, U = TRUE, FALSE, UNKNOWN
 LETTERS = {"T": T, "F": F, "U": U}
@@ -40,7 +41,7 @@ def test_dates_over_sets(start: int, length: int, spans: list[tuple[int, int]], 
     assert Dates(start, start + length).truth(utc, (least, least + more)) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("daily", "dates", "through", "answer"),
     [
         ((), (10, 20), 0, T),
@@ -94,7 +95,7 @@ UNSURE = (Outcome.DEFER, Reason.SAFETY_UNKNOWN)
 ERROR = flat.NOW.utc_error_us
 
 
-@pytest.mark.parametrize(
+@rows(
     ("times", "answer"),
     [
         ({}, AIRSPACE),
@@ -113,7 +114,7 @@ def test_keeping_out(times: dict[str, tuple[int, ...]], answer: tuple[Outcome, R
     assert in_school(**times) == answer
 
 
-@pytest.mark.parametrize(
+@rows(
     ("times", "answer"),
     [
         ({"dates": (0, UTC + LONGEST + ERROR)}, ADMITTED),

@@ -12,6 +12,7 @@ from reference.naive_geometry import circle_far, circle_near, in_shape, touches,
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.decision.zones import Place, PreparedZone, Sweep
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
+from virtual.rows import rows
 
 T, F = TRUE, FALSE
 SMALL = st.integers(-12, 12)
@@ -77,7 +78,7 @@ def test_a_widened_leg_and_a_circle(
     check_circle(zone, a, b, box)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("leg", "answer"),
     [
         ((-2_000, 1_100, 2_000, 1_100), F),  # passes at 1.1 m
@@ -96,7 +97,7 @@ def test_legs_past_a_circle_of_one_metre(leg: tuple[int, int, int, int], answer:
     assert PreparedZone(0, zone).along(there, (0, 0, 0, 0)) == answer
 
 
-@pytest.mark.parametrize(
+@rows(
     ("path", "answer"),
     [
         ((5, 0), F),  # on the circle
@@ -112,8 +113,8 @@ def test_the_circle_itself_is_outside(path: tuple[int, ...], answer: int) -> Non
     assert PreparedZone(0, zone).along(path, (0, 0, 0, 0)) == answer
 
 
-@pytest.mark.parametrize("turn", [0, 1, 2, 3])
-@pytest.mark.parametrize(
+@rows("turn", [0, 1, 2, 3])
+@rows(
     ("east", "reach", "answer"),
     [
         (-1_040, (0, 50), T | F),  # reaches in
@@ -158,7 +159,7 @@ def test_a_path_is_its_legs(zone: Zone, path: list[tuple[int, int]], box: tuple[
 SQUARE = polygon(0, 0, 10, 0, 10, 10, 0, 10, floor=5, ceiling=20)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("path", "answer"),
     [
         ((5, 5), T),
@@ -180,7 +181,7 @@ def test_by_hand(path: tuple[int, ...], answer: int) -> None:
     assert PreparedZone(0, SQUARE).along(path, (0, 0, 0, 0)) == answer
 
 
-@pytest.mark.parametrize(
+@rows(
     ("point", "answer"),
     [((2, 2), T), ((5, 5), F), ((4, 5), T), ((6, 5), F), ((0, 5), F), ((8, 1), T), ((9, 1), F)],
 )
@@ -198,7 +199,7 @@ def test_a_place_in_a_box(box: tuple[int, int, int, int], answer: int) -> None:
     assert PreparedZone(0, SQUARE).along((5, 5), box) == answer
 
 
-@pytest.mark.parametrize(
+@rows(
     ("low", "high", "answer"),
     [(6, 19, T), (5, 19, T | F), (6, 20, T | F), (0, 5, F), (20, 30, F), (0, 30, T | F), (6, 6, T)],
 )

@@ -1,8 +1,7 @@
 """What is offered for a word that is not known."""
 
-import pytest
-
 from rtshcua.diagnostics.suggest import LISTED, listed, nearest
+from virtual.rows import rows
 
 CASES = [
     ("baterry", ["battery", "height"], "", "battery"),
@@ -22,7 +21,7 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("word", "known", "about", "meant"), CASES)
+@rows(("word", "known", "about", "meant"), CASES)
 def test_the_name_that_was_meant(word: str, known: list[str], about: str, meant: str | None) -> None:
     assert nearest(word, known, about) == meant
     assert nearest(word, reversed(known), about) == meant

@@ -2,14 +2,13 @@
 
 from hashlib import sha256
 
-import pytest
-
 from rtshcua.evidence.heads import START, Head
 from rtshcua.evidence.merkle import leaf_hash, root_of
+from virtual.rows import rows
 
 
-@pytest.mark.parametrize("count", [0, 1, 255, 256, 257, 700])
-@pytest.mark.parametrize("asked", [None, 0, 3, 256, 300])
+@rows("count", [0, 1, 255, 256, 257, 700])
+@rows("asked", [None, 0, 3, 256, 300])
 def test_a_segment_is_what_its_lines_are_whenever_it_is_asked_for(count: int, asked: int | None) -> None:
     head = Head()
     assert (head.seq, head.prev, head.epoch, head.octets) == (0, START, -1, 0)

@@ -13,6 +13,7 @@ from rtshcua.evidence.note import Checkpoint, parse, split
 from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
+from virtual.rows import rows
 
 FILES = made()
 EXPECTED: dict[str, dict[str, Any]] = json.loads(FILES["expected.json"])
@@ -33,8 +34,8 @@ def test_the_files_are_those_that_the_script_makes() -> None:
     assert [name for name, data in FILES.items() if found[name] != data] == []
 
 
-@pytest.mark.parametrize("name", EXPECTED)
-@pytest.mark.parametrize("pinned", [ROOT_KEY, ROOT_KID], ids=["key", "name"])
+@rows("name", EXPECTED)
+@rows("pinned", [ROOT_KEY, ROOT_KID], ids=["key", "name"])
 def test_the_independent_verifier(name: str, pinned: bytes) -> None:
     beside = FOLDER / f"{name}.anchors"
     anchors = [beside.read_bytes()] if beside.exists() else []
@@ -45,7 +46,7 @@ def test_the_independent_verifier(name: str, pinned: bytes) -> None:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+@rows("name", EXPECTED)
 def test_this_verifier(name: str) -> None:
     report = verify(lines_of(name))
     assert report.failure is None
@@ -53,7 +54,7 @@ def test_this_verifier(name: str) -> None:
     assert (report.records, report.root.hex()) == (EXPECTED[name]["lines"], EXPECTED[name]["root"])
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+@rows("name", EXPECTED)
 def test_leaves_roots_and_checkpoints(name: str) -> None:
     wanted, tree = EXPECTED[name], Tree()
     for number, leaf in enumerate(wanted["leaves"]):
@@ -72,7 +73,7 @@ def test_leaves_roots_and_checkpoints(name: str) -> None:
             assert json.loads(line)["checkpoint"] == signed["note"]
 
 
-@pytest.mark.parametrize("name", REJECTED)
+@rows("name", REJECTED)
 def test_what_no_verifier_accepts(name: str) -> None:
     lines = lines_of(f"rejected/{name}")
     assert verify(lines).failure is not None

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.evidence.merkle import EMPTY, Tree, leaf_hash, node_hash, root_of
+from virtual.rows import rows
 
 
 def definition(entries: list[bytes]) -> bytes:
@@ -49,7 +50,7 @@ ROOTS = [
 ]
 
 
-@pytest.mark.parametrize("count", range(1, 9))
+@rows("count", range(1, 9))
 def test_known_roots(count: int) -> None:
     assert root_of(map(leaf_hash, ENTRIES[:count])).hex() == ROOTS[count - 1]
 

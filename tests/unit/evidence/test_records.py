@@ -23,6 +23,7 @@ from rtshcua.evidence.records import (
     encode,
     unsigned,
 )
+from virtual.rows import rows
 
 ESCAPES = {"\b": "\\b", "\t": "\\t", "\n": "\\n", "\f": "\\f", "\r": "\\r", '"': '\\"', "\\": "\\\\"}
 
@@ -164,7 +165,7 @@ def test_unsigned_is_the_record_without_its_checkpoint(close: Signed) -> None:
 GOOD = encode(Effect("0" * 64, 1, "d", 1, "e", 0, 0, 0, 0, 0, "effect", 3, 2))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("line", "slug", "words"),
     [
         (b"", "record/malformed", "it is not a record"),

@@ -3,12 +3,11 @@
 import re
 from pathlib import Path
 
-import pytest
-
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 PAGE = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
@@ -65,11 +64,11 @@ def test_there_are_examples_of_everything() -> None:
         assert word in words, word
 
 
-@pytest.mark.parametrize("source", SOURCES)
+@rows("source", SOURCES)
 def test_a_source_is_compiled_without_a_finding(source: str) -> None:
     assert findings(source) == ""
 
 
-@pytest.mark.parametrize("condition", CONDITIONS)
+@rows("condition", CONDITIONS)
 def test_a_condition_is_compiled_without_a_finding(condition: str) -> None:
     assert findings(AROUND.replace("CONDITION", condition)) == ""

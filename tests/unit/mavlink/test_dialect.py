@@ -4,11 +4,10 @@ import json
 import subprocess
 import sys
 
-import pytest
-
 from rtshcua.codec.build_dialect import COMMAND, build_table, render
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.dialect import Field
+from virtual.rows import rows
 
 
 def test_shipped_table_is_fresh() -> None:
@@ -20,7 +19,7 @@ def test_rendered_table_is_the_table() -> None:
     assert json.loads(render(table)) == table
 
 
-@pytest.mark.parametrize(
+@rows(
     ("message", "field", "expected"),
     [
         ("BATTERY_STATUS", "battery_remaining", Field("int8_t", 0, "%", None)),

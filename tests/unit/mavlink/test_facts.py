@@ -3,13 +3,13 @@
 from random import Random
 from types import ModuleType
 
-import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.layouts import LAYOUTS, Layout
 from rtshcua.mavlink.modes import COPTER_NAMES, PX4_NAMES, CopterMode, Px4Mode
+from virtual.rows import rows
 
 
 def numbers(of: ModuleType) -> dict[str, int]:
@@ -27,7 +27,7 @@ def test_messages_have_the_dialects_numbers() -> None:
     assert sorted(theirs.values()) == sorted(LAYOUTS)
 
 
-@pytest.mark.parametrize(("number", "layout"), LAYOUTS.items(), ids=MESSAGES)
+@rows(("number", "layout"), LAYOUTS.items(), ids=MESSAGES)
 def test_layouts_are_the_dialects(number: int, layout: Layout) -> None:
     kind = dialect.mavlink_map[number]
     assert layout.names == tuple(kind.ordered_fieldnames)
@@ -39,7 +39,7 @@ def test_layouts_are_the_dialects(number: int, layout: Layout) -> None:
         assert repr(layout.fields.unpack(turned)) == repr(kind.unpacker.unpack(turned))
 
 
-@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=MESSAGES)
+@rows("layout", LAYOUTS.values(), ids=MESSAGES)
 def test_a_target_is_a_system_and_behind_it_a_component(layout: Layout) -> None:
     system, component = layout.at("target_system"), layout.at("target_component")
     assert component == (system + 1 if system >= 0 else -1)
@@ -53,7 +53,7 @@ def test_fields_are_taken_by_name_and_zeros_at_the_end_need_not_be_there() -> No
     assert layout.getter("count")(layout.read(frame)) == 0x102
 
 
-@pytest.mark.parametrize(("name", "value"), numbers(enums).items(), ids=numbers(enums))
+@rows(("name", "value"), numbers(enums).items(), ids=numbers(enums))
 def test_numbers_are_the_dialects(name: str, value: int) -> None:
     if name not in OWN_WORDS:
         assert value == getattr(dialect, name)

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.quantise import UNITS, hypot_mm, quantise
 from rtshcua.model.quantity import Dimension
+from virtual.rows import rows
 
 
-@pytest.mark.parametrize(
+@rows(
     ("raw", "unit", "dimension", "expected"),
     [
         (1234, "mm", "length", 1234),
@@ -56,7 +57,7 @@ def test_sentinels_are_unknown() -> None:
     assert quantise(0, 100, 1, {-1}) == 0
 
 
-@pytest.mark.parametrize(("raw", "expected"), [(0.5, 1), (-0.5, -1), (1.5, 2), (2.5, 3), (0.49, 0), (-0.0, 0)])
+@rows(("raw", "expected"), [(0.5, 1), (-0.5, -1), (1.5, 2), (2.5, 3), (0.49, 0), (-0.0, 0)])
 def test_halves_go_away_from_zero(raw: float, expected: int) -> None:
     result = quantise(raw, 1, 1)
     assert result == expected

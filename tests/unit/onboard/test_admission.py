@@ -3,7 +3,6 @@
 import json
 from collections import deque
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -18,6 +17,7 @@ from rtshcua.onboard.runtime.admission import InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US, WINDOW, RemainingLatency
 from rtshcua.onboard.runtime.supervisor import RetryPolicy
 from rtshcua.wire.response import Answer
+from virtual.rows import rows
 
 TIMES = st.lists(st.integers(-10, 1 << 40), max_size=2 * WINDOW)
 
@@ -67,7 +67,7 @@ def waits(reason: Reason, outcome: Outcome, step: int, at_us: int, on: OnInadmis
 BEFORE, AFTER = 1, 10 * S
 
 
-@pytest.mark.parametrize(
+@rows(
     ("reason", "outcome", "step", "before", "after"),
     [
         (Reason.AWAITING_APPROVAL, Outcome.DEFER, 3, True, True),  # it has a time of its own

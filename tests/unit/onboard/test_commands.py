@@ -7,6 +7,7 @@ from rtshcua.model.flat.zone import project
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from virtual.rows import rows
 
 COMMANDS = Commands(POLICY, MISSION)
 
@@ -37,7 +38,7 @@ def test_a_degrade_rule_has_a_target() -> None:
     assert COMMANDS.command(FALLBACK_LINK, 0, -len(RULES), 1).skill == "return_home"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("kind", "step", "link_number"),
     [
         (STEP, 4, -1),

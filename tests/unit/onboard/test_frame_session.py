@@ -26,6 +26,7 @@ from rtshcua.onboard.enforcement.frames import (
     FrameSession,
 )
 from rtshcua.onboard.ports import Command
+from virtual.rows import rows
 
 SYSTEM, HOME_AMSL = 3, 488_000
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
@@ -217,8 +218,8 @@ def test_what_is_on_no_list_never_passes(autopilot: int) -> None:
             assert not covers(gate, message), named(message)
 
 
-@pytest.mark.parametrize("forced", [21_196.0, 2_989.0, 1.0, nan, inf])
-@pytest.mark.parametrize("on", [0, 1])
+@rows("forced", [21_196.0, 2_989.0, 1.0, nan, inf])
+@rows("on", [0, 1])
 def test_nothing_is_armed_or_disarmed_by_force(forced: float, on: int) -> None:
     by_int = reposition(command=400, param1=on, param2=forced)
     for message in (long(400, on, forced), by_int):
@@ -284,7 +285,7 @@ REFUSED: list[tuple[str, int, MotionKind, Any]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("why", "autopilot", "kind", "message"), REFUSED, ids=lambda value: str(value)[:40])
+@rows(("why", "autopilot", "kind", "message"), REFUSED, ids=lambda value: str(value)[:40])
 def test_what_is_nearly_the_command_is_not(why: str, autopilot: int, kind: MotionKind, message: Any) -> None:
     assert session(autopilot, command(kind)).seal(pack(message), NOW) is NOT_COVERED, why
 

@@ -1,6 +1,5 @@
 """The rehearsal: what is decided on each step, where it is judged, and that nothing comes of it."""
 
-import pytest
 from msgspec.structs import replace
 
 from reference.documents import ASKED, approval, low, presented
@@ -13,6 +12,7 @@ from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.ports import Ending
 from rtshcua.onboard.rehearsal import flown, rehearse
+from virtual.rows import rows
 
 OF = loaded()
 
@@ -71,7 +71,7 @@ def test_a_rehearsal_uses_nothing_up() -> None:
     assert run.until_over().ending is Ending.COMPLETED
 
 
-@pytest.mark.parametrize(
+@rows(
     ("plan", "x", "y", "height"),
     [
         (Plan(MotionKind.HOLD, (), 0, 0), 1, 2, 3),

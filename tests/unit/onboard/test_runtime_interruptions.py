@@ -22,6 +22,7 @@ from rtshcua.onboard.ports import (
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
 from rtshcua.wire.response import Status, encode_refusal
+from virtual.rows import rows
 
 #: it is waited for as long as it can fly: less than that of others, so that this is soon over
 SHORT = replace(POLICY.vehicle, endurance_us=4 * MIN)
@@ -67,7 +68,7 @@ AIR = (taking_off, running, holding, falling, returning)
 Situation = Callable[[], Run]
 
 
-@pytest.mark.parametrize("situation", GROUND + AIR)
+@rows("situation", GROUND + AIR)
 def test_the_pilot_wins_at_once(situation: Situation) -> None:
     run = situation()
     flown = list(run.flown)
@@ -86,8 +87,8 @@ def test_interrupted_on_the_ground_ends_at_once(situation: Situation) -> None:
     assert run.flown == []
 
 
-@pytest.mark.parametrize("situation", AIR)
-@pytest.mark.parametrize("again", [0, 1, 40])
+@rows("situation", AIR)
+@rows("again", [0, 1, 40])
 def test_interrupted_in_the_air_falls_back_first(situation: Situation, again: int) -> None:
     run = situation()
     run.tick(Interrupted(0))
@@ -139,7 +140,7 @@ def test_a_link_that_comes_back_lets_the_skill_go_on() -> None:
     assert run.events.count("link-lost") == run.events.count("link-back") == 1
 
 
-@pytest.mark.parametrize("situation", GROUND + AIR)
+@rows("situation", GROUND + AIR)
 def test_a_link_that_stays_away_ends_the_run(situation: Situation) -> None:
     run = situation()
     run.vehicle.mute = True
@@ -328,6 +329,6 @@ def test_the_boundary_fails_while_a_chain_is_flown() -> None:
     assert_audited(run)
 
 
-@pytest.mark.parametrize("situation", GROUND + AIR)
+@rows("situation", GROUND + AIR)
 def test_whether_it_has_to_be_brought_down_can_be_told(situation: Situation) -> None:
     assert situation().runtime.aloft is (situation in AIR)

@@ -41,6 +41,7 @@ from rtshcua.onboard.ports import (
 )
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
+from virtual.rows import rows
 
 LOST_US = S  # a link counts as lost when it was silent for so long
 EACH_US = 50_000  # the first messages after a silence come so far apart
@@ -197,8 +198,8 @@ def test_a_silence_is_no_violation(situation: Situation, seconds: float, order: 
     assert_audited(run)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("situation", MISSION_FLIES)
+@rows("order", ORDERS)
+@rows("situation", MISSION_FLIES)
 def test_after_a_long_silence_the_contingency_flies(situation: Situation, order: int) -> None:
     run = situation(AfterSilence.CONTINGENCY)
     flown = list(run.flown)
@@ -253,7 +254,7 @@ def test_after_a_long_silence_on_the_ground_the_step_is_decided_as_ever() -> Non
 # ------------------------------------------------------------------------------- what is really wrong afterwards
 
 
-@pytest.mark.parametrize("order", range(8))
+@rows("order", range(8))
 def test_a_breach_is_judged_once_all_is_fresh_and_not_before(order: int) -> None:
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 5)
@@ -445,8 +446,8 @@ def test_a_vehicle_that_landed_in_the_silence_has_landed() -> None:
     assert run.events[-1] == "landed"
 
 
-@pytest.mark.parametrize("moment", ["lost", "back"])
-@pytest.mark.parametrize("situation", AIR)
+@rows("moment", ["lost", "back"])
+@rows("situation", AIR)
 def test_the_pilot_wins_in_the_silence(situation: Situation, moment: str) -> None:
     run = situation(AfterSilence.CONTINGENCY)
     flown = list(run.flown)
@@ -615,7 +616,7 @@ BATCH: tuple[Callable[[Run], Event], ...] = (
 )
 
 
-@pytest.mark.parametrize("order", list(permutations(range(len(BATCH)))))
+@rows("order", list(permutations(range(len(BATCH)))))
 def test_nothing_lands_whatever_the_order_of_what_came_at_once(order: tuple[int, ...]) -> None:
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 6)

@@ -11,6 +11,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.face import _HANDLERS
 from rtshcua.simulation.world import Simulation
+from virtual.rows import rows
 
 HEARD = [kind for kind in mavlink.mavlink_map.values() if kind.msgname in _HANDLERS]
 COMMANDS = [16, 17, 20, 21, 22, 34, 115, 176, 178, 186, 192, 193, 207, 224, 300, 400, 511, 512, 5001, 5002, 5003, 5100]
@@ -56,7 +57,7 @@ def bombard(seed: int) -> Simulation:
     return simulation
 
 
-@pytest.mark.parametrize("seed", range(8))
+@rows("seed", range(8))
 def test_a_bombardment(seed: int) -> None:
     assert len(HEARD) == len(_HANDLERS)
     simulation = bombard(seed)

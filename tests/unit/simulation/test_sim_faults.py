@@ -12,6 +12,7 @@ from rtshcua.model import faults
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.faults import OF_VEHICLE, fault_words, parse_fault
 from rtshcua.simulation.surroundings import Wind
+from virtual.rows import rows
 
 S = 1_000_000
 
@@ -176,7 +177,7 @@ def test_faults_from_the_configuration_happen_when_they_should(pilot: Callable[.
     assert 4_900 < p.truth.battery <= 5_000
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "expected"),
     [
         ("battery,at=20s,level=15%", faults.BatteryLevel(20 * S, 1_500)),
@@ -220,7 +221,7 @@ def test_fault_texts(text: str, expected: faults.Fault) -> None:
     assert parse_fault(text) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "message"),
     [
         ("", "no such fault"),

@@ -16,6 +16,7 @@ from rtshcua.simulation.fence import Area, Circle, FenceLimits, Polygon
 from rtshcua.simulation.place import Point
 from rtshcua.simulation.plans import draws_no_fence, from_message
 from virtual import plans as p
+from virtual.rows import rows
 
 Pilots = Callable[..., Any]
 SQUARE = Polygon(((-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)))
@@ -65,7 +66,7 @@ def test_a_polygon_may_be_concave() -> None:
     assert NOTCHED.holds(5, 4)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("area", "inside", "outside"),
     [
         (Area(), (500, 500), None),

@@ -17,6 +17,7 @@ from rtshcua.simulation.config import HOME, Kind, SimulationConfig
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
+from virtual.rows import rows
 
 S = 1_000_000
 
@@ -244,7 +245,7 @@ def test_whatever_it_is_told_it_stays_within_bounds_and_uses_energy(
             last = now
 
 
-@pytest.mark.parametrize(
+@rows(
     "bad",
     [
         {"system": 0},

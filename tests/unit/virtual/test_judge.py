@@ -19,6 +19,7 @@ from rtshcua.virtual.flown import Frame, Happened, Reaction, Sample, ScenarioFlo
 from rtshcua.virtual.judge import SLUGS, Judgement, inside_mm, judge, moves
 from virtual import case
 from virtual.once import once
+from virtual.rows import rows
 from virtual.scenarios import flown, incident, scenario
 
 S, M = case.S, case.M
@@ -84,7 +85,7 @@ def test_nothing_is_wrong_with_a_good_flight(good: ScenarioFlown) -> None:
 SQUARE = (0, 0, 10, 0, 10, 10, 0, 10)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("zone", "place", "inside"),
     [
         (Zone("box", 1, -100, 100, SQUARE), (5, 5, 0), 5),
@@ -160,7 +161,7 @@ def test_whoever_flies_while_a_zone_that_must_be_kept_is_not_there_is_outside(go
     assert [(each.slug, each.at_us) for each in found] == [("outside-fence", 20 * S)]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fault", "cause"),
     [
         (faults.GpsJump(5 * S, 0, 10 * M), "position"),
@@ -219,7 +220,7 @@ def test_a_collision(good: ScenarioFlown) -> None:
     assert judged(good, crash()).margins.obstacle_mm == 0
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fault", "cause"),
     [
         (faults.Kill(5 * S), "motors"),
@@ -310,7 +311,7 @@ def reposition(x: int, y: int) -> bytes:
     return packed(dialect.MAVLink_command_int_message(1, 1, 0, 192, 0, 0, -1, 1, 0, float("nan"), x, y, 10))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("frame", "flavour", "kinds"),
     [
         (long(512, 0), "px4", None),

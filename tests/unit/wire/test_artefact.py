@@ -4,6 +4,7 @@ import pytest
 
 from rtshcua.wire import cbor, names
 from rtshcua.wire.artefact import ArtefactError, unwrap, wrap
+from virtual.rows import rows
 
 
 def test_bytes_begin_with_name_and_version():
@@ -12,7 +13,7 @@ def test_bytes_begin_with_name_and_version():
     assert unwrap(names.POLICY, data) == {"a": 1}
 
 
-@pytest.mark.parametrize(
+@rows(
     ("data", "slug", "text"),
     [
         (b"", "malformed", "this is no `rtshcua/policy`: not canonical CBOR: ends where an item should begin (byte 0)"),

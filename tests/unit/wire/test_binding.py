@@ -3,12 +3,12 @@
 from typing import Any
 
 import msgspec
-import pytest
 
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Motion
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.wire.binding import ID_BYTES, bind, binding_of, first_unbound
+from virtual.rows import rows
 
 DIGEST = bytes(range(32))
 
@@ -89,7 +89,7 @@ def test_the_same_mission_gives_the_same_bytes_and_another_time_other_ids() -> N
     assert other.isdisjoint(ids[0])
 
 
-@pytest.mark.parametrize("field", [field for field in Invocation.__struct_fields__ if field != "binding"])
+@rows("field", [field for field in Invocation.__struct_fields__ if field != "binding"])
 def test_no_field_of_an_invocation_can_change_unseen(field: str) -> None:
     bound = bind(mission(), DIGEST)
     changed = msgspec.structs.replace(bound.invocations[1], **{field: other(getattr(bound.invocations[1], field))})
@@ -97,7 +97,7 @@ def test_no_field_of_an_invocation_can_change_unseen(field: str) -> None:
     assert first_unbound(forged) == 1
 
 
-@pytest.mark.parametrize("field", Contract.__struct_fields__)
+@rows("field", Contract.__struct_fields__)
 def test_no_field_of_its_contract_can_change_unseen(field: str) -> None:
     bound = bind(mission(), DIGEST)
     invocation = bound.invocations[0]
@@ -105,9 +105,7 @@ def test_no_field_of_its_contract_can_change_unseen(field: str) -> None:
     assert binding_of(bound, msgspec.structs.replace(invocation, contract=weaker)) != invocation.binding
 
 
-@pytest.mark.parametrize(
-    "field", ["policy_digest", "policy", "policy_version", "vehicle", "name", "issued_at_us", "phases"]
-)
+@rows("field", ["policy_digest", "policy", "policy_version", "vehicle", "name", "issued_at_us", "phases"])
 def test_what_it_stands_in_cannot_change_unseen(field: str) -> None:
     bound = bind(mission(), DIGEST)
     assert first_unbound(msgspec.structs.replace(bound, **{field: other(getattr(bound, field))})) == 0

@@ -9,6 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rtshcua.wire import cbor
+from virtual.rows import rows
 
 INT64 = st.integers(-(1 << 63), (1 << 63) - 1) | st.integers(-300, 300) | st.integers(-70_000, 70_000)
 TEXT = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)
@@ -105,7 +106,7 @@ EXAMPLES = [
 ]
 
 
-@pytest.mark.parametrize(("value", "encoded"), EXAMPLES, ids=[encoded[:16] for _, encoded in EXAMPLES])
+@rows(("value", "encoded"), EXAMPLES, ids=[encoded[:16] for _, encoded in EXAMPLES])
 def test_examples(value, encoded):
     assert cbor.encode(value).hex() == encoded
     assert cbor.decode(bytes.fromhex(encoded)) == value
@@ -220,7 +221,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("data", "offset", "reason"), REFUSED, ids=lambda item: str(item)[:24])
+@rows(("data", "offset", "reason"), REFUSED, ids=lambda item: str(item)[:24])
 def test_refused_with_place_and_reason(data, offset, reason):
     with pytest.raises(cbor.CborError) as refused:
         cbor.decode(bytes.fromhex(data))
@@ -245,7 +246,7 @@ def test_more_bytes_than_the_limit_are_refused_unread():
     assert refused.value.offset == 2
 
 
-@pytest.mark.parametrize(
+@rows(
     "data",
     [
         b"\x9a\xff\xff\xff\xff" * 32,
@@ -273,7 +274,7 @@ class Kind(IntEnum):
     ONE = 1
 
 
-@pytest.mark.parametrize(
+@rows(
     ("value", "reason"),
     [
         (1 << 63, "integer outside 64 bits"),

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
+from virtual.rows import rows
 
 KEY = SigningKey.from_seed(bytes(range(32)), duty=Duty.POLICY)
 PUBLIC = KEY.verification()
@@ -98,7 +99,7 @@ def test_only_its_own_form_is_taken():
     assert opened(ENVELOPE, limit=len(ENVELOPE) - 1).payload == PAYLOAD
 
 
-@pytest.mark.parametrize(
+@rows(
     "header",
     [
         {},

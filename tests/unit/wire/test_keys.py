@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rtshcua.wire.key_file import MAX_KEY_FILE, KeyFileError, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey, WrongDuty, key_id
 from rtshcua.wire.untrusted import Untrusted
+from virtual.rows import rows
 
 SEED = bytes(range(32))
 PASSPHRASE = b"correct horse"
@@ -100,8 +101,8 @@ def test_secrets_are_never_shown():
         pickle.dumps(key)
 
 
-@pytest.mark.parametrize("duty", list(Duty))
-@pytest.mark.parametrize(("development", "passphrase"), [(True, None), (True, PASSPHRASE), (False, PASSPHRASE)])
+@rows("duty", list(Duty))
+@rows(("development", "passphrase"), [(True, None), (True, PASSPHRASE), (False, PASSPHRASE)])
 def test_key_files_come_back(duty, development, passphrase):
     key = signing_key(duty, development=development)
     loaded = load_signing_key(dump_signing_key(key, passphrase=passphrase), duty=duty, passphrase=passphrase)
@@ -159,7 +160,7 @@ def test_loading_refuses_secrets_that_do_not_fit():
     assert refusal(PLAIN.replace(b"development: yes", b"development: no")) == "unencrypted"
 
 
-@pytest.mark.parametrize(
+@rows(
     "data",
     [
         b"",

@@ -2,14 +2,13 @@
 
 import hmac
 
-import pytest
-
 from rtshcua.wire.permit import SIZE, Permit, open_permit, seal
+from virtual.rows import rows
 
 PERMIT = Permit(1, 2, -1, 77, 3, 4, 123_456_789)
 
 
-@pytest.mark.parametrize("octets", [1, 32, 63, 64, 65, 200])
+@rows("octets", [1, 32, 63, 64, 65, 200])
 def test_the_mac_is_that_of_rfc_2104(octets: int) -> None:
     key = bytes(range(octets))
     sealed = seal(PERMIT, key)

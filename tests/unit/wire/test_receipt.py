@@ -1,12 +1,12 @@
 """Receipts: one encoding, and nothing else is one."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire import artefact, names
 from rtshcua.wire.receipt import APPROVAL, Receipt, decode, encode
+from virtual.rows import rows
 
 INTEGERS = st.integers(-(1 << 63), (1 << 63) - 1)
 
@@ -21,7 +21,7 @@ def test_no_other_bytes_are_one(data: bytes) -> None:
     assert isinstance(decode(data), Refusal)
 
 
-@pytest.mark.parametrize("body", [1, (), (1,), (1, "a"), (1, 2, "b"), (1, "a", "b", 1, 1, 1, 1, 1), (1, "a", "b")])
+@rows("body", [1, (), (1,), (1, "a"), (1, 2, "b"), (1, "a", "b", 1, 1, 1, 1, 1), (1, "a", "b")])
 def test_other_bodies_are_none(body: object) -> None:
     assert isinstance(decode(artefact.wrap(names.RECEIPT, body)), Refusal)
 

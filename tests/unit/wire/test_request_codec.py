@@ -10,6 +10,7 @@ from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, cbor, names, request
 from rtshcua.wire.request import MAX_AGE_US, MAX_SIZE, STEP, Request
+from virtual.rows import rows
 
 TIME = st.integers(0, MAX_VALUE)
 
@@ -82,7 +83,7 @@ def changed(at: int, octets: bytes) -> bytes:
 BIG = (MAX_VALUE + 1).to_bytes(8)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("data", "text"),
     [
         (b"", "not a request of version 2 for a state of 3 slots and 2 monitors"),

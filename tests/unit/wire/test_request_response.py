@@ -9,6 +9,7 @@ from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import artefact, cbor, names, permit, response
 from rtshcua.wire.permit import SIZE, Permit
 from rtshcua.wire.response import Answer, Status
+from virtual.rows import rows
 
 ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE)
 
@@ -52,7 +53,7 @@ def changed(data: bytes, at: int, octet: int) -> bytes:
     return data[:start] + bytes([octet]) + data[start + 1 :]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("data", "text"),
     [
         (b"", "not a response of version 1"),

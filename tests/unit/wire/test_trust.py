@@ -18,6 +18,7 @@ from rtshcua.wire.trust import (
     speaker_refusal,
 )
 from rtshcua.wire.untrusted import Untrusted
+from virtual.rows import rows
 
 
 def signing_key(number, duty, *, development=False):
@@ -112,7 +113,7 @@ def test_a_tampered_root_is_refused():
     assert opening(forged) == opening(forged, pinned=ROOT.kid) == "bad-signature"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "slug"),
     [
         ({"version": 0}, "malformed"),
@@ -175,7 +176,7 @@ def key_body(**changes):
     return body(keys=[fields])
 
 
-@pytest.mark.parametrize(
+@rows(
     "payload",
     [
         body(version="1"),

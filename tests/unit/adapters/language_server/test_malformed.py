@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 
+from virtual.rows import rows
+
 pytest.importorskip("pygls")
 
 from rtshcua.adapters.language_server.server import make
@@ -37,7 +39,7 @@ def _said(message: dict[str, Any]) -> list[Any]:
     return sent.answers
 
 
-@pytest.mark.parametrize(
+@rows(
     "params",
     [
         {},
@@ -51,7 +53,7 @@ def _said(message: dict[str, Any]) -> list[Any]:
         None,
     ],
 )
-@pytest.mark.parametrize("number", [7, "seven"])
+@rows("number", [7, "seven"])
 def test_a_request_is_answered(params: Any, number: int | str) -> None:
     (answer,) = _said({"id": number, "method": "textDocument/hover", "params": params})
     assert (answer["id"], answer["error"]["code"]) == (number, -32602)

@@ -3,6 +3,7 @@
 import pytest
 
 from rtshcua.adapters.vehicle.address import Address, parse
+from virtual.rows import rows
 
 
 @pytest.mark.parametrize(("text", "loopback"), [
@@ -19,7 +20,7 @@ def test_parts() -> None:
     assert parse("udpin:10.0.0.7:14551") == Address("udpin", "10.0.0.7", 14551)
 
 
-@pytest.mark.parametrize("text", [
+@rows("text", [
     "", "udpin", "udpin:", "udpin:14550", "udpin::14550", "udpin:h:0", "udpin:h:65536", "udpin:h:-1", "udpin:h:1x",
     "tcp:h:1", "udpin:h h:1", "udpin:h:١", "udpin:[::1]:14550",
 ])  # fmt: skip

@@ -1,8 +1,7 @@
 """The estimator gates position and height: by its flags, their age, and whether there ever was a home."""
 
-import pytest
-
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator
+from virtual.rows import rows
 
 S = 1_000_000
 GPI = "GLOBAL_POSITION_INT"
@@ -15,7 +14,7 @@ def known(estimator: Estimator, now_us: int = S) -> set[str]:
     return vouched
 
 
-@pytest.mark.parametrize(("flags", "fields"), [
+@rows(("flags", "fields"), [
     (0x000, set()),
     (0x400, set()),  # ArduPilot while it boots
     (0x0A7, {"vx", "vz", "hdg"}),  # ArduPilot before GPS: a height, but no home yet

@@ -19,6 +19,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, POLYGON, Zone
 from virtual.policy import POLICY, PROJECTION, VEHICLE
+from virtual.rows import rows
 
 S = 1_000_000
 SQUARE = (-100_000, -100_000, 100_000, -100_000, 100_000, 100_000, -100_000, 100_000)
@@ -122,7 +123,7 @@ def test_arducopters_fence_is_switched_on_and_its_other_kinds_stay_on() -> None:
     assert (px4.parameters["FENCE_TYPE"], px4.parameters["FENCE_ENABLE"]) == (3.0, 0.0)
 
 
-@pytest.mark.parametrize(("flavour", "parameters", "says"), [
+@rows(("flavour", "parameters", "says"), [
     (PX4, {"RTL_RETURN_ALT": 60.0}, "it returns at 60 m (`RTL_RETURN_ALT`), and the policy says 30 m: "
                                     "set `RTL_RETURN_ALT` to 30, or change `return at`"),
     (PX4, {"RTL_RETURN_ALT": 3_000.0}, "it returns at 3000 m"),
@@ -262,7 +263,7 @@ def test_fences_of_other_kinds_are_not_ours() -> None:
     assert one.unready is None
 
 
-@pytest.mark.parametrize("value", [0, 1, 2, 255, 4_001, 2**31 - 1, -1, -5])
+@rows("value", [0, 1, 2, 255, 4_001, 2**31 - 1, -1, -5])
 def test_px4s_integers_travel_as_their_bytes(value: int) -> None:
     parameters = VehicleParameters(bytewise=True)
     parameters.read("GF_ACTION")

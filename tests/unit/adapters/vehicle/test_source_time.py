@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -11,6 +10,7 @@ from reference.stamped_link import LinkKind, StampedVehicle
 from rtshcua.adapters.vehicle.source_time import APART_US, DRIFT_US, EACH_US, GAP_US, STEP_US, SourceTime
 from rtshcua.codec.frames import Received, kind_of
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 S = 1_000_000
 UNIX_US = 1_767_225_600_000_000
@@ -64,7 +64,7 @@ def sensor(boot_ms: int) -> Any:
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 0, 3)
 
 
-@pytest.mark.parametrize(("message", "made_us"), [
+@rows(("message", "made_us"), [
     (place(4_000), 10 * S),
     (place(1_000), 7 * S),  # 3 s on the way
     (gps(3_900_000), 9_900_000),

@@ -19,6 +19,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Crashed, Failed, Ready, Succeeded, TakenOver
 from rtshcua.simulation.vehicle import Vehicle
 from virtual.policy import POLICY
+from virtual.rows import rows
 from virtual.sampling import each_once
 
 Make = Callable[..., Any]
@@ -125,7 +126,7 @@ def test_a_hold_that_drifts_away_has_failed(aloft: Make, monkeypatch: pytest.Mon
 BRAKES = Brakes(2_000, 500_000)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("passed_s", "fastest"),
     [(0, 10_000), (0.5, 10_000), (2.5, 10_000), (3.5, 8_000), (5.0, 5_000), (7.0, 1_000), (7.5, STILL), (60, STILL)],
 )

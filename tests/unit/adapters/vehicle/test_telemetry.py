@@ -18,6 +18,7 @@ from rtshcua.model.flat.signal import SignalSource
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from virtual.policy import BATTERY, FIX, HEIGHT, LINK, POLICY, POSITION_X, PROJECTION, WIND
+from virtual.rows import rows
 
 S = 1_000_000
 HOME = (PROJECTION.latitude, PROJECTION.longitude)
@@ -35,7 +36,7 @@ def wind(north: float, east: float) -> Any:
     return mavlink.MAVLink_wind_cov_message(0, north, east, 0, 0, 0, 0, 0, 0)
 
 
-@pytest.mark.parametrize(("message", "values"), [
+@rows(("message", "values"), [
     (battery(57), {BATTERY: 5_700}),
     (battery(-1), {BATTERY: None}),
     (position(*HOME), {HEIGHT: 20_000, POSITION_X: 0, POSITION_X + 1: 0}),

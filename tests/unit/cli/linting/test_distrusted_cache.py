@@ -13,6 +13,7 @@ from rtshcua.adapters.files import lint_cache
 from rtshcua.adapters.files.lint_cache import LintCache
 from rtshcua.cli.linting.examined import decoded
 from rtshcua.diagnostics.exits import ExitCode
+from virtual.rows import rows
 
 FOLDER = Path(".rtshcua_cache")
 
@@ -119,7 +120,7 @@ def test_what_is_remembered_is_about_what_was_read(here: Path, lint: Lint, own: 
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
 
 
-@pytest.mark.parametrize(
+@rows(
     "harm", [{"members": 1}, {"members": [1]}, {"reads": []}, {"reads": {"a": 1}}, {"packs": {"a": 1}}, {"result": 1}]
 )
 def test_a_tree_of_another_shape_is_none(harm: dict[str, object]) -> None:

@@ -13,6 +13,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.lint import lint as rules
 from rtshcua.ground.lint.fixes import fixed
+from virtual.rows import rows
 
 IDLE = "// rtshcua: ignore E1304 because the register says so\n"
 WITHOUT = POLICY.replace(f"{UNUSED}\n", "")
@@ -109,7 +110,7 @@ def finding(start: int, end: int, replacement: str, how: Applicability = Applica
     return Diagnostic(codes.NAMING, "it is so", fix.span, fixes=(fix,))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("findings", "expected"),
     [
         ([finding(0, 1, "A"), finding(3, 4, "")], "Abc"),

@@ -26,6 +26,7 @@ from rtshcua.evidence.proofs.check import check_proof
 from rtshcua.evidence.proofs.file import MAX_PROOF
 from rtshcua.wire import cbor
 from virtual import case
+from virtual.rows import rows
 
 Change = Callable[[Parts], None]
 
@@ -127,7 +128,7 @@ INCLUSION: list[tuple[Change, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("change", "slug"), INCLUSION)
+@rows(("change", "slug"), INCLUSION)
 def test_a_changed_proof_of_inclusion_is_refused(change: Change, slug: str) -> None:
     parts = inclusion(3)
     assert parts.slug() == "believed"
@@ -157,7 +158,7 @@ def test_a_changed_proof_of_consistency_is_refused(change: Change, slug: str) ->
     assert parts.slug() == slug
 
 
-@pytest.mark.parametrize(
+@rows(
     ("change", "slug"),
     [
         (put("signed", inclusion(3).extra["signed"]), "proof/signed"),
@@ -218,7 +219,7 @@ def test_what_a_proof_carries_must_be_in_its_one_form() -> None:
     assert found.slug == "proof/extra"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("changed", "slug"),
     [
         ({"signature": 7}, "proof/malformed"),

@@ -4,8 +4,6 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 from reference.proof_mutations import check, cosigned
 from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
@@ -16,6 +14,7 @@ from rtshcua.evidence.proofs.make import (
     receipt_of,
     with_cosignatures,
 )
+from virtual.rows import rows
 
 VECTORS = Path(__file__).resolve().parents[3] / "vectors" / "proof"
 LOG = sealed_log(recovers=True)
@@ -39,7 +38,7 @@ MADE: dict[str, Callable[[], bytes | Flaw]] = {
 }
 
 
-@pytest.mark.parametrize("name", MADE)
+@rows("name", MADE)
 def test_a_proof_is_made_as_it_was(name: str) -> None:
     made = MADE[name]()
     assert isinstance(made, bytes)
@@ -49,7 +48,7 @@ def test_a_proof_is_made_as_it_was(name: str) -> None:
     assert made == (VECTORS / name).read_bytes()
 
 
-@pytest.mark.parametrize("name", [name for name in MADE if "." in name and name not in ("log.jsonl", "root.key")])
+@rows("name", [name for name in MADE if "." in name and name not in ("log.jsonl", "root.key")])
 def test_a_proof_that_was_made_verifies(name: str) -> None:
     assert check((VECTORS / name).read_bytes()) == "true"
 

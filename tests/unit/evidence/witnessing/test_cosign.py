@@ -8,6 +8,7 @@ import pytest
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.witnessing.cosign import Cosignature, cosign, cosignatures, name_of, read_cosignature
 from rtshcua.wire.keys import Duty, SigningKey, key_id
+from virtual.rows import rows
 
 KEY = SigningKey.from_seed(bytes([7]) * 32, duty=Duty.WITNESS)
 OTHER = SigningKey.from_seed(bytes([8]) * 32, duty=Duty.WITNESS)
@@ -41,7 +42,7 @@ def test_it_is_read_back() -> None:
     )
 
 
-@pytest.mark.parametrize("line", ["", "— a b\n", "— a AAAA\n", line_of()[:-1], line_of(OTHER), "x" + line_of()])
+@rows("line", ["", "— a b\n", "— a AAAA\n", line_of()[:-1], line_of(OTHER), "x" + line_of()])
 def test_lines_of_others_say_nothing(line: str) -> None:
     assert read_cosignature(line, TEXT, [KEY.public]) is None
     assert cosignatures(f"{TEXT}\n{line_of(OTHER)}", [KEY.public]) == (TEXT, [])

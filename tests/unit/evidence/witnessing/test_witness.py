@@ -23,6 +23,7 @@ from rtshcua.evidence.witnessing.witness import (
     vehicle_of,
 )
 from rtshcua.wire.keys import Duty
+from virtual.rows import rows
 
 
 def asked(log: Log, known: int | None, records: int | None = None) -> Request:
@@ -288,7 +289,7 @@ def test_what_is_no_checkpoint(note: str) -> None:
     assert refused(Judge(), Request(0, (), note)).status == MALFORMED
 
 
-@pytest.mark.parametrize(
+@rows(
     ("origin", "vehicle"),
     [(ORIGIN, VEHICLE), ("rtshcua/log/quad/00", "quad"), ("rtshcua/log/quad%2f/00", ""), ("rtshcua/log/a b/0", ""),
      ("log/quad/0", ""), ("rtshcua/log/", ""), ("rtshcua/log//0", ""), ("rtshcua/log/%FF/0", "")],
@@ -317,7 +318,7 @@ def test_the_body_is_that_of_the_page() -> None:
         assert decode(each.encode()) == each
 
 
-@pytest.mark.parametrize(
+@rows(
     "data",
     [
         b"",

@@ -19,6 +19,7 @@ from rtshcua.ground.agent.specification import parse_specification
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 POLICY = CHECKOUT / "policies" / "bridge_inspection.rts"
@@ -93,7 +94,7 @@ def test_strict_forms_say_what_they_may_and_all_that_they_must() -> None:
     assert "overrides" not in dumps(strict(SCHEMA))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("where", "value"),
     [
         (("phases", 0, "steps", 0, "skill"), "fly_away"),

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +18,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import UNITS, Dimension
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 LINEAR = sorted(Dimension, key=lambda one: one.value)
@@ -139,7 +139,7 @@ def test_every_example_fits_its_own_pattern() -> None:
     assert found["n"]["examples"] == ["5"]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("permitted", "least", "most"),
     [
         ("altitude > 10.5 m and altitude < 30.25 m", 10_501, 30_249),

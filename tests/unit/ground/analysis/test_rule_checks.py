@@ -8,6 +8,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 LIBRARY = str(CHECKOUT / "tests/golden/checker/library")
@@ -175,7 +176,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@rows("name", CASES)
 def test_rules_are_told_apart(name: str) -> None:
     rules, expected = CASES[name]
     got = found(rules)
@@ -255,11 +256,11 @@ def test_a_step_may_come_too_late_in_the_day(minutes: int, codes: list[str]) -> 
     assert [each.code.id for each in compiled.diagnostics] == codes
 
 
-@pytest.mark.parametrize(
+@rows(
     ("window", "codes"),
     [("08:00 .. 09:00", []), ("23:57 .. 00:08", []), ("08:00 .. 08:03", ["E0718"]), ("08:00 .. 08:04", ["E0718"])],
 )
-@pytest.mark.parametrize("permits", [1, 2])
+@rows("permits", [1, 2])
 def test_some_time_of_issue_must_do(window: str, codes: list[str], permits: int) -> None:
     permit = "permit takeoff by role operator when "
     rules = [f"{permit}local time in {window}", f"{permit}altitude > 20 m or local time in 12:00 .. 12:02"][:permits]

@@ -4,6 +4,7 @@ import pytest
 
 from rtshcua.evidence.records import Decision, Effect, RecordedContext, RecordedState
 from rtshcua.ground.auditor.cover import Cover
+from virtual.rows import rows
 
 STEP, FALLBACK, CONTINGENCY = 0, 1, 2
 DEGRADE = -1
@@ -33,8 +34,8 @@ def test_nothing_covers_what_nobody_decided(key: tuple[int, int, int]) -> None:
     assert slug(Cover(), sent(*key)) == "dispatch/not-permitted"
 
 
-@pytest.mark.parametrize("key", KEYS)
-@pytest.mark.parametrize("outcome", ["deny", "defer", "fallback"])
+@rows("key", KEYS)
+@rows("outcome", ["deny", "defer", "fallback"])
 def test_only_allow_covers(key: tuple[int, int, int], outcome: str) -> None:
     cover = Cover()
     cover.decided(decision(*key, outcome=outcome))

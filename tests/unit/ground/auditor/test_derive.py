@@ -10,6 +10,7 @@ from reference.kinds_of_flight import fallen_back
 from rtshcua.model.faults import BatteryLevel
 from virtual import case
 from virtual.flight import Flight
+from virtual.rows import rows
 
 M = case.M
 
@@ -39,7 +40,7 @@ def test_the_contingency_is_derived_again() -> None:
     assert prove(lines).report.failure is None
 
 
-@pytest.mark.parametrize(
+@rows(
     ("fields", "slug"),
     [
         ({"outcome": "fallback"}, "decision/outcome"),

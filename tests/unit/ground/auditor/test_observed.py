@@ -3,7 +3,6 @@
 import json
 from functools import cache
 
-import pytest
 from msgspec.structs import replace
 
 from reference import flat_case as flat
@@ -18,6 +17,7 @@ from rtshcua.ground.auditor.observed import Observed
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import Now
+from virtual.rows import rows
 
 LETTERS = {"T": 1, "F": 2, "U": 4}
 WINDS: dict[str, int | None] = {"T": 4 * M, "F": 9 * M, "U": None}
@@ -26,7 +26,7 @@ CALM = clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M)))
 SAID = clause("wind.speed < 8 m/s for the last 3 s", (Op.MONITOR, 0, 0))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("kind", "wind", "said", "refused"),
     [
         (FOR, "F", "F", None),
@@ -102,7 +102,7 @@ def test_a_log_with_monitors_is_derived_again() -> None:
     assert "monitors" in [claim.slug for claim in report.unproven]
 
 
-@pytest.mark.parametrize("monitors", [[], [1, 1], [0], [3], [8], [-1]])
+@rows("monitors", [[], [1, 1], [0], [3], [8], [-1]])
 def test_what_is_no_truth_of_each_monitor(monitors: list[int]) -> None:
     slug, record = forged(decisions()[0], monitors=monitors)
     assert record == decisions()[0]

@@ -1,13 +1,12 @@
 """An approval is awaited no longer than the decision on the step is valid, by its skill or by its own words."""
 
-import pytest
-
 from reference.sources import found, mission, policy, program, skill
+from virtual.rows import rows
 
 CONFIRM = "confirm probe by role supervisor within 10 min"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("skill_valid", "step", "findings"),
     [
         ("40 min", "probe()", 0),

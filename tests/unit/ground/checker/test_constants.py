@@ -4,8 +4,6 @@ from fractions import Fraction
 from pathlib import Path
 from random import Random
 
-import pytest
-
 from reference.naive_expression import SI, Names, World, known, number
 from reference.random_expressions import ALTITUDE, STEP, Maker
 from rtshcua.ground.checker.report import Report
@@ -17,6 +15,7 @@ from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.expression import Value
 from rtshcua.model.quantity import Dimension
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 
@@ -93,7 +92,7 @@ STORED = [
 ]
 
 
-@pytest.mark.parametrize(("argument", "code", "help"), STORED)
+@rows(("argument", "code", "help"), STORED)
 def test_an_argument_is_whole(argument: str, code: str, help: str | None) -> None:
     found = [(each.code.id, each.help) for each in compiled(argument).diagnostics if each.code.id < "E0606"]
     assert found == ([(code, help)] if help is not None or code == "E0322" else [])

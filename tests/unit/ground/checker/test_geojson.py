@@ -13,6 +13,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
 from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.geojson import GeoPolygon, read_area
+from virtual.rows import rows
 
 SQUARE = [[8.54, 47.39], [8.55, 47.39], [8.55, 47.40], [8.54, 47.40], [8.54, 47.39]]
 HOLE = [[8.542, 47.392], [8.542, 47.394], [8.544, 47.394], [8.544, 47.392], [8.542, 47.392]]
@@ -45,7 +46,7 @@ def refused(data: Any, name: str | None = None) -> Refused:
 POINT = {"type": "Point", "coordinates": [8.5, 47.3]}
 
 
-@pytest.mark.parametrize(
+@rows(
     ("tree", "name"),
     [
         (polygon(SQUARE, HOLE), None),
@@ -108,7 +109,7 @@ def test_fifteen_decimals_are_rounded_to_the_nearest_half_to_even(longitude: str
     assert found.outer[0] == tuple(round(Fraction(each) * 10_000_000) for each in (longitude, latitude))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("written", "whole"),
     [("1.00000005", 10_000_000), ("1.00000015", 10_000_002), ("-1.00000005", -10_000_000), ("1e1", 100_000_000),
      ("1E-7", 1), ("5e-8", 0), ("0.1500000e-6", 2), ("1e-999", 0), ("-0.0", 0)],
@@ -118,7 +119,7 @@ def test_numbers_are_decimal_digits_and_no_floats(written: str, whole: int) -> N
     assert read_area(text.encode(), None)[0].outer[0][0] == whole
 
 
-@pytest.mark.parametrize(
+@rows(
     ("data", "words"),
     [
         (b"", "line 1, column 1: expecting value"),
@@ -152,7 +153,7 @@ FIJI = [[179.9, -16], [-179.9, -16], [-179.9, -17], [179.9, -17], [179.9, -16]]
 BOW = [[8.0, 47.0], [8.1, 47.1], [8.1, 47.0], [8.0, 47.1], [8.0, 47.0]]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("tree", "name", "words"),
     [
         (POINT, None, "is a Point"),

@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import pytest
-
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 IMPORTS = """
@@ -82,7 +81,7 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "code", "help", "replacement"), CASES)
+@rows(("text", "code", "help", "replacement"), CASES)
 def test_one_mistake_is_one_finding_with_help(text: str, code: str, help: str | None, replacement: str | None) -> None:
     found = check(text)
     assert {each.code.id for each in found} == {code}

@@ -3,11 +3,12 @@
 import pytest
 
 from reference.sources import found, mission, policy, program
+from virtual.rows import rows
 
 FLIGHT = mission("takeoff(altitude = 10 m)", "hover(10 s)", "return_home()")
 
 
-@pytest.mark.parametrize(
+@rows(
     ("old", "new", "code", "word"),
     [
         ("on quad", "on quod", "E0201", "`quod`"),

@@ -1,11 +1,10 @@
 """A default is an argument like any other: of the parameter's type, and in its range, both ends included."""
 
-import pytest
-
 from reference.sources import found, program, skill
+from virtual.rows import rows
 
 
-@pytest.mark.parametrize(
+@rows(
     ("parameter", "codes"),
     [
         ("top: altitude in 5 m .. 30 m = 5 m", []),

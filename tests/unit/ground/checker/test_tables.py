@@ -2,19 +2,18 @@
 
 from pathlib import Path
 
-import pytest
-
 import rtshcua.ground as ground
 from rtshcua.diagnostics import codes
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.dialect import DATUM
 from rtshcua.mavlink.quantise import UNITS
 from rtshcua.model.quantity import Dimension
+from virtual.rows import rows
 
 GROUND = Path(ground.__file__).parent
 
 
-@pytest.mark.parametrize(("message", "field"), list(DATUM))
+@rows(("message", "field"), list(DATUM))
 def test_altitudes_of_known_datum_are_fields_with_a_length(message: str, field: str) -> None:
     assert dialect.load().messages[message].fields[field].unit in UNITS[Dimension.LENGTH]
 

@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-import pytest
-
 from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 
@@ -232,12 +231,12 @@ def findings(condition: str) -> list[str]:
     return [found.code.id for found in check_program(load(["x.rts"], read, str(CHECKOUT)), dialect.load())]
 
 
-@pytest.mark.parametrize("condition", GOOD)
+@rows("condition", GOOD)
 def test_it_has_a_meaning(condition: str) -> None:
     assert findings(condition) == []
 
 
-@pytest.mark.parametrize(("condition", "code"), BAD)
+@rows(("condition", "code"), BAD)
 def test_it_has_none_and_a_finding_says_why(condition: str, code: str) -> None:
     assert set(findings(condition)) == {code}
 
@@ -257,7 +256,7 @@ HELPS = [
 ]
 
 
-@pytest.mark.parametrize(("condition", "help"), HELPS)
+@rows(("condition", "help"), HELPS)
 def test_the_help_says_what_would_do(condition: str, help: str) -> None:
     def read(path: str) -> bytes:
         return SOURCE.replace("CONDITION", condition).encode() if path == "x.rts" else Path(path).read_bytes()
@@ -276,7 +275,7 @@ CALLED_PHASE = [
 ]
 
 
-@pytest.mark.parametrize("declaration", CALLED_PHASE)
+@rows("declaration", CALLED_PHASE)
 def test_nothing_that_has_a_value_is_called_phase(declaration: str) -> None:
     def read(path: str) -> bytes:
         return (

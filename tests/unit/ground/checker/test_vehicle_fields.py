@@ -1,8 +1,7 @@
 """Each figure of a vehicle is of its dimension, and a reserve leaves something to fly with."""
 
-import pytest
-
 from reference.sources import found
+from virtual.rows import rows
 
 VEHICLE = """
 vehicle glider {
@@ -12,7 +11,7 @@ vehicle glider {
 """
 
 
-@pytest.mark.parametrize(
+@rows(
     ("old", "new", "codes"),
     [
         ("", "", []),

@@ -6,6 +6,7 @@ from reference import sources
 from reference.sources import found
 from rtshcua import library
 from rtshcua.cli.sources import compile_sources
+from virtual.rows import rows
 
 SIGNALS = "".join(
     f"signal {name} : {type} = GLOBAL_POSITION_INT.{field}  stale after 2 s\n"
@@ -56,7 +57,7 @@ def test_it_comes_to_a_deceleration_rounded_down_and_the_slots_of_its_signals() 
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
+@rows(
     ("brakes", "code"),
     [
         ("brakes from 12 m in 6 s after 500 ms", "E0310"),

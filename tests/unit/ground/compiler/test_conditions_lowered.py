@@ -11,6 +11,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import MonitorKind, Policy
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 
@@ -123,7 +124,7 @@ CODE = [
 ]
 
 
-@pytest.mark.parametrize(("condition", "code"), CODE)
+@rows(("condition", "code"), CODE)
 def test_code(condition: str, code: str) -> None:
     policy, contract = lowered(condition)
     (clause,) = contract.maintain
@@ -196,7 +197,7 @@ TOO_LARGE = [
 ]
 
 
-@pytest.mark.parametrize(("condition", "code"), TOO_LARGE)
+@rows(("condition", "code"), TOO_LARGE)
 def test_what_does_not_fit_on_board_says_so(condition: str, code: str) -> None:
     assert {each.code.id for each in compiled(condition).diagnostics} == {code}
 

@@ -8,6 +8,7 @@ from rtshcua.ground.compiler.proofs import observation
 from rtshcua.ground.compiler.proofs.rates import COMMANDS, RATES
 from rtshcua.mavlink import dialect
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
+from virtual.rows import rows
 
 LAND = {"motion": "land", "fallback": "", "class": "tactical"}
 
@@ -29,7 +30,7 @@ def test_the_figures_are_those_of_what_flies() -> None:
 # ---------------------------------------------------------------- E0618
 
 
-@pytest.mark.parametrize(
+@rows(
     ("parts", "expected"),
     [
         ({}, []),
@@ -39,7 +40,7 @@ def test_the_figures_are_those_of_what_flies() -> None:
         ({"maintain": "local time in 08:00 .. 18:00"}, []),  # that is known without any signal
     ],
 )
-@pytest.mark.parametrize("place", ["contingency", "fallback"])
+@rows("place", ["contingency", "fallback"])
 def test_a_last_link_can_when_nothing_is_known_and_only_the_reserve_is_left(
     parts: dict[str, str], expected: list[str], place: str
 ) -> None:
@@ -67,7 +68,7 @@ def test_a_last_link_comes_down_from_the_highest_step(seconds: int, expected: li
 # ---------------------------------------------------------------- E0806, E0807
 
 
-@pytest.mark.parametrize(
+@rows(
     ("parts", "expected"),
     [
         ({"deadline": "30 s", "valid": "for 30 s", "lasts": "at most 30 s"}, []),
@@ -113,7 +114,7 @@ def test_a_step_of_its_own_times_is_looked_at_too(block: str, expected: list[str
 SLOW = "signal slow : speed = WIND.speed stale after {}\n"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("stale", "lasts", "expected"),
     [
         ("10 s", "2020 ms", []),  # 1 s to the next report, 20 ms, 1 s
@@ -138,7 +139,7 @@ def test_what_is_only_required_is_not_watched() -> None:
 # ---------------------------------------------------------------- E0717
 
 
-@pytest.mark.parametrize(
+@rows(
     ("parts", "expected"),
     [
         ({"deadline": "1 s", "require": "wind.speed < 9 m/s"}, []),
@@ -198,7 +199,7 @@ LONG = "battery > 20 % for the last {}"
 RARE = "battery > 20 % within the last {}"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("permits", "expected"),
     [
         ([LONG.format("5 min")], []),
@@ -252,7 +253,7 @@ def test_a_window_holds_more_than_one_report(window: str, kind: str, expected: l
     assert codes(probe, policy()) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("clause", "expected"),
     [
         ("up <= 40 m", ["E1203"]),
@@ -268,7 +269,7 @@ def test_what_is_maintained_can_change(clause: str, expected: list[str]) -> None
     assert codes(skill("probe(up: altitude in 5 m .. 50 m)", **parts), policy()) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("timing", "record", "expected"),
     [
         ("tactical", "decision, state, authorization", []),

@@ -13,6 +13,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.binding import bind
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 AT = 1_700_000_000_000_000
@@ -89,7 +90,7 @@ def test_clauses_of_several_lines_all_count_in_their_order() -> None:
     assert [clause.text for clause in watch.require] == ["battery > 40 %", "gps.fix >= fix_3d", "height < 40 m"]
 
 
-@pytest.mark.parametrize(
+@rows(
     "parts",
     [
         {"clause": "assume obstacle.distance > 4 m"},
@@ -113,7 +114,7 @@ def test_what_reads_a_sensor_that_is_not_fitted_is_refused(parts: dict[str, str]
     assert "E0413" not in codes(compiled(**parts))
 
 
-@pytest.mark.parametrize(
+@rows(
     ("without", "code"),
     [
         ("without obstacle.distanse", "E0201"),

@@ -3,6 +3,7 @@
 import pytest
 
 from reference.sources import found, mission, policy, program, skill
+from virtual.rows import rows
 
 UP = "takeoff(altitude = 20 m)"
 HOME = "return_home()"
@@ -14,7 +15,7 @@ def codes(*steps: str, skills: str = "") -> list[str]:
     return [code for code, _ in found(program(skills, policy(), mission(*steps)))]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("steps", "expected"),
     [
         ((UP, HOME), []),
@@ -37,7 +38,7 @@ def test_steps_follow_each_other(steps: tuple[str, ...], expected: list[str]) ->
     assert codes(*steps) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("clause", "expected"),
     [
         ("height >= 20 m", []),
@@ -49,7 +50,7 @@ def test_steps_follow_each_other(steps: tuple[str, ...], expected: list[str]) ->
         ("landed in {on_ground, landing}", ["E0619"]),
     ],
 )
-@pytest.mark.parametrize("kind", ["require", "assume"])
+@rows("kind", ["require", "assume"])
 def test_clauses_over_what_motions_determine_must_be_able_to_hold(clause: str, expected: list[str], kind: str) -> None:
     assert codes(UP, "probe()", HOME, skills=skill("probe()", **{kind: clause})) == expected
 

@@ -3,6 +3,7 @@
 import pytest
 
 from reference.sources import found, program, skill
+from virtual.rows import rows
 
 BASE = """
   permit return_home, emergency_land by any
@@ -24,7 +25,7 @@ LISTEN = "permit listen by role rescuer when {}"
 ALWAYS = "the link `listen` is not always permitted to `rescuer` through `operator`"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("search", "listen", "expected"),
     [
         ("phase == search", "phase == search", []),

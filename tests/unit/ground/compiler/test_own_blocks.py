@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import pytest
-
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 LIBRARY = str(CHECKOUT / "tests/golden/checker/library")
@@ -71,7 +70,7 @@ def quoted(found: Diagnostic, **parts: str) -> str:
     return (HEAD + TEXT.format(**parts))[found.span.start : found.span.end]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("own", "code", "at"),
     [
         ("", None, ""),
@@ -91,7 +90,7 @@ def test_a_block_is_held_to_what_its_skill_is(own: str, code: str | None, at: st
         assert found[code] == at
 
 
-@pytest.mark.parametrize(
+@rows(
     ("parts", "code", "at"),
     [
         ({"rule": "degrade any when battery < 20 % to wait_here"}, "E0611", "wait_here"),

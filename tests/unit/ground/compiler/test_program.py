@@ -19,6 +19,7 @@ from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import mission_payload, policy_digest, policy_payload
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 MISSIONS = sorted(path.stem for path in (CHECKOUT / "missions").glob("*.rts"))
@@ -68,7 +69,7 @@ def test_what_ships_compiles_without_a_finding_and_is_taken_on_board(name: str) 
     assert not isinstance(steps, Refusal), steps
 
 
-@pytest.mark.parametrize("name", [path for path in SHIPPED if "/skills/" not in path])
+@rows("name", [path for path in SHIPPED if "/skills/" not in path])
 def test_what_ships_checks_without_a_finding(name: str) -> None:
     assert check_program(program_of(name.removeprefix("lib:")), dialect.load()) == ()
 

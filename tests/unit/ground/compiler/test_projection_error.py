@@ -7,12 +7,12 @@ the lengths here; no normal section of WGS 84 is curved more than at the equator
 
 import math
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.model.flat.zone import project, unproject
+from virtual.rows import rows
 
 A, F = 6_378_137_000.0, 1 / 298.257223563  # mm
 E2 = F * (2 - F)
@@ -66,7 +66,7 @@ def test_distances_in_the_plane_are_true_to_within_the_stated_bound(
     assert low <= allowed
 
 
-@pytest.mark.parametrize(
+@rows(
     ("latitude", "km", "stated"),
     [(0, 0.5, 1), (0, 5, 1), (47.4, 0.5, 9), (47.4, 2, 35), (47.4, 5, 87), (47.4, 10, 175), (60, 5, 139), (70, 5, 221)],
 )

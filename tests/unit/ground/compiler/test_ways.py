@@ -13,6 +13,7 @@ from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.ground.compiler.proofs.fan import Fan, Landmarks, disc, hull
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
+from virtual.rows import rows
 
 POINTS = st.tuples(st.integers(-40, 40), st.integers(-40, 40))
 
@@ -125,7 +126,7 @@ def test_where_home_may_really_be_counts(within: int, expected: list[str]) -> No
     assert [code for code, _ in found(program(other(within), pole, rules, flight))] == expected
 
 
-@pytest.mark.parametrize("within", [5, 20, 26, 30, 60, 200, 2000])
+@rows("within", [5, 20, 26, 30, 60, 200, 2000])
 def test_the_less_is_known_of_home_the_more_is_found(within: int) -> None:
     yard = "zone yard = circle(47.39774 N, 8.54559 E, 30 m)\n"
     flight = mission(UP, "hover()", HOME).replace("on quad", "on other")
@@ -146,7 +147,7 @@ def test_zones_with_times_are_left_for_on_board() -> None:
     assert found(program(night, policy("airspace inside city outside night"), vehicle_clock)) == []
 
 
-@pytest.mark.parametrize(
+@rows(
     ("link", "expected"),
     [
         ("goto(47.39799 N, 8.54559 E, altitude = 20 m)", []),

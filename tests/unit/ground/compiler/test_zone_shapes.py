@@ -22,6 +22,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone, project
+from virtual.rows import rows
 
 #: 400 m by 222 m, with a courtyard
 YARD = """zone yard = polygon(47.3970 N, 8.5440 E, 47.3970 N, 8.5493 E, 47.3990 N, 8.5493 E, 47.3990 N, 8.5440 E)
@@ -248,7 +249,7 @@ def test_a_floor_and_no_ceiling_go_up_to_the_highest() -> None:
     assert zone(lowered(f"{YARD} floor 5 m\n"), "yard").ceiling == HIGHEST
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "code", "words"),
     [
         ("zone way = corridor(47.39 N, 8.54 E, width 40 m)", "E0516", "has 1 place, and needs two"),

@@ -1,10 +1,10 @@
 """Places as editors count them, against counting by encoding; changes, against cutting the text."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.editor.positions import Change, Edit, Encoding, Lines, Place, difference, edited
+from virtual.rows import rows
 
 TEXTS = st.lists(st.sampled_from(["a", "é", "€", "𝄞", "\n", "\r", "\r\n", "\f", " "]), max_size=20).map("".join)
 ENCODINGS = st.sampled_from(Encoding)
@@ -39,7 +39,7 @@ def test_a_place_and_back(text: str, encoding: Encoding, offset: int) -> None:
         assert lines.offset(place) == offset
 
 
-@pytest.mark.parametrize(
+@rows(
     ("place", "encoding", "offset"),
     [
         (Place(0, 0), Encoding.UTF_16, 0),

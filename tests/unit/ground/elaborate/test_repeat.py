@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from rtshcua.ground.elaborate.repeat import unrolled
 from rtshcua.ground.language.parse import parse
 from rtshcua.model.flat.limits import MAX_INVOCATIONS
 from rtshcua.model.ir.missions import MissionDecl
+from virtual.rows import rows
 
 Compile = Callable[..., Compiled]
 Check = Callable[[str], Checked]
@@ -60,7 +60,7 @@ def test_it_is_unrolled_in_order(phase: list[Any]) -> None:
     assert len(set(map(id, steps))) == len(steps) or plain is mission
 
 
-@pytest.mark.parametrize(
+@rows(
     ("body", "codes", "steps"),
     [
         ("repeat 0 { a() }", ["E0319"], 2),

@@ -1,10 +1,9 @@
 """Comments: each stays in its place, whatever is laid out around it; no `//` ever swallows code."""
 
-import pytest
-
 from fuzz.targets.format import pieces
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format import formatted
+from virtual.rows import rows
 
 CONTRACT = "skill s() {\n  deadline 2 s\n  require  battery > 30 % and gps.fix >= fix_3d\n}\n"
 
@@ -44,14 +43,14 @@ def laid_out(text: str) -> str | None:
     return made.text
 
 
-@pytest.mark.parametrize("before", TABLE)
+@rows("before", TABLE)
 def test_places(before: str) -> None:
     after = TABLE[before] or before
     assert laid_out(before) == after
     assert laid_out(after) == after
 
 
-@pytest.mark.parametrize("comment", ["// a\n", "/* a */", "/* a\n b */", "\n// a\n", "\n/* a */\n", '// */ "\n'])
+@rows("comment", ["// a\n", "/* a */", "/* a\n b */", "\n// a\n", "\n/* a */\n", '// */ "\n'])
 def test_between_any_two_words(comment: str) -> None:
     """The words before and after a comment are those that were there."""
     for text in (CONTRACT, 'mission m under p@1 on v { intent "x"  phase a { b(c = 1, 2 m) } }'):
@@ -84,7 +83,7 @@ def test_a_comment_that_is_too_wide_moves_no_other() -> None:
     assert f"  deadline 2 s  // {wide}\n" in (laid_out(text) or "")
 
 
-@pytest.mark.parametrize("end", list("\xa0\u3000\u2028\u2029\x85\v\x1c\x1d\x1e\x1f\ufeff"), ids=ascii)
+@rows("end", list("\xa0\u3000\u2028\u2029\x85\v\x1c\x1d\x1e\x1f\ufeff"), ids=ascii)
 def test_what_is_no_blank_stays_at_the_end_of_a_comment(end: str) -> None:
     for text in (f"// a{end}\n", f"skill s() {{  // a{end}\n}}\n", f"/* a{end}\n b{end} */\n"):
         assert laid_out(text) == text

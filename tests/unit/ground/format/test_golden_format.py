@@ -3,10 +3,9 @@
 import re
 from pathlib import Path
 
-import pytest
-
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format import formatted
+from virtual.rows import rows
 
 GOLDEN = Path(__file__).resolve().parents[3] / "golden" / "format"
 PAIRS = sorted(GOLDEN.glob("*.before.rts"))
@@ -16,7 +15,7 @@ def read(path: Path) -> str:
     return path.read_bytes().decode()
 
 
-@pytest.mark.parametrize("before", PAIRS, ids=lambda path: path.name.partition(".")[0])
+@rows("before", PAIRS, ids=lambda path: path.name.partition(".")[0])
 def test_golden(before: Path) -> None:
     after = before.with_name(before.name.replace(".before.", ".after."))
     made = formatted(Source("x.rts", read(before)))

@@ -4,6 +4,7 @@ import pytest
 
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format import formatted
+from virtual.rows import rows
 
 
 def laid_out(text: str, width: int = 120) -> str:
@@ -13,7 +14,7 @@ def laid_out(text: str, width: int = 120) -> str:
     return made.text
 
 
-@pytest.mark.parametrize(
+@rows(
     ("written", "meant"),
     [
         ("require a<1 and b>=2", "require a < 1 and b >= 2"),
@@ -36,7 +37,7 @@ def test_blanks_within_a_line(written: str, meant: str) -> None:
     assert laid_out(f"skill s() {{ {written} }}") == f"skill s() {{ {meant} }}\n"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("written", "meant"),
     [
         ("signal a:b=C.d", "signal a : b = C.d"),

@@ -13,6 +13,7 @@ from rtshcua.ground.format.read import read
 from rtshcua.ground.format.same import difference
 from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.parse import parse
+from virtual.rows import rows
 
 TEXT = """// a
 skill s(p: length, q: speed = 1 m/s) {
@@ -23,7 +24,7 @@ skill s(p: length, q: speed = 1 m/s) {
 """
 
 
-@pytest.mark.parametrize(
+@rows(
     "text",
     [
         "zone z = 3", "skill s() {", "skill s() { deadline 2 s", '"', "/* a", "zone z = circle(1 N, 2 E, 3 m) \0 // b",

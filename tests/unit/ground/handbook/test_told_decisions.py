@@ -5,8 +5,6 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
-import pytest
-
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.handbook.cases import Tried
@@ -17,6 +15,7 @@ from rtshcua.ground.language.load import load
 from rtshcua.ground.testing.run import run_case
 from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 BEFORE = "".join(
@@ -49,7 +48,7 @@ def chapter(rules: str) -> Chapter:
     return found
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "answer"),
     [
         ("permit goto by role operator", "yes"),

@@ -5,8 +5,6 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, get_args, get_type_hints
 
-import pytest
-
 import rtshcua.model.ir as ir
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.handbook.cases import told_test
@@ -33,6 +31,7 @@ from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, Rule
 from rtshcua.model.ir.skills import SkillDecl
+from virtual.rows import rows
 
 NAMES = Vocabulary(
     frozenset(
@@ -52,7 +51,7 @@ def condition(text: str) -> Condition:
     return rule.when
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "words"),
     [
         ("battery > 35 %", "`battery` is above 35 %"),

@@ -15,6 +15,7 @@ from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.table import table
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 GRAMMAR = generate.GRAMMAR.read_text(encoding="utf-8")
@@ -110,7 +111,7 @@ def test_damaged_sources(data: st.DataObject) -> None:
     agree(damaged)
 
 
-@pytest.mark.parametrize("text", SHIPPED)
+@rows("text", SHIPPED)
 def test_shipped_sources_fit(text: str) -> None:
     assert fits(text)
     agree(text)

@@ -2,7 +2,6 @@
 
 from fractions import Fraction
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from rtshcua.ground.language.exact import LIMIT, Trouble, exact
 from rtshcua.ground.language.parse import parse
 from rtshcua.model.ir.expression import Comparison, Quantity
 from rtshcua.model.quantity import UNITS, Datum, Dimension, display
+from virtual.rows import rows
 
 DIGITS = st.text("0123456789", min_size=1, max_size=24)
 
@@ -36,7 +36,7 @@ def test_what_is_displayed_is_read_back(value: int, dimension: Dimension) -> Non
     assert exact(number, unit or None) == (value, dimension, None)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("number", "unit", "expected"),
     [
         ("0", "m", 0),
@@ -73,7 +73,7 @@ def quantity(text: str) -> Quantity:
     return condition.right
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "value", "dimension", "datum"),
     [
         ("20 m", 20_000, Dimension.LENGTH, None),

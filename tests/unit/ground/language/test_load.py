@@ -2,12 +2,11 @@
 
 from collections.abc import Iterable
 
-import pytest
-
 from rtshcua.diagnostics.codes import IMPORT_CYCLE, IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE, Severity
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.load import Program, load
+from virtual.rows import rows
 
 
 class Files:
@@ -76,7 +75,7 @@ def test_files_of_a_circle_of_imports_are_read_once() -> None:
     assert circles(program) == [("c", "abca"), ("b", "bb")]
 
 
-@pytest.mark.parametrize(
+@rows(
     ("files", "expected"),
     [
         ({"a": "b", "b": ""}, []),
@@ -154,7 +153,7 @@ def test_a_file_of_a_zone_that_is_missing() -> None:
     assert found.fixes == ()
 
 
-@pytest.mark.parametrize("path", ["", "/etc/passwd", "C:x.geojson", "a\\\\b.geojson", "~/x", "http://x/y.geojson"])
+@rows("path", ["", "/etc/passwd", "C:x.geojson", "a\\\\b.geojson", "~/x", "http://x/y.geojson"])
 def test_paths_of_zones_that_mean_nothing_elsewhere(path: str) -> None:
     files = Files(a=f'zone z from "{path}"')
     (found,) = files.load("a").diagnostics
@@ -216,7 +215,7 @@ def test_without_listing_there_is_no_suggestion() -> None:
     assert (found.code, found.help) == (NO_SUCH_FILE, None)
 
 
-@pytest.mark.parametrize("path", ["", "/etc/passwd", "C:x.rts", "a\\\\b.rts", "~/x.rts", "http://x/y.rts"])
+@rows("path", ["", "/etc/passwd", "C:x.rts", "a\\\\b.rts", "~/x.rts", "http://x/y.rts"])
 def test_paths_that_mean_nothing_elsewhere(path: str) -> None:
     files = Files(a=f'import "{path}"')
     (found,) = files.load("a").diagnostics

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.language.moment import moment
+from virtual.rows import rows
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 OFFSETS = st.integers(-24 * 60 + 1, 24 * 60 - 1).map(lambda minutes: timezone(timedelta(minutes=minutes)))
@@ -20,7 +21,7 @@ def test_as_the_standard_library_reads_them(expected: int, zone: timezone) -> No
     assert moment(time.isoformat().replace("T", "t")) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "expected"),
     [
         ("1970-01-01T00:00Z", 0),
@@ -38,7 +39,7 @@ def test_by_hand(text: str, expected: int) -> None:
     assert moment(text) == expected
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "why"),
     [
         ("", "a date, `T`"),

@@ -8,6 +8,7 @@ import pytest
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.parse import parse
 from rtshcua.model.ir.program import Unit
+from virtual.rows import rows
 
 Read = Callable[[str], Unit]
 Plain = Callable[[Any], Any]
@@ -117,7 +118,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("body", "message"), WRONG)
+@rows(("body", "message"), WRONG)
 def test_what_is_not_written_as_it_must_be(body: str, message: str | None) -> None:
     parsed = parse(Source("x.rts", f'scenario "it" {{ {body} }}'))
     assert len(parsed.diagnostics) == 1

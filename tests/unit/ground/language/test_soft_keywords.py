@@ -1,11 +1,10 @@
 """Words of the language are names wherever the grammar asks for a name."""
 
-import pytest
-
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.table import table
+from virtual.rows import rows
 
 SOFT = sorted(word for word, free in table().words.items() if free)
 RESERVED = sorted(word for word, free in table().words.items() if not free)
@@ -67,19 +66,19 @@ test "x" from § {
 LED = ["abs", "circle", "corridor", "difference", "falling", "grow", "max", "min", "polygon", "rising", "union"]
 
 
-@pytest.mark.parametrize("word", [*SOFT, *LED, "repeat", "one", "local"])
+@rows("word", [*SOFT, *LED, "repeat", "one", "local"])
 def test_soft(word: str) -> None:
     assert parse(Source("x", EVERYWHERE.replace("§", word))).diagnostics == ()
 
 
-@pytest.mark.parametrize("word", RESERVED)
+@rows("word", RESERVED)
 def test_reserved(word: str) -> None:
     (found,) = parse(Source("x", f"signal {word} : ratio = A.b stale after 5 s")).diagnostics
     assert found.code is SYNTAX
     assert found.message == f"`{word}` is a reserved word, so it is no name"
 
 
-@pytest.mark.parametrize("word", [*LED, "repeat", "on"])
+@rows("word", [*LED, "repeat", "on"])
 def test_words_that_stand_before_a_name_of_their_own(word: str) -> None:
     text = f"mission m under p@1 on v {{ phase a {{ {word}() {word} () on inadmissible skip {word}({word}) }} }}"
     parsed = parse(Source("x", text))
@@ -87,8 +86,8 @@ def test_words_that_stand_before_a_name_of_their_own(word: str) -> None:
     assert [step.skill.text for step in parsed.unit.missions[0].phases[0].steps] == [word] * 3
 
 
-@pytest.mark.parametrize("word", ["rising", "falling"])
-@pytest.mark.parametrize(
+@rows("word", ["rising", "falling"])
+@rows(
     "text",
     [
         "§ < 3",

@@ -21,6 +21,7 @@ from rtshcua.model.ir.missions import Overrides, Repeat, Step
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import Circle, Combination, Corridor, Daily, Dates, GeoJson, Polygon
 from rtshcua.model.ir.policies import Delegation, Rule, Use
+from virtual.rows import rows
 
 SHIPPED = sorted(path for folder in ("skills", "policies", "missions") for path in
                  (Path(__file__).resolve().parents[4] / folder).glob("*.rts"))  # fmt: skip
@@ -93,7 +94,7 @@ def without_spans(value: object) -> object:
     return value
 
 
-@pytest.mark.parametrize("text", [pytest.param(read(path), id=path.stem) for path in (*SHIPPED, FORMS)] + [CORNERS])
+@rows("text", [pytest.param(read(path), id=path.stem) for path in (*SHIPPED, FORMS)] + [CORNERS])
 def test_spans(text: str) -> None:
     source = Source("x.rts", text)
     parsed = parse(source)

@@ -1,8 +1,7 @@
 """The rules about what a policy decides: what they find, and above all what they leave alone."""
 
-import pytest
-
 from reference.linted import HEAD, decided
+from virtual.rows import rows
 
 SKILLS = HEAD + "".join(f'import "lib:skills/{name}.rts"\n' for name in ("takeoff", "hover", "goto", "inspect_area"))
 SAFE = "permit hover, return_home, emergency_land by any contingency return_home, emergency_land"
@@ -23,7 +22,7 @@ zone near = circle(47.3977 N, 8.5456 E, 12 km)
 ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when altitude > 30 m"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "gates"),
     [
         (ALL, False),
@@ -80,7 +79,7 @@ BOX = "polygon(47.599 N, 8.545 E, 47.599 N, 8.546 E, 47.598 N, 8.546 E, 47.598 N
 WIDE = "polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("zone", "airspace", "idle"),
     [
         (FAR, "inside city outside far", True),
@@ -113,7 +112,7 @@ def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, 
 # ---------------------------------------------------------------------------------------------------- E1308
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "bounded"),
     [
         ("permit goto by role operator", False),
@@ -145,7 +144,7 @@ def test_a_permit_to_fly_anywhere(rules: str, bounded: bool) -> None:
 SITTING = "skill sit() { motion land class tactical deadline 9 s valid for 9 min lasts at most 9 s energy at most 1 % }"
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "how_many"),
     [
         ("degrade any when battery < 25 % to return_home", 1),
@@ -165,7 +164,7 @@ def test_a_degrade_that_keeps_from_landing(rules: str, how_many: int) -> None:
 # ---------------------------------------------------------------------------------------------------- E1303
 
 
-@pytest.mark.parametrize(
+@rows(
     ("rules", "broad"),
     [
         ("permit takeoff by role operator through agent, operator", False),

@@ -1,6 +1,5 @@
 """Comments that ignore: `sift` says what a naive reading says, of any text and any findings."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,6 +11,7 @@ from rtshcua.ground.format.comments import gap_of
 from rtshcua.ground.lint.comments import comments
 from rtshcua.ground.lint.ignores import ignores
 from rtshcua.ground.lint.sift import sift
+from virtual.rows import rows
 
 CODES = (codes.NAMING, codes.UNUSED, codes.UNDECIDED, codes.SYNTAX, codes.UNUSED_IGNORE)
 PIECES = st.sampled_from(
@@ -57,7 +57,7 @@ def test_a_fix_takes_an_ignore_out_and_nothing_else(text: str) -> None:
         assert outside.startswith(("//", "/*")) or "because" not in gone
 
 
-@pytest.mark.parametrize(
+@rows(
     ("comment", "line"),
     [
         ("\n{} \na\n", 3),
@@ -75,7 +75,7 @@ def test_the_line_that_an_ignore_is_about(comment: str, line: int) -> None:
         assert given.line == line
 
 
-@pytest.mark.parametrize(
+@rows(
     ("reason", "says_why"),
     [
         ("the letter says 30 m", True), ("EU 2019/947", True), ("das Amt für X", True), ("规定如此", True),
@@ -87,9 +87,9 @@ def test_a_reason_has_letters(reason: str, says_why: bool) -> None:
     assert [each.code.id for each in read.faults] == ([] if says_why else ["E1310"])
 
 
-@pytest.mark.parametrize("blank", ["", " ", "\t", "\u00a0", "\u3000", "\x0b", "\x1c", "\u2028"])
-@pytest.mark.parametrize("word", ["ignore", "ignore-file", "ignored", "ignore,"])
-@pytest.mark.parametrize("marks", ["//{}", "/*{}*/"])
+@rows("blank", ["", " ", "\t", "\u00a0", "\u3000", "\x0b", "\x1c", "\u2028"])
+@rows("word", ["ignore", "ignore-file", "ignored", "ignore,"])
+@rows("marks", ["//{}", "/*{}*/"])
 def test_the_formatter_means_the_same_comments(blank: str, word: str, marks: str) -> None:
     comment = marks.format(f"{blank}rtshcua:{blank}{word} E1302 because it is so")
     (row,) = gap_of(f"\n{comment}\n", at_start=True, at_end=False).comments

@@ -9,6 +9,7 @@ from rtshcua.diagnostics.render import render
 from rtshcua.ground.language.load import load
 from rtshcua.ground.lint.agreed import Linted, agreed
 from rtshcua.ground.lint.lint import lint
+from virtual.rows import rows
 
 SHIPPED = sorted(
     path.relative_to(CHECKOUT)
@@ -118,7 +119,7 @@ def test_programs_that_share_a_file_agree_or_say_nothing() -> None:
 # ---------------------------------------------------------------------------------------------------- E1302
 
 
-@pytest.mark.parametrize(
+@rows(
     ("name", "better"),
     [
         ("BridgeA", "bridge_a"),

@@ -8,6 +8,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix, Label
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.lint.stored import as_lists, from_lists
+from virtual.rows import rows
 
 WHOLE = Diagnostic(
     codes.NAMING,
@@ -25,7 +26,7 @@ def test_there_and_back() -> None:
     assert from_lists(json.loads(json.dumps(as_lists((WHOLE, LEAST))))) == (WHOLE, LEAST)
 
 
-@pytest.mark.parametrize(
+@rows(
     "harm",
     [
         {0: "E9999"}, {0: []}, {1: 1}, {1: None}, {2: ["a.rts", "1", "3"]}, {2: ["a.rts", 3, 1]}, {2: ["a.rts", -1, 3]},

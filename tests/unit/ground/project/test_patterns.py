@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.project.patterns import matches
+from virtual.rows import rows
 
 _PART = st.text("ab*?", min_size=1, max_size=4)
 _PATTERN = st.builds(
@@ -56,7 +57,7 @@ def test_nothing_means_nothing(pattern: str) -> None:
     assert not matches(pattern, "a/b")
 
 
-@pytest.mark.parametrize(
+@rows(
     ("pattern", "path"),
     [
         ("/".join(repeat("**", 40)) + "/x", "/".join(repeat("a", 60))),

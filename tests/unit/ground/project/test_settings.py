@@ -1,11 +1,10 @@
 """What a configuration says, and how one that is wrong is refused: with the nearest that would be accepted."""
 
-import pytest
-
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.patterns import matches
 from rtshcua.ground.project.settings import Ignored, Settings, parse_settings
+from virtual.rows import rows
 
 WHOLE = """
 [lint]
@@ -50,7 +49,7 @@ def test_nothing_said_is_the_defaults() -> None:
     assert found.lint.cache == ""
 
 
-@pytest.mark.parametrize(
+@rows(
     ("text", "told", "help"),
     [
         ("x =", "r.toml: it is not TOML: invalid value", None),
@@ -96,7 +95,7 @@ def test_refusals(text: str, told: str, help: str | None) -> None:
     assert found == Refusal("configuration", told, help or "")
 
 
-@pytest.mark.parametrize(
+@rows(
     ("pattern", "meant", "not_meant"),
     [
         ("drafts", ["drafts/a.rts", "x/drafts/y/a.rts", "drafts"], ["drafts2/a.rts", "a/mydrafts"]),

@@ -17,6 +17,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from rtshcua.wire.bundle import policy_digest, policy_payload
+from virtual.rows import rows
 
 TABLE = f"""test "charge and wind" {{
   {WHEN}
@@ -117,7 +118,7 @@ def unmet(expectation: str, *given: str) -> Ran:
     return one
 
 
-@pytest.mark.parametrize(
+@rows(
     ("expectation", "given", "message", "help"),
     [
         (

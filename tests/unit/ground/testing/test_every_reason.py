@@ -1,9 +1,8 @@
 """Every reason that a decision can have is reached by some test, written as people write them."""
 
-import pytest
-
 from reference.deciding import IMPORT, NOMINAL, WHEN, decided
 from rtshcua.model.outcome import Reason, outcome_of
+from virtual.rows import rows
 
 #: a policy of its own, for what the shipped one never decides
 OWN = """import "lib:policies/site.rts"
@@ -84,7 +83,7 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("before", "parts", "expected"), CASES, ids=[" ".join(case[1])[-60:] for case in CASES])
+@rows(("before", "parts", "expected"), CASES, ids=[" ".join(case[1])[-60:] for case in CASES])
 def test_decided(before: str, parts: tuple[str, ...], expected: str) -> None:
     assert decided(*parts, before=before) == expected
 

@@ -1,8 +1,7 @@
 """What is wrong with nominals and tests is said in the words that are used elsewhere."""
 
-import pytest
-
 from reference.deciding import IMPORT, NOMINAL, WHEN, found
+from virtual.rows import rows
 
 WRONG = [
     ("given batery = 20 %", "E0201", "nothing declares `batery`", "did you mean `battery`?"),
@@ -75,7 +74,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("part", "code", "message", "help"), WRONG, ids=[each[0] for each in WRONG])
+@rows(("part", "code", "message", "help"), WRONG, ids=[each[0] for each in WRONG])
 def test_a_premise(part: str, code: str, message: str, help: str | None) -> None:
     findings = found(f'test "it" {{ {WHEN} {part} expect allow }}')
     assert {each[0] for each in findings} == {code}
@@ -103,7 +102,7 @@ zone own = circle(47.39850 N, 8.54600 E, 30 m)
 """
 
 
-@pytest.mark.parametrize(("request_", "code", "message"), ASKED)
+@rows(("request_", "code", "message"), ASKED)
 def test_a_request(request_: str, code: str, message: str) -> None:
     findings = found(f'{SPIN}test "it" {{ when {request_} expect allow }}')
     assert [each[:2] for each in findings] == [(code, message)]
@@ -128,7 +127,7 @@ TABLES = [
 ]
 
 
-@pytest.mark.parametrize(("table", "code", "message"), TABLES)
+@rows(("table", "code", "message"), TABLES)
 def test_a_table(table: str, code: str, message: str) -> None:
     findings = found(f'test "it" {{ {WHEN} table {table} }}')
     assert (code, message) in [each[:2] for each in findings]

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import pytest
-
 from reference.deciding import program
 from rtshcua.ground.checker.faults import NAMED, example
 from rtshcua.ground.compiler.program import check_program, compile_program
@@ -28,6 +26,7 @@ from rtshcua.model.scenario import (
     When,
 )
 from rtshcua.onboard.ports import Ending
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 IMPORT = 'import "lib:missions/standard.rts"\n'
@@ -80,7 +79,7 @@ MOMENTS: list[tuple[str, When]] = [
 ]
 
 
-@pytest.mark.parametrize(("text", "when"), MOMENTS)
+@rows(("text", "when"), MOMENTS)
 def test_a_moment(text: str, when: When) -> None:
     (incident,) = flown(f"{text} kill()").scenario.incidents
     assert incident.when == when
@@ -115,7 +114,7 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("text", "fault"), FAULTS)
+@rows(("text", "fault"), FAULTS)
 def test_a_fault(text: str, fault: object) -> None:
     (incident,) = flown(f"at 2 s {text}").scenario.incidents
     assert incident.fault == fault
@@ -336,7 +335,7 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
 ]
 
 
-@pytest.mark.parametrize(("body", "code", "message", "help"), WRONG)
+@rows(("body", "code", "message", "help"), WRONG)
 def test_what_is_wrong_is_said(body: str, code: str, message: str, help: str | None) -> None:
     ((has, said, more),) = found(body, OTHERS)
     assert has == code

@@ -12,6 +12,7 @@ from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.versions.differences import differences
 from rtshcua.ground.versions.raised import Compared, compare
 from rtshcua.mavlink import dialect
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 
@@ -88,7 +89,7 @@ def changed(changes: Mapping[str, str]) -> str:
     return text
 
 
-@pytest.mark.parametrize(
+@rows(
     ("old", "new"),
     [
         ("policy yard", "// a comment\npolicy   yard"),
@@ -125,7 +126,7 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
     assert differences(before.policy, after) == ("the order of its `degrade` rules",)
 
 
-@pytest.mark.parametrize(
+@rows(
     ("old", "new", "words"),
     [
         ("top <= 20 m", "top <= 21 m", "the rule `permit rise by role operator, trainee through agent, oper...`"),

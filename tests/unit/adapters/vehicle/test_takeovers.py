@@ -7,6 +7,7 @@ what we do.
 """
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -25,6 +26,7 @@ from rtshcua.model.faults import Fault, LinkDelay, MessageSilence, Mode, PilotGo
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Failed, Ready, Succeeded, TakenOver
 from virtual.copying import copied
+from virtual.flyer import Flyer, climbed
 from virtual.policy import POLICY, geo
 from virtual.sampling import each_once
 
@@ -87,12 +89,45 @@ TAKEOVERS: dict[str, Callable[[int], Fault]] = {
 }
 
 
-@pytest.mark.parametrize("name", TAKEOVERS)
-def test_a_takeover_in_a_leg_is_seen_and_not_fought(aloft: Make, flavour: str, name: str) -> None:
-    """PX4's pause and go-to, and ArduCopter's guided target, change no mode (recorded)."""
-    one = aloft()
+@cache
+def in_a_leg(flavour: str) -> Flyer:
+    """Five seconds of a leg are flown."""
+    one = copied(climbed(flavour, 20_000))
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
+    return one
+
+
+@cache
+def held(flavour: str) -> Flyer:
+    """It stopped in the leg, and stands."""
+    one = copied(in_a_leg(flavour))
+    one.begin(MotionKind.HOLD)
+    one.wait(8)
+    return one
+
+
+@cache
+def climbing(flavour: str, height: int) -> Flyer:
+    """On its way to 20 m it is at a height, in mm."""
+    one = copied(ready(flavour))
+    one.begin(MotionKind.CLIMB, altitude=20_000)
+    while one.truth.up_mm < height:
+        one.wait(0.1)
+    return one
+
+
+@cache
+def ready(flavour: str) -> Flyer:
+    one = Flyer(flavour)
+    one.until(Ready)
+    return one
+
+
+@pytest.mark.parametrize("name", TAKEOVERS)
+def test_a_takeover_in_a_leg_is_seen_and_not_fought(flavour: str, name: str) -> None:
+    """PX4's pause and go-to, and ArduCopter's guided target, change no mode (recorded)."""
+    one = copied(in_a_leg(flavour))
     sent = Sent(one)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
@@ -114,15 +149,11 @@ CLIMBING = {
 
 @pytest.mark.parametrize("name", CLIMBING)
 @pytest.mark.parametrize("height", [3_000, 17_800])
-def test_a_takeover_in_a_climb_is_seen_and_not_fought(flyer: Make, flavour: str, name: str, height: int) -> None:
+def test_a_takeover_in_a_climb_is_seen_and_not_fought(flavour: str, name: str, height: int) -> None:
     """ArduCopter has no target to report in a takeoff (recorded), PX4 the same one from its first to its last moment.
     ArduCopter's pause shows in nothing but its motion.
     """
-    one = flyer()
-    one.until(Ready)
-    one.begin(MotionKind.CLIMB, altitude=20_000)
-    while one.truth.up_mm < height:
-        one.wait(0.1)
+    one = copied(climbing(flavour, height))
     sent = Sent(one)
     one.vehicle.simulation.inject(CLIMBING[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
@@ -182,13 +213,9 @@ def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(aloft: Make, name
 
 
 @pytest.mark.parametrize("name", ["pause", "go-to", "land", "position"])
-def test_a_takeover_is_seen_while_it_holds(aloft: Make, flavour: str, name: str) -> None:
+def test_a_takeover_is_seen_while_it_holds(flavour: str, name: str) -> None:
     """ArduCopter obeys no pause in BRAKE: there is nothing to see."""
-    one = aloft()
-    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
-    one.wait(5)
-    one.begin(MotionKind.HOLD)
-    one.wait(8)
+    one = copied(held(flavour))
     sent = Sent(one)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
@@ -207,11 +234,9 @@ def unstreamed(one: Any) -> None:
     one.vehicle.simulation.receive(Codec(255, 190).pack(off), one.vehicle.clock.elapsed_us)
 
 
-def test_another_target_is_seen_before_our_next_one_leaves_though_none_is_streamed(aloft: Make) -> None:
+def test_another_target_is_seen_before_our_next_one_leaves_though_none_is_streamed(flavour: str) -> None:
     """Both answer REQUEST_MESSAGE of POSITION_TARGET_GLOBAL_INT: it is asked for with the mode."""
-    one = aloft()
-    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
-    one.wait(5)
+    one = copied(in_a_leg(flavour))
     unstreamed(one)
     one.wait(1)
     sent = Sent(one)
@@ -236,11 +261,9 @@ def test_a_target_that_is_never_told_holds_nothing_up_for_long(aloft: Make, dela
     assert sent.at_us[0] <= begins_us + 2 * delay_us + TARGET_US + TICK_US
 
 
-def test_sticks_end_what_px4_does_by_itself(aloft: Make, flavour: str) -> None:
+def test_sticks_end_what_px4_does_by_itself(flavour: str) -> None:
     """ArduCopter does not mind them in GUIDED."""
-    one = aloft()
-    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
-    one.wait(5)
+    one = copied(in_a_leg(flavour))
     one.vehicle.simulation.inject(PilotSticks(0))
     if flavour == "px4":
         assert one.until(TakenOver, 3).how == "Position"
@@ -262,10 +285,8 @@ def test_our_own_targets_are_nobody_elses(aloft: Make) -> None:
     assert not any(isinstance(event, TakenOver) for event in one.events)
 
 
-def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(aloft: Make, flavour: str) -> None:
-    one = aloft()
-    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
-    one.wait(5)
+def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(flavour: str) -> None:
+    one = copied(in_a_leg(flavour))
     sent = Sent(one)
     one.begin(MotionKind.HOME)
     one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, OLD[flavour]))

@@ -67,12 +67,12 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
 
 def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The one that flies: a few real flights, from the source to the report."""
-    code, out, err = run(capsys, "--flights", "4", "--json", "--fault", "link-silence", "--fault", "wind", "-o", "made")
+    code, out, err = run(capsys, "--flights", "2", "--json", "--fault", "link-silence", "--fault", "wind", "-o", "made")
     assert (code, err) == (ExitCode.OK, "")
     found = json.loads(out)["campaign"]
-    assert (found["mission"], found["flights"], found["failed"], found["campaign"]) == ("short", 4, 0, 1)
+    assert (found["mission"], found["flights"], found["failed"], found["campaign"]) == ("short", 2, 0, 1)
     assert set(found["kinds"]) <= {"LinkSilence", "WindStep"}
-    assert sum(sum(counts.values()) for counts in found["endings"].values()) == 4
+    assert sum(sum(counts.values()) for counts in found["endings"].values()) == 2
     lines = [json.loads(line) for line in Path("made/results.jsonl").read_text().splitlines()]
     assert all(line["flown_us"] > S and len(line["log"]) == 64 for line in lines)
     again = [fly_one_again(lines[0])]
@@ -96,7 +96,7 @@ def fly_one_again(line: dict[str, Any]) -> Result:
     assert isinstance(kinds, frozenset)
     space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds)
     assert not hasattr(space, "slug")
-    made = drawn(Order(begun["seed"], 4, space), line["number"], {})
+    made = drawn(Order(begun["seed"], 2, space), line["number"], {})
     return field.fly(Flight(line["number"], made.scenario, made.tries))
 
 

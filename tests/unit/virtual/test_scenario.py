@@ -162,11 +162,30 @@ def test_a_process_begins_when_the_disk_takes_records_again() -> None:
     assert any("no space left" in note for note in found.notes)
 
 
-def test_a_host_that_stalls_reads_later_what_was_said() -> None:
-    found = flown(scenario(incident(15, faults.HostStall(0, 2 * S))))
-    assert not [frame for frame in found.frames if 15_050_000 < frame.sent_us < 17 * S]
-    assert found.ending == "completed"
-    nothing_wrong(found)
+@pytest.fixture(scope="module")
+def bothered() -> ScenarioFlown:
+    """A flight in which several things happen that change nothing, each for a test of its own."""
+    return flown(
+        scenario(
+            incident(5, faults.Approval(0, "supervisor")),
+            incident(6, faults.Approval(0, "nobody")),
+            incident(12, faults.Babble(0, 20)),
+            incident(14, faults.ClockStep(0, -3_600 * S)),
+            incident(15, faults.HostStall(0, 2 * S)),
+        )
+    )
+
+
+def test_a_host_that_stalls_reads_later_what_was_said(bothered: ScenarioFlown) -> None:
+    assert [frame for frame in bothered.frames if 14 * S < frame.sent_us < 15 * S]
+    assert not [frame for frame in bothered.frames if 15_050_000 < frame.sent_us < 17 * S]
+    assert [frame for frame in bothered.frames if 17 * S <= frame.sent_us < 18 * S]
+
+
+def test_what_bothers_a_flight_ends_it_no_earlier(bothered: ScenarioFlown) -> None:
+    assert [each.number for each in bothered.happened] == [0, 1, 2, 3, 4]
+    assert bothered.ending == "completed"
+    nothing_wrong(bothered)
 
 
 def test_a_full_disk() -> None:
@@ -193,11 +212,8 @@ def test_a_step_waits_for_a_disk_that_takes_its_time() -> None:
     nothing_wrong(slow)
 
 
-def test_a_clock_that_is_set_moves_nothing_and_is_told() -> None:
-    found = flown(scenario(incident(15, faults.ClockStep(0, -3_600 * S))))
-    assert "clock-stepped" in events(found)
-    assert found.ending == "completed"
-    nothing_wrong(found)
+def test_a_clock_that_is_set_moves_nothing_and_is_told(bothered: ScenarioFlown) -> None:
+    assert "clock-stepped" in events(bothered)
 
 
 # ---------------------------------------------------------------- those who hand in documents
@@ -241,9 +257,8 @@ def test_an_approval_is_refused(low: bytes) -> None:
     nothing_wrong(found)
 
 
-def test_nobody_answers_what_is_not_asked() -> None:
-    found = flown(scenario(incident(5, faults.Approval(0, "supervisor")), incident(6, faults.Approval(0, "nobody"))))
-    notes = [each.note for each in found.happened]
+def test_nobody_answers_what_is_not_asked(bothered: ScenarioFlown) -> None:
+    notes = [each.note for each in bothered.happened]
     assert notes[1] == "nothing of the mission asks for it"
 
 
@@ -263,12 +278,9 @@ def test_a_replacement_that_comes_twice() -> None:
     nothing_wrong(found)
 
 
-def test_babble_changes_nothing() -> None:
-    found = flown(scenario(incident(12, faults.Babble(0, 20))))
-    refused = [r["detail"] for r in records(found) if r.get("event") == "document-refused"]
+def test_babble_is_refused_and_changes_nothing(bothered: ScenarioFlown) -> None:
+    refused = [r["detail"] for r in records(bothered) if r.get("event") == "document-refused"]
     assert refused
-    assert found.ending == "completed"
-    nothing_wrong(found)
 
 
 def test_documents_for_a_dead_process_are_lost() -> None:

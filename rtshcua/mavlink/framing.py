@@ -38,9 +38,14 @@ def checksum(octets: bytes, start: int = 0xFFFF) -> int:
     return MIRROR[crc >> 8] | MIRROR[crc & 0xFF] << 8
 
 
-def checks(covered: bytes, low: int, high: int) -> bool:
-    """Whether these two octets are the checksum of what they cover; as comparing `checksum`, with less to do."""
-    return crc_hqx(covered.translate(MIRROR), 0xFFFF) == MIRROR[low] << 8 | MIRROR[high]
+def octets_of_checksum(octets: bytes) -> bytes:
+    """`checksum` as it stands in a frame."""
+    return crc_hqx(octets.translate(MIRROR), 0xFFFF).to_bytes(CHECKSUM, "big").translate(MIRROR)
+
+
+def checks(octets: bytes) -> bool:
+    """Whether these octets end in the checksum of those before: taken over it too, the CRC is 0."""
+    return not crc_hqx(octets.translate(MIRROR), 0xFFFF)
 
 
 def with_flags(frame: bytes, flags: int) -> bytes:

@@ -4,7 +4,7 @@ It plans its speed so that it can stop at the target, leans towards the speed it
 no further than it may lean, and learns from where it drifts how much it must lean against the wind.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
 
 GRAVITY = 9.80665
@@ -38,10 +38,15 @@ class Approach:
 
     braking: float
     gain: float
+    linear: float = field(init=False, repr=False, compare=False)
+    """From this distance on, in m, it is linear."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "linear", self.braking / self.gain**2)
 
     def speed(self, distance: float) -> float:
         """The greatest speed from which the vehicle still stops at `distance`."""
-        linear = self.braking / self.gain**2
+        linear = self.linear
         if distance <= linear:
             return distance * self.gain
         return sqrt(2 * self.braking * (distance - linear / 2))
@@ -50,7 +55,7 @@ class Approach:
         """The inverse of `speed`: how far ahead the place is where a vehicle of that speed can stop."""
         if speed <= self.braking / self.gain:
             return speed / self.gain
-        return speed * speed / (2 * self.braking) + self.braking / self.gain**2 / 2
+        return speed * speed / (2 * self.braking) + self.linear / 2
 
 
 @dataclass(slots=True)
@@ -88,8 +93,9 @@ class Body:
 
         `climb` is the wanted speed upwards, reached by at most `climb_most`; `wind` is the velocity of the air.
         """
-        ask_north = (want[0] - self.v_north) * _FOLLOW
-        ask_east = (want[1] - self.v_east) * _FOLLOW
+        north, east = want
+        ask_north = (north - self.v_north) * _FOLLOW
+        ask_east = (east - self.v_east) * _FOLLOW
         much = hypot(ask_north, ask_east)
         if much > most:
             ask_north *= most / much
@@ -128,7 +134,7 @@ class Body:
     def turn(self, dt: float, yaw: float) -> None:
         """Turns the nose towards `yaw`, as fast as it goes."""
         away = (yaw - self.yaw + pi) % (2 * pi) - pi
-        self.yaw = (self.yaw + max(-YAW_RATE * dt, min(YAW_RATE * dt, away)) + pi) % (2 * pi) - pi
+        self.yaw = (self.yaw + within(away, YAW_RATE * dt) + pi) % (2 * pi) - pi
 
     def _fly(self, dt: float, ask_north: float, ask_east: float, wind: tuple[float, float]) -> None:
         much = hypot(ask_north, ask_east)
@@ -143,33 +149,43 @@ class Body:
             change_east *= JERK * dt / change
         self.lean_north = lean_north = lean_north + change_north
         self.lean_east = lean_east = lean_east + change_east
-        air_north, air_east = wind[0] - self.v_north, wind[1] - self.v_east
+        wind_north, wind_east = wind
+        air_north, air_east = wind_north - self.v_north, wind_east - self.v_east
         drag = _ROTOR_DRAG + _BODY_DRAG * hypot(air_north, air_east)
         drag_north, drag_east = drag * air_north, drag * air_east
         learn = dt / _LEARN_S
         self._trim_north += (-drag_north - self._trim_north) * learn
         self._trim_east += (-drag_east - self._trim_east) * learn
         self._move(dt, (lean_north + drag_north) * dt, (lean_east + drag_east) * dt)
-        north, east = cos(self.yaw), sin(self.yaw)
+        yaw = self.yaw
+        north, east = cos(yaw), sin(yaw)
         self.pitch = -atan((lean_north * north + lean_east * east) / GRAVITY)
         self.roll = atan((lean_east * north - lean_north * east) / GRAVITY)
 
     def _climb(self, dt: float, climb: float, most: float) -> None:
-        ask = (climb - self.v_up) * 2 * _FOLLOW
-        change, jerk = max(-most, min(most, ask)) - self.a_up, _CLIMB_JERK * dt
-        self.a_up += max(-jerk, min(jerk, change))
+        a_up = self.a_up
+        change = within((climb - self.v_up) * 2 * _FOLLOW, most) - a_up
+        self.a_up = a_up + within(change, _CLIMB_JERK * dt)
         self._rise(dt)
 
     def _rise(self, dt: float) -> None:
-        self.up += (self.v_up + self.a_up * dt / 2) * dt
-        self.v_up += self.a_up * dt
+        v_up, a_up = self.v_up, self.a_up
+        self.up += (v_up + a_up * dt / 2) * dt
+        self.v_up = v_up + a_up * dt
 
     def _move(self, dt: float, d_north: float, d_east: float) -> None:
         # The mean of old and new velocity: exact while the acceleration is constant.
-        self.north += (self.v_north + d_north / 2) * dt
-        self.east += (self.v_east + d_east / 2) * dt
-        self.v_north += d_north
-        self.v_east += d_east
+        v_north, v_east = self.v_north, self.v_east
+        self.north += (v_north + d_north / 2) * dt
+        self.east += (v_east + d_east / 2) * dt
+        self.v_north, self.v_east = v_north + d_north, v_east + d_east
+
+
+def within(value: float, most: float) -> float:
+    """A value, or what is nearest to it from -`most` to `most`: in half the time of `max` and `min`."""
+    if value > most:
+        return most
+    return value if value > -most else -most
 
 
 def heading(north: float, east: float) -> float:

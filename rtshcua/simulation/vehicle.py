@@ -10,7 +10,7 @@ from rtshcua.mavlink import enums
 from rtshcua.model.faults import Mode
 from rtshcua.simulation import battery, guidance
 from rtshcua.simulation.handling import Handling
-from rtshcua.simulation.kinematics import Body, heading
+from rtshcua.simulation.kinematics import Body, heading, within
 from rtshcua.simulation.place import Point
 
 
@@ -131,8 +131,8 @@ class Vehicle:
     @property
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
-        wanted = self.handling.cruise if self._speed is None else self._speed
-        return min(wanted, self.handling.max_speed)
+        wanted, most = self.handling.cruise if self._speed is None else self._speed, self.handling.max_speed
+        return most if most < wanted else wanted
 
     @speed.setter
     def speed(self, value: float) -> None:
@@ -377,7 +377,8 @@ class Vehicle:
             self._advance(error)
         most = agility.takeoff_acceleration if self._activity is _CLIMB else agility.climb_acceleration
         self.blind = self.blind or not sees
-        north, east = self.target.north - error[0], self.target.east - error[1]
+        target = self.target
+        north, east = target.north - error[0], target.east - error[1]
         if self.blind:
             body.drift(dt, self._climb_rate(north, east), most, wind)
             return
@@ -387,11 +388,13 @@ class Vehicle:
                 self._comes_back = True
             else:
                 north, east = north + self._past.north, east + self._past.east
+        speed = self.speed
         if self._activity is _CIRCLE:
-            want = guidance.around(body, north, east, self._radius, self.speed)
+            want = guidance.around(body, north, east, self._radius, speed)
         else:
-            speed = guidance.speed_back(body, north, east) if self._comes_back else self.speed
-            want = guidance.towards(body, north, east, min(speed, self.speed), self._approach)
+            if self._comes_back:
+                speed = min(guidance.speed_back(body, north, east), speed)
+            want = guidance.towards(body, north, east, speed, self._approach)
         climb = self._climb_rate(north, east)
         body.track(dt, want, self._hardest, climb, most, wind)
         if self._nose is not None:
@@ -436,8 +439,7 @@ class Vehicle:
         climbs = self._activity is _CLIMB
         rate = guidance.climb_rate(self.body.up, self.target.up, self.handling, climbs)
         if self._activity is _TRACK:
-            most = guidance.steepest(self.body, north, east, self.target.up)
-            rate = max(-most, min(most, rate))
+            rate = within(rate, guidance.steepest(self.body, north, east, self.target.up))
         return rate
 
     # ---------------------------------------------------------------------------------------------- on the ground

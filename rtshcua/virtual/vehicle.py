@@ -85,10 +85,10 @@ class VirtualVehicle:
                 self._send(frames, events)
             if clock.elapsed_us >= end_us:
                 return events
-            if looked_at < len(events):
-                if any(type(event) is not Readings for event in events[looked_at:]):
+            while looked_at < len(events):
+                if type(events[looked_at]) is not Readings:
                     return events
-                looked_at = len(events)
+                looked_at += 1
             clock.elapsed_us = min(end_us, clock.elapsed_us + self._tick_us)
             datagrams = self.simulation.advance(clock.elapsed_us)
             if datagrams:

@@ -135,7 +135,7 @@ class Driver:
         send += self._streams.due(self.system, now_us)
         if not self._was_ready and self.seen.down:
             send += self.preflight.due(self.system, now_us)
-        if self._texts.waits:
+        if self._texts.parts:
             self._hear(self._texts.due(now_us), events)
         self._look(now_us, events)
         if self._manoeuvre is not None and (aged or now_us >= self._manoeuvre.due_us):
@@ -148,7 +148,7 @@ class Driver:
             for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
                 events += [ports.Noted(now_us, text) for text in notes]
                 notes.clear()
-        if self._announcer.waits:
+        if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         return events, self._pack(send, now_us, events) if send else []
 
@@ -203,7 +203,7 @@ class Driver:
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; whether a manoeuvre may see something new in it."""
-        name, message, component = frame.name, frame.message, frame.component
+        message, name, _, component, _, _, _ = frame
         at_us = self.source.of(frame, now_us)
         if self.source.stepped:
             self.seen.made_us.clear()

@@ -124,7 +124,7 @@ class LinkWatch:
     """
 
     def __init__(self, slack: int = 1) -> None:
-        self._slack = slack
+        self._silent_us, self._unanswered_limit_us = SILENT_US * slack, UNANSWERED_US * slack
         #: when it was last heard
         self.heard_us: int | None = None
         self._unanswered_us: int | None = None  # since when a question stands open
@@ -155,22 +155,17 @@ class LinkWatch:
 
     def look(self, now_us: int) -> bool:
         """Let time pass; True when `down` is another than at the last look."""
-        if self.heard_us is None:
+        heard_us, was = self.heard_us, self.down
+        if heard_us is None:
             return False
-        if self._seen_us is not None and self.down is None:
-            self.up_us += min(now_us - self._seen_us, SILENT_US * self._slack)  # we may have been held up ourselves
+        if self._seen_us is not None and was is None:
+            self.up_us += min(now_us - self._seen_us, self._silent_us)  # we may have been held up
         self._seen_us = now_us
-        was, self.down = self.down, self._why(now_us)
-        return was != self.down
-
-    def _why(self, now_us: int) -> str | None:
-        if self.heard_us is not None and now_us - self.heard_us > SILENT_US * self._slack:
+        down, asked_us = None, self._unanswered_us
+        if now_us - heard_us > self._silent_us:
             # What was asked meanwhile could not be answered; the question is put anew when it is heard again.
-            self._unanswered_us = None
-            return SILENT
-        asked_us = self._unanswered_us
-        held = self.answers or self.strict
-        if held and asked_us is not None and now_us - asked_us > UNANSWERED_US * self._slack:
-            self.mute = True
-            return UNANSWERED
-        return None
+            down, self._unanswered_us = SILENT, None
+        elif asked_us is not None and now_us - asked_us > self._unanswered_limit_us and (self.answers or self.strict):
+            down, self.mute = UNANSWERED, True
+        self.down = down
+        return was != down

@@ -1,7 +1,8 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from rtshcua.decision.tree import where
 from rtshcua.mavlink import dialect
@@ -17,6 +18,7 @@ MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
 _WITHIN_STALE = 4
 
 
+_Read: TypeAlias = Callable[[Any], int | None]  # a field of a message
 _NONE: Final = frozenset[str]()
 _NUMBERS: Final = (int, float)  # as `int | float` it would be made anew for each field
 
@@ -43,17 +45,18 @@ class Telemetry:
     def __init__(self, policy: Policy) -> None:
         vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
+        self._told: set[str] = set()  # what came of the autopilot: of each name, always the same slots
         self._first: dict[tuple[int, str], Any] = {}
-        self._projection = policy.projection
-        self._by_message: dict[str, list[tuple[Signal, SignalSource]]] = {}
+        self._by_message: dict[str, list[_Carried]] = {}
+        stale_us: dict[str, int] = {}
         for signal in policy.signals:
             for source in signal.sources:
                 _check(signal, source)
-                self._by_message.setdefault(source.message, []).append((signal, source))
+                name = source.message
+                self._by_message.setdefault(name, []).append(_carried(signal, source, policy.projection))
+                stale_us[name] = min(signal.stale_us, stale_us.get(name, signal.stale_us))
         #: the messages that carry some signal, and how often each is needed, in us
-        self.intervals: Mapping[str, int] = {
-            name: _often(min(signal.stale_us for signal, _ in carried)) for name, carried in self._by_message.items()
-        }
+        self.intervals: Mapping[str, int] = {name: _often(each_us) for name, each_us in stale_us.items()}
         #: for each signal, the messages that may carry it
         self.sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
 
@@ -72,16 +75,15 @@ class Telemetry:
             doubtful = _NONE
         empty = name == "WIND" and _says_nothing(message)
         values: list[tuple[int, int | None]] = []
-        for signal, source in carried:
-            if empty or (doubtful and not doubtful.isdisjoint(source.fields)):
-                values += [(slot, None) for slot in range(signal.slot, signal.slot + 1 + (signal.kind == POSITION))]
-            elif signal.kind == POSITION:
-                x, y = _place(source, message, self._projection)
-                values += [(signal.slot, x), (signal.slot + 1, y)]
+        for fields, slots, read in carried:
+            if empty or (doubtful and not doubtful.isdisjoint(fields)):
+                values += [(slot, None) for slot in slots]
             else:
-                values.append((signal.slot, _number(source, message)))
+                values += zip(slots, read(message), strict=True)
         if component == AUTOPILOT:
-            self._own.update(slot for slot, _ in values)
+            if name not in self._told:
+                self._told.add(name)
+                self._own.update(slot for slot, _ in values)
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
 
@@ -109,27 +111,59 @@ def _often(stale_us: int) -> int:
     return min(max(stale_us // _WITHIN_STALE, MOST_OFTEN_US), LEAST_OFTEN_US)
 
 
-def _number(source: SignalSource, message: Any) -> int | None:
-    parts = [_field(source, message, field) for field in source.fields]
-    if len(parts) == 1 or parts[0] is None:
-        return parts[0]
-    return None if parts[1] is None else hypot_mm(parts[0], parts[1])
+class _Carried(NamedTuple):
+    """What a message carries of one signal: the fields that it rests on, the slots, and what reads them, in order."""
+
+    fields: tuple[str, ...]
+    slots: tuple[int, ...]
+    read: Callable[[Any], Sequence[int | None]]
 
 
-def _place(source: SignalSource, message: Any, projection: Projection) -> tuple[int, int] | tuple[None, None]:
-    latitude, longitude = (_field(source, message, field) for field in source.fields)
-    if latitude is None or longitude is None:
-        return None, None
-    x, y = project(projection, latitude, longitude)
-    # farther than any zone can be declared, or on no globe: nonsense, not a place
-    if max(abs(x), abs(y)) > MAX_COORDINATE or abs(longitude) > HALF_TURN:
-        return None, None
-    return x, y
+def _carried(signal: Signal, source: SignalSource, projection: Projection) -> _Carried:
+    """Prepared once, for it is read from each message of its name."""
+    fields = [_field(source, field) for field in source.fields]
+    if signal.kind == POSITION:
+        return _Carried(source.fields, (signal.slot, signal.slot + 1), _place(*fields, projection))
+    return _Carried(source.fields, (signal.slot,), _number(*fields))
 
 
-def _field(source: SignalSource, message: Any, field: str) -> int | None:
-    raw = getattr(message, field)
-    if not isinstance(raw, _NUMBERS):
-        return None
-    value = quantise(raw, source.numerator, source.denominator, source.unknown)
-    return None if value is None or abs(value) > MAX_VALUE else value
+def _number(first: _Read, second: _Read | None = None) -> Callable[[Any], Sequence[int | None]]:
+    """A number, or the length of a vector."""
+    if second is None:
+        return lambda message: (first(message),)
+
+    def length(message: Any) -> tuple[int | None]:
+        a, b = first(message), second(message)
+        return (None if a is None or b is None else hypot_mm(a, b),)
+
+    return length
+
+
+def _place(latitude_of: _Read, longitude_of: _Read, projection: Projection) -> Callable[[Any], Sequence[int | None]]:
+    nowhere = None, None
+
+    def place(message: Any) -> Sequence[int | None]:
+        latitude, longitude = latitude_of(message), longitude_of(message)
+        if latitude is None or longitude is None:
+            return nowhere
+        x, y = project(projection, latitude, longitude)
+        # farther than any zone can be declared, or on no globe: nonsense, not a place
+        if max(abs(x), abs(y)) > MAX_COORDINATE or abs(longitude) > HALF_TURN:
+            return nowhere
+        return x, y
+
+    return place
+
+
+def _field(source: SignalSource, field: str) -> _Read:
+    value_of = attrgetter(field)
+    numerator, denominator, unknown = source.numerator, source.denominator, source.unknown
+
+    def read(message: Any) -> int | None:
+        raw = value_of(message)
+        if not isinstance(raw, _NUMBERS):
+            return None
+        value = quantise(raw, numerator, denominator, unknown)
+        return None if value is None or abs(value) > MAX_VALUE else value
+
+    return read

@@ -32,7 +32,8 @@ class StatusTexts:
 
     def __init__(self) -> None:
         self._id = 0
-        self._parts: list[str] = []
+        #: what came of a text that is not whole yet
+        self.parts: list[str] = []
         self._severity = 0
         self._at_us = 0
         self._left = BURST
@@ -43,26 +44,21 @@ class StatusTexts:
         """Take in one STATUSTEXT; the texts that are complete now."""
         part: str = message.text
         said: list[Said] = []
-        if not (self._parts and message.id == self._id and message.chunk_seq == len(self._parts)):
+        if not (self.parts and message.id == self._id and message.chunk_seq == len(self.parts)):
             said += self._finish(now_us)
         self._id, self._severity, self._at_us = message.id, message.severity, now_us
-        self._parts.append(part)
-        if len(part) < TEXT_OCTETS or not message.id or len(self._parts) * TEXT_OCTETS >= LONGEST:
+        self.parts.append(part)
+        if len(part) < TEXT_OCTETS or not message.id or len(self.parts) * TEXT_OCTETS >= LONGEST:
             said += self._finish(now_us)
         return said
 
-    @property
-    def waits(self) -> bool:
-        """Whether a text is not whole yet."""
-        return bool(self._parts)
-
     def due(self, now_us: int) -> list[Said]:
         """The text whose end did not come in time."""
-        return self._finish(now_us) if self._parts and now_us - self._at_us > CHUNK_US else []
+        return self._finish(now_us) if self.parts and now_us - self._at_us > CHUNK_US else []
 
     def _finish(self, now_us: int) -> list[Said]:
-        text = quoted("".join(self._parts).rstrip("\0\t\r\n "))
-        self._parts = []
+        text = quoted("".join(self.parts).rstrip("\0\t\r\n "))
+        self.parts = []
         if not text:
             return []
         if self._paid_us is None:
@@ -88,21 +84,17 @@ class Announcer:
     """Keeps what is told to ground stations until the link has nothing better to do."""
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[int, str]] = deque(maxlen=KEPT)
+        #: what there is to tell
+        self.waiting: deque[tuple[int, str]] = deque(maxlen=KEPT)
         self._sent_us: int | None = None
 
     def add(self, severity: int, text: str) -> None:
         """Announce a text; of a long one the first 50 octets."""
-        self._waiting.append((severity, text))
-
-    @property
-    def waits(self) -> bool:
-        """Whether there is something to tell."""
-        return bool(self._waiting)
+        self.waiting.append((severity, text))
 
     def due(self, now_us: int, *, busy: bool) -> list[Message]:
         """The next one, unless the link is busy or was just used for one."""
-        if busy or not self._waiting or (self._sent_us is not None and now_us - self._sent_us < EACH_US):
+        if busy or not self.waiting or (self._sent_us is not None and now_us - self._sent_us < EACH_US):
             return []
         self._sent_us = now_us
-        return [messages.status_text(*self._waiting.popleft())]
+        return [messages.status_text(*self.waiting.popleft())]

@@ -66,6 +66,8 @@ class Inbox:
 
     def due(self, now_us: int) -> Iterator[tuple[int, Received]]:
         """What the autopilot has got to by now, and when."""
+        if not any(self._waiting):
+            return iter(())
         ready: list[list[tuple[int, Received]]] = []
         for lane in self._waiting:
             taken = []

@@ -31,7 +31,8 @@ class Face:
         self._system = system
         self._codec = Codec(system, COMPONENT)
         self._radio = Codec(system, RADIO)
-        self._radio_due_us = 0
+        self.radio_due_us = 0
+        """When the radio sends next, by the world's time: it runs on while the autopilot's loop halts."""
 
     @property
     def damaged(self) -> int:
@@ -71,12 +72,10 @@ class Face:
                 autopilot.outbox.append(message)
         return self._collect() if autopilot.outbox else []
 
-    def radio_due(self, now_us: int) -> list[bytes]:
-        """The frames that the radio sends now, by the world's time: it runs on while the autopilot's loop halts."""
-        if now_us < self._radio_due_us:
-            return []
-        self._radio_due_us = now_us + _RADIO_INTERVAL_US
-        return [self._radio.pack(radio_status(self._autopilot))]
+    def radio(self, now_us: int) -> bytes:
+        """The frame that the radio sends now, from `radio_due_us` on."""
+        self.radio_due_us = now_us + _RADIO_INTERVAL_US
+        return self._radio.pack(radio_status(self._autopilot))
 
     def _is_for_me(self, message: Message) -> bool:
         system = getattr(message, "target_system", 0)

@@ -30,9 +30,7 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
         return 0.0, 0.0
     # Where it will be by the time that it has turned over, so that it does not slow down too late.
     closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
-    left = distance - closing * LEAD_S
-    fastest = approach.speed(left if left > 0.0 else 0.0)
-    speed = fastest if fastest < speed else speed
+    speed = min(speed, approach.speed(max(distance - closing * LEAD_S, 0.0)))
     return north / distance * speed, east / distance * speed
 
 
@@ -103,8 +101,7 @@ def climb_rate(up: float, target: float, handling: Handling, taking_off: bool) -
     fastest = handling.climb if away > 0 else handling.descent
     if taking_off:
         fastest = min(fastest, handling.takeoff_climb)
-    speed = handling.agility.climb_approach.speed(abs(away))
-    return copysign(speed if speed < fastest else fastest, away)
+    return copysign(min(fastest, handling.agility.climb_approach.speed(abs(away))), away)
 
 
 def steepest(body: Body, north: float, east: float, up: float) -> float:
@@ -114,7 +111,7 @@ def steepest(body: Body, north: float, east: float, up: float) -> float:
     if away < _LEVEL_M:
         return inf
     closing = (north * body.v_north + east * body.v_east) / away
-    return (closing if closing > _NEAR_M else _NEAR_M) * abs(up - body.up) / away
+    return max(closing, _NEAR_M) * abs(up - body.up) / away
 
 
 def landing_rate(body: Body, handling: Handling) -> float:

@@ -185,7 +185,9 @@ def within(value: float, most: float) -> float:
     """A value, or what is nearest to it from -`most` to `most`: in half the time of `max` and `min`."""
     if value > most:
         return most
-    return value if value > -most else -most
+    if value < -most:
+        return -most
+    return value
 
 
 def heading(north: float, east: float) -> float:

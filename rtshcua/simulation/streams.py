@@ -42,13 +42,14 @@ class Streams:
         """The messages to send now; each is due again an interval later."""
         if now_us < self._next_us:
             return []
-        due = [message_id for message_id, at_us in self._due.items() if at_us <= now_us]
+        due_us = self._due
+        due = [message_id for message_id, at_us in due_us.items() if at_us <= now_us]
         for message_id in due:
             # From when it was due, so that the mean rate is right; but what was missed is not made up for.
             interval = self._interval[message_id]
-            following = self._due[message_id] + interval
-            self._due[message_id] = following if following > now_us else now_us + interval
-        self._next_us = min(self._due.values(), default=now_us)
+            following = due_us[message_id] + interval
+            due_us[message_id] = following if following > now_us else now_us + interval
+        self._next_us = min(due_us.values(), default=now_us)
         return due
 
 

@@ -132,7 +132,7 @@ class Vehicle:
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
         wanted, most = self.handling.cruise if self._speed is None else self._speed, self.handling.max_speed
-        return most if most < wanted else wanted
+        return min(wanted, most)
 
     @speed.setter
     def speed(self, value: float) -> None:

@@ -89,7 +89,7 @@ class Simulation:
 
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
-        autopilot = self._autopilot
+        autopilot, face, down = self._autopilot, self._face, self._down
         while self._ticked_us + TICK_US <= to_us:
             at_us = self._ticked_us + TICK_US
             if self._inbox:
@@ -102,16 +102,16 @@ class Simulation:
             self._deliver(at_us)
             if not self._halted:
                 autopilot.tick()
-                for frame in self._face.due():
-                    self._down.send(frame, at_us)
+                for frame in face.due():
+                    down.send(frame, at_us)
             if autopilot.taker is not None and self._taken_over_us is None:
                 self._taken_over_us = at_us
-            for frame in self._face.radio_due(at_us):
-                self._down.send(frame, at_us)
-        self._now_us = max(self._now_us, to_us)
+            if at_us >= face.radio_due_us:
+                down.send(face.radio(at_us), at_us)
+        self._now_us = now_us = max(self._now_us, to_us)
         if self._inbox:
-            self._obey(self._inbox, self._now_us)
-        return self._down.due(self._now_us)
+            self._obey(self._inbox, now_us)
+        return down.due(now_us)
 
     def receive(self, data: bytes, at_us: int) -> list[bytes]:
         """The other end sends a datagram at `at_us`: lets time pass until then, and gives what `advance` would.

@@ -43,11 +43,6 @@ def octets_of_checksum(octets: bytes) -> bytes:
     return crc_hqx(octets.translate(MIRROR), 0xFFFF).to_bytes(CHECKSUM, "big").translate(MIRROR)
 
 
-def checks(octets: bytes) -> bool:
-    """Whether these octets end in the checksum of those before: taken over it too, the CRC is 0."""
-    return not crc_hqx(octets.translate(MIRROR), 0xFFFF)
-
-
 def with_flags(frame: bytes, flags: int) -> bytes:
     """A frame without a signature, with other incompatibility flags and the checksum that belongs to them.
 

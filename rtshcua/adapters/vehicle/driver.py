@@ -103,15 +103,13 @@ class Driver:
         """Take in a datagram; whatever its bytes, never raises."""
         events: list[Event] = []
         send: list[Message] = []
-        received = self.link.parse(datagram, now_us)
+        received, watch = self.link.parse(datagram, now_us), self._watch
         for frame in received:
             if self.flavour is None:
                 self._choose(frame)
             if frame.system == self.system and self.flavour is not None:
-                if frame.component == AUTOPILOT and (
-                    self._watch.heard_us != now_us or self._watch.down or self._was_mute
-                ):
-                    self._watch.heard(now_us)  # one frame tells of a moment what all of that moment do
+                if frame.component == AUTOPILOT and (watch.heard_us != now_us or watch.down or self._was_mute):
+                    watch.heard_us = now_us  # one frame tells of a moment what all of that moment do
                     self._look(now_us, events)
                 told = self._take(frame, now_us, events, send)
                 if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
@@ -286,11 +284,12 @@ class Driver:
         """Whether the link is up, and how long it was so far. One that is heard and does not hear us may still be sent
         what stops it.
         """
-        was = self._watch.down
-        changed = self._watch.look(now_us)
-        self.seen.up_us, down = self._watch.up_us, self._watch.down
-        if self._watch.mute != self._was_mute:
-            self._was_mute = self._watch.mute
+        watch = self._watch
+        was = watch.down
+        changed = watch.look(now_us)
+        self.seen.up_us, down = watch.up_us, watch.down
+        if watch.mute != self._was_mute:
+            self._was_mute = watch.mute
             events.append(ports.Answering(now_us, answers=not self._was_mute))
         if not changed:
             return

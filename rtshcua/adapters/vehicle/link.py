@@ -125,7 +125,7 @@ class LinkWatch:
 
     def __init__(self, slack: int = 1) -> None:
         self._silent_us, self._unanswered_limit_us = SILENT_US * slack, UNANSWERED_US * slack
-        #: when it was last heard
+        #: when a frame of the autopilot last came
         self.heard_us: int | None = None
         self._unanswered_us: int | None = None  # since when a question stands open
         self._seen_us: int | None = None
@@ -139,10 +139,6 @@ class LinkWatch:
         self.mute = False
         #: why the link is down; None while it is up
         self.down: str | None = None
-
-    def heard(self, now_us: int) -> None:
-        """A frame of the autopilot came."""
-        self.heard_us = now_us
 
     def asked(self, now_us: int) -> None:
         """Something was asked that the autopilot answers."""

@@ -222,7 +222,9 @@ class ObservedVehicle:
         return news
 
     def _take(self, name: str, message: Any, now_us: int, at_us: int | None) -> bool:
-        match name:
+        match name:  # what comes most often, first
+            case "ATTITUDE":
+                self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
             case "HEARTBEAT":
                 self.mode = message.custom_mode
                 self.armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -243,8 +245,6 @@ class ObservedVehicle:
                     self.target_us = now_us
                     self.targets += 1
                 return before != self.target
-            case "ATTITUDE":
-                self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
             case "GPS_RAW_INT":
                 fix, self.fix = self.fix, message.fix_type
                 return bool(fix != self.fix)

@@ -69,7 +69,7 @@ class Telemetry:
         here: see `source_time`.
         """
         carried = self._by_message.get(name)
-        if carried is None or not self._is_first(name, message, component):
+        if carried is None or (message.instance_field is not None and not self._is_first(name, message, component)):
             return ()
         if component != AUTOPILOT:
             doubtful = _NONE
@@ -89,8 +89,6 @@ class Telemetry:
 
     def _is_first(self, name: str, message: Any, component: int) -> bool:
         """Whether this comes from the lowest instance of its sensor that the component was heard to have."""
-        if message.instance_field is None:
-            return True
         instance = getattr(message, message.instance_field)
         first = self._first[component, name] = min(instance, self._first.get((component, name), instance))
         return bool(instance == first)
@@ -121,10 +119,10 @@ class _Carried(NamedTuple):
 
 def _carried(signal: Signal, source: SignalSource, projection: Projection) -> _Carried:
     """Prepared once, for it is read from each message of its name."""
-    fields = [_field(source, field) for field in source.fields]
+    first, *more = [_field(source, field) for field in source.fields]
     if signal.kind == POSITION:
-        return _Carried(source.fields, (signal.slot, signal.slot + 1), _place(*fields, projection))
-    return _Carried(source.fields, (signal.slot,), _number(*fields))
+        return _Carried(source.fields, (signal.slot, signal.slot + 1), _place(first, more[0], projection))
+    return _Carried(source.fields, (signal.slot,), _number(first, *more))
 
 
 def _number(first: _Read, second: _Read | None = None) -> Callable[[Any], Sequence[int | None]]:

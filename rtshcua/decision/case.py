@@ -14,6 +14,7 @@ from rtshcua.model.outcome import Outcome, Reason
 
 #: what a single situation may say of a temporal monitor
 SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
+_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
 
 
 class Case:
@@ -60,7 +61,7 @@ def remembered(state: State, policy: PreparedPolicy, now: Now) -> Seen:
     """This situation, with what was answered about it so far."""
     seen = policy.seen
     if seen is None or seen.now != now or seen.state != state:
-        seen = policy.seen = Seen(state, now, _situation(state, policy, now), [], [], [])
+        seen = policy.seen = _tuple(Seen, (state, now, _situation(state, policy, now), [], [], []))
     return seen
 
 
@@ -81,7 +82,7 @@ def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     if len(monitors) != count or (count and not SINGLE.issuperset(monitors)):
         monitors = (UNKNOWN,) * count
     utc, error = now.utc_us, max(now.utc_error_us, 0)
-    return Sets(values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error), monitors)
+    return _tuple(Sets, (values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error), monitors))
 
 
 def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:

@@ -32,6 +32,7 @@ class Ahead(NamedTuple):
     lasts_us: int
 
 
+_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
 UNKNOWN_AHEAD = Ahead(UNKNOWN_VOLUME, 0)
 
 
@@ -64,8 +65,9 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     low, high = min(height, to_height), max(height, to_height)
     sweep = Sweep((x, y, to_x, to_y), (-reach, -reach, reach, reach))
     farthest = max(distance(x, y), distance(to_x, to_y))
-    volume = Volume(Place(((sweep, low, high),), 0), (low, high, PRESENT, None), (farthest, farthest))
-    return Ahead(volume, goes_us - age_us - (-speed * SECOND // braking))
+    place = Place(((sweep, low, high),), 0)
+    volume = _tuple(Volume, (place, (low, high, PRESENT, None), (farthest, farthest)))
+    return _tuple(Ahead, (volume, goes_us - age_us - (-speed * SECOND // braking)))
 
 
 def _root(square: int) -> int:

@@ -229,12 +229,12 @@ class Autopilot:
             self._stay_off()
             return
         self.now_us += TICK_US
-        self.air.step(_TICK_S)
-        sensors, vehicle = self.sensors, self.vehicle
+        air, sensors, vehicle, battery = self.air, self.sensors, self.vehicle, self.battery
+        air.step(_TICK_S)
         sensors.step(_TICK_S)
-        wind = (self.air.north, self.air.east)
-        load = vehicle.step(_TICK_S, wind, sensors.error, powered=self.battery.level > 0, sees=sensors.estimates)
-        self.battery.drain(_TICK_S, load)
+        wind = (air.north, air.east)
+        load = vehicle.step(_TICK_S, wind, sensors.error, powered=battery.level > 0, sees=sensors.estimates)
+        battery.drain(_TICK_S, load)
         if sensors.late:
             sensors.follow(_TICK_S, vehicle.body)
         if self.surroundings.pillars and vehicle.in_air and self.surroundings.is_hit(vehicle.body):

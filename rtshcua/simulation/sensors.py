@@ -104,7 +104,7 @@ class Sensors:
         self.age_s += dt * self._pace
         if not self._is_up:
             self._come_up()
-        if self.lost or self.glitching:
+        if self.lost or self.glitch != (0.0, 0.0):
             self._without_fix_s += dt
             self._drift += _DRIFT * dt
         else:
@@ -190,8 +190,8 @@ class Sensors:
     @property
     def error(self) -> tuple[float, float]:
         """How far the estimate is off, north and east, noise apart. The vehicle steers by the estimate."""
-        wander = self._wander
-        return self._jump[0] + self._drift + wander[0], self._jump[1] + self._drift + wander[1]
+        (north, east), (wander_north, wander_east), drift = self._jump, self._wander, self._drift
+        return north + drift + wander_north, east + drift + wander_east
 
     def velocity(self, body: Body) -> tuple[float, float, float]:
         """The velocity that GLOBAL_POSITION_INT reports: north, east and up."""

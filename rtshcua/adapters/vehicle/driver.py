@@ -28,6 +28,7 @@ HEARTBEAT_US = 1_000_000
 
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 _OF_PREFLIGHT = frozenset(preflight.HEEDED)
+_heard = tuple.__new__  # the constructor that a named tuple is given is a function more
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
 
 
@@ -114,7 +115,7 @@ class Driver:
                 told = self._take(frame, now_us, events, send)
                 if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
                     self._advance(now_us, send, events)
-        return Heard(events, self._pack(send, now_us, events) if send else [], received)
+        return _heard(Heard, (events, self._pack(send, now_us, events) if send else [], received))
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """What is due at a time: heartbeat, requests for streams, retries, a link that went down."""

@@ -35,16 +35,17 @@ class StateMonitor:
     def update(self, readings: Readings) -> None:
         """Take over what one frame reported at `readings.at_us`."""
         self._state = self._held = None
+        values, stamps, at_us = self._values, self._stamps, readings.at_us
         for slot, value in readings.values:
-            if not 0 <= slot < len(self._values):
+            if not 0 <= slot < len(values):
                 continue
-            stamp = self._stamps[slot]
-            if stamp is not None and readings.at_us < stamp:
+            stamp = stamps[slot]
+            if stamp is not None and at_us < stamp:
                 continue
-            self._stamps[slot] = readings.at_us
-            if slot in self._where and value != self._values[slot]:
+            stamps[slot] = at_us
+            if slot in self._where and value != values[slot]:
                 self._moved = True
-            self._values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
+            values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
             self._unseen.add(slot)
 
     def moved(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.folders import data_folder
-from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.faults import untrusted
@@ -15,8 +15,9 @@ from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with
 from rtshcua.cli.sources import compile_sources
-from rtshcua.cli.unlock import unlock
+from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.compiler.pins import Pins
 from rtshcua.ground.compiler.sign import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -43,6 +44,15 @@ def compile(
     with_: Annotated[
         list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
     ] = None,
+    proposer: Annotated[
+        str | None,
+        typer.Option("--source", metavar="agent|operator", help="who proposes it [default: its word; .json: agent]"),
+    ] = None,
+    role: Annotated[str | None, typer.Option(help="the role that it is for [default: what it says]")] = None,
+    policy: Annotated[
+        str | None,
+        typer.Option(metavar="NAME[@VERSION]", help="the policy that it is under [default: its word; .json: --with]"),
+    ] = None,
     replaces: Annotated[
         list[Path] | None,
         typer.Option(help="the bundle that flies, then what replaced it since: make a replacement (repeatable)"),
@@ -58,12 +68,21 @@ def compile(
 
     With --replaces it is signed for a flight that is under way, under the policy that it flies under: the steps before
     --from stay as they are. `rtshcua replace` hands it in.
+
+    What a mission says of its own source, role and policy gives it no authority: what it claims beyond --source, --role
+    and --policy is an error. A specification (.json) is an agent's unless --source says otherwise, and its policy is
+    named by --policy or handed in by --with.
     """
     sources_given = [source, *(with_ or [])]
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
     issued_at = time.time_ns() // 1_000 if at is None else moment(at)
     if issued_at is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
+    pins = _pins(proposer, role, policy)
+    if pins is None:
+        text = f"`--source {proposer}`" if proposer not in (None, *PROPOSERS) else f"`--policy {policy}`"
+        help = f"accepted: {' or '.join(PROPOSERS)}" if "--source" in text else "accepted: a name, or as in `rules@7`"
+        return findings.refuse(ExitCode.USAGE, "usage", f"{text} is none", help)
     if (first is None) != (not replaces):
         return findings.refuse(ExitCode.USAGE, "usage", "`--replaces` and `--from` go together")
     target = output or source.with_suffix(".replacement" if replaces else ".bundle")
@@ -73,7 +92,7 @@ def compile(
         what = "one of the sources" if target.is_file() else "no regular file"
         return findings.refuse(ExitCode.USAGE, "output", f"`{target}` is {what}, and is not replaced by a bundle")
     compiled, sources = compile_sources(
-        sources_given, mission=mission, issued_at_us=issued_at, values=tuple(set_ or ())
+        sources_given, mission=mission, issued_at_us=issued_at, values=tuple(set_ or ()), pins=pins
     )
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
@@ -84,9 +103,10 @@ def compile(
     try:
         signers = (
             unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
-            unlock(store, Duty.MISSION, path=mission_key, passphrase_file=passphrase_file),
+            unlock_for(store, compiled.mission, path=mission_key, passphrase_file=passphrase_file),
         )
         data = sign(compiled.policy, compiled.mission, policy_key=signers[0], mission_key=signers[1])
+        check_trusted(store, signers[1], compiled.policy, compiled.mission)
     except Untrusted as error:
         return findings.end(untrusted(error))
     replace(target, data)
@@ -99,6 +119,15 @@ def compile(
         bundle=_described(compiled.policy, compiled.mission, target, data, signers),
         bounds=None if compiled.bounds is None else compiled.bounds._asdict(),
     )
+
+
+def _pins(source: str | None, role: str | None, policy: str | None) -> Pins | None:
+    """What was said of a mission on the command line; None where it makes no sense."""
+    name, at, version = (policy or "").partition("@")
+    numbered = version.isascii() and version.isdigit()
+    if source not in (None, *PROPOSERS) or (policy is not None and not name) or (at and not numbered):
+        return None
+    return Pins(source, role, frozenset({name}) if name else None, int(version) if numbered else None)
 
 
 def _same(one: Path, other: Path) -> bool:

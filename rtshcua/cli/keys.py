@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.folders import data_folder
-from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.keystore import OPERATOR, KeyStore
 from rtshcua.adapters.files.signing import fingerprint, write_link_key
 from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.showing.keys import as_object, speaks
@@ -20,7 +20,7 @@ from rtshcua.cli.shown import utc
 from rtshcua.cli.unlock import read_passphrase
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.signing import KEY_OCTETS
-from rtshcua.wire.keys import SEED_BYTES
+from rtshcua.wire.keys import ANY, SEED_BYTES
 from rtshcua.wire.trust import TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -48,12 +48,20 @@ def init(
     witness_threshold: Annotated[
         int, typer.Option(min=1, max=_MOST_WITNESSES, help="how many of them must cosign what counts as anchored")
     ] = 1,
+    role: Annotated[
+        list[str] | None, typer.Option(help="a role that missions may be for [default: operator] (repeatable)")
+    ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(help="a policy that missions may be under; encrypted keys need one [default: any] (repeatable)"),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
     """Make a key for each duty, and the trust root that names them.
 
-    A development root says so of itself: its keys lie unencrypted in your data folder, readable by you alone. A witness
-    is worth something only away from the vehicle: move its key to where `rtshcua witness` runs, and the log's aboard.
+    There are two mission keys: one signs what agents propose, and nothing else, the other what people do. A development
+    root says so of itself: its keys lie unencrypted in your data folder, readable by you alone. A witness is worth
+    something only away from the vehicle: move its key to where `rtshcua witness` runs, and the log's aboard.
     """
     store = KeyStore(data_folder())
     if store.exists():
@@ -64,6 +72,9 @@ def init(
         return fail(
             ExitCode.USAGE, f"`--witness-threshold {witness_threshold}` is more than the {witnesses} of `--witnesses`"
         )
+    if not development and not policy:
+        help = "`--policy NAME` names one: whoever may choose the policy may choose a laxer one"
+        return fail(ExitCode.USAGE, "mission keys that are in earnest are for named policies", help)
     passphrase = None
     if not development:
         passphrase = _new_passphrase(passphrase_file)
@@ -80,6 +91,8 @@ def init(
         expires_us=now_us + days * _DAY_US,
         witnesses=witnesses,
         witness_threshold=witness_threshold,
+        roles=role or (OPERATOR,),
+        policies=policy or (ANY,),
     )
     return _listed(store, as_json=as_json)
 

@@ -8,13 +8,12 @@ from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.documents import subject
 from rtshcua.cli.faults import code_of
 from rtshcua.cli.findings import Findings
-from rtshcua.cli.unlock import unlock
+from rtshcua.cli.unlock import check_trusted, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.document import MAX_DOCUMENT, DocumentError
-from rtshcua.wire.keys import Duty
 from rtshcua.wire.replacement import sign_replacement
 from rtshcua.wire.untrusted import Untrusted
 
@@ -46,7 +45,8 @@ def replace_with(
         if policy_digest(policy_payload(policy)) != over.policy_digest:
             text = f"the sources make another policy than the `{over.policy.name}@{over.policy.version}` that is flown"
             return findings.refuse(ExitCode.REFUSED, "wrong-policy", text, _SAME_POLICY)
-        key = unlock(store, Duty.MISSION, path=order.mission_key, passphrase_file=order.passphrase_file)
+        key = unlock_for(store, mission, path=order.mission_key, passphrase_file=order.passphrase_file)
+        check_trusted(store, key, policy, mission)
         document = sign_replacement(mission, over=over, kept=order.first, key=key)
     except DocumentError as error:
         return findings.refuse(ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` stay as they fly")

@@ -9,6 +9,7 @@ from rtshcua import library
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.compiler.pins import PROPOSED, Pins, policies_of
 from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.ground.elaborate.settings import parse_settings
 from rtshcua.ground.language.faults import MAX_SIZE
@@ -24,14 +25,16 @@ class Reading(NamedTuple):
     pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]]
 
 
-def read_sources(paths: Sequence[Path]) -> Reading:
-    """Sources and all that they import. The first may be a mission specification (.json), as an agent proposes it."""
+def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
+    """Sources and all that they import. The first may be a mission specification (.json), as an agent proposes it;
+    what it claims beyond `pins` is a finding.
+    """
     first, shipped = paths[0], str(library.root())
     rest = [str(path) for path in paths[1:]]
     if first.suffix.lower() == ".json":
         from rtshcua.ground.agent.specification import load_specification  # brings pydantic
 
-        program, specification = load_specification(str(first), rest, _read, shipped, _listing, _pack)
+        program, specification = load_specification(str(first), rest, _read, shipped, _listing, _pack, pins)
         return Reading(program, specification.pointed)
     return Reading(load([str(first), *rest], _read, shipped, _listing, packs=_pack), tuple)
 
@@ -46,15 +49,33 @@ def read_text(name: str, text: str) -> Reading:
 
 
 def compile_sources(
-    paths: Sequence[Path], *, mission: str | None, issued_at_us: int, values: Sequence[str] = ()
+    paths: Sequence[Path],
+    *,
+    mission: str | None,
+    issued_at_us: int,
+    values: Sequence[str] = (),
+    pins: Pins | None = None,
 ) -> tuple[Compiled, Mapping[str, Source]]:
     """Compile the mission in the first of `paths`; gives the sources too, for showing what was found in them.
 
-    `values` are those of the mission's parameters, `name=value` each.
+    `values` are those of the mission's parameters, `name=value` each. With `pins` it is to be signed: what it claims
+    beyond them is a finding; the source of a specification is `agent` where they do not name one, and its policy is one
+    of those in the sources after the first.
     """
-    reading = read_sources(paths)
+    given = pins
+    if paths[0].suffix.lower() == ".json":
+        given = PROPOSED if pins is None else pins._replace(source=pins.source or PROPOSED.source)
+    reading = read_sources(paths, given or PROPOSED)
+    if pins is not None and given is not pins and pins.policies is None:
+        named = frozenset(shown(str(path)) for path in paths[1:])
+        given = given._replace(policies=policies_of(reading.program, named))
     compiled = compile_program(
-        reading.program, dialect.load(), mission=mission, issued_at_us=issued_at_us, settings=parse_settings(values)
+        reading.program,
+        dialect.load(),
+        mission=mission,
+        issued_at_us=issued_at_us,
+        settings=parse_settings(values),
+        pins=given,
     )
     return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics)), compiled.sources
 

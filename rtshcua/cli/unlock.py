@@ -4,24 +4,52 @@ import sys
 from getpass import getpass
 from pathlib import Path
 
-from rtshcua.adapters.files.keystore import KeyStore, read_key
+from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, read_key
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.bundle import check_proposer
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import open_root
 
 
-def unlock(store: KeyStore, duty: Duty, *, path: Path | None = None, passphrase_file: Path | None = None) -> SigningKey:
-    """The key of a duty, from `path` or else the store.
+def unlock(
+    store: KeyStore, duty: Duty, *, path: Path | None = None, passphrase_file: Path | None = None, whose: str = ""
+) -> SigningKey:
+    """The key of a duty, from `path` or else the store; of several of a duty the one of `whose`.
 
     An encrypted key is opened with the content of `passphrase_file` without its line ending, or with what a person
     types at the terminal. Raises `Untrusted` (`no-keys`, `exposed`, `passphrase-needed`, ...) and OSError.
     """
     given = None if passphrase_file is None else read_passphrase(passphrase_file)
     try:
-        return _load(store, duty, path, given)
+        return _load(store, duty, path, given, whose)
     except KeyFileError as error:
         if error.slug != "passphrase-needed" or given is not None or not _terminal():
             raise
-    return _load(store, duty, path, getpass(f"passphrase of the `{duty}` key: ").encode())
+    return _load(store, duty, path, getpass(f"passphrase of the `{duty}` key: ").encode(), whose)
+
+
+def unlock_for(
+    store: KeyStore, mission: Mission, *, path: Path | None = None, passphrase_file: Path | None = None
+) -> SigningKey:
+    """The mission key that is for what this mission's source proposes; of the store's keys no other would do."""
+    source = next((SourceKind(each.source).name.lower() for each in mission.invocations), PROPOSERS[0])
+    return unlock(store, Duty.MISSION, path=path, passphrase_file=passphrase_file, whose=source)
+
+
+def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mission) -> None:
+    """Whether the store's trust root, if it names the key, lets it sign this mission: who flies it would ask.
+
+    Raises `BundleError`.
+    """
+    if not store.exists():
+        return
+    root = open_root(store.root(), pinned=store.pin(), now_us=0)
+    named = root.keys_for(Duty.MISSION).get(key.kid)
+    if named is not None:
+        check_proposer(named, policy, mission.invocations, now_us=0)
 
 
 def read_passphrase(path: Path) -> bytes:
@@ -29,10 +57,10 @@ def read_passphrase(path: Path) -> bytes:
     return path.read_bytes().rstrip(b"\r\n")
 
 
-def _load(store: KeyStore, duty: Duty, path: Path | None, passphrase: bytes | None) -> SigningKey:
+def _load(store: KeyStore, duty: Duty, path: Path | None, passphrase: bytes | None, whose: str) -> SigningKey:
     if path is not None:
         return read_key(path, duty, passphrase=passphrase)
-    return store.signing_key(duty, passphrase=passphrase)
+    return store.signing_key(duty, passphrase=passphrase, whose=whose)
 
 
 def _terminal() -> bool:

@@ -216,6 +216,10 @@ DUPLICATE_KEY = _code("E0903", "duplicate-key", "an object has the same key twic
 SPECIFICATION_SIZE = _code(
     "E0904", "specification-size", "the specification is larger or deeper than the compiler reads"
 )
+CLAIMED_AUTHORITY = _code(
+    "E0905", "claimed-authority", "a mission claims another source, role or policy than it is compiled for"
+)
+POLICY_NOT_NAMED = _code("E0906", "policy-not-named", "nobody but a specification says which policy it flies under")
 
 # E10: limits of what fits on board
 TOO_MANY = _code("E1001", "too-many", "there are more of these than fit on board")

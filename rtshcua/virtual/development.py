@@ -44,6 +44,7 @@ def root(issued_at_us: int) -> bytes:
                 roles=(ANY,) if duty in _SPEAKERS else (),
                 sources=("agent", "operator") if duty in _SPEAKERS else (),
                 vehicles=() if duty is Duty.ROOT else (ANY,),
+                policies=(ANY,) if duty is Duty.MISSION else (),
             )
             for duty, key in made.items()
         ),

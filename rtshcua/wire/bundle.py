@@ -4,6 +4,7 @@ Each envelope is a COSE_Sign1 around an artefact whose body is the flat form. Pa
 parsed, and their digests are those of the bytes that were signed.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
@@ -15,7 +16,7 @@ from rtshcua.wire import artefact, binding, cose, digest, names
 from rtshcua.wire.cose import Opened
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.names import Artefact
-from rtshcua.wire.trust import TrustRoot, key_refusal, speaker_refusal
+from rtshcua.wire.trust import TrustRoot, key_refusal, proposer_refusal
 from rtshcua.wire.untrusted import Untrusted
 
 #: a bundle larger than this is refused unread, in bytes
@@ -28,7 +29,7 @@ class BundleError(Untrusted):
     """A bundle that is refused.
 
     `too-large`, `malformed`, `wrong-policy`, `wrong-vehicle`, `key-expired`, `wrong-source`, `wrong-role`,
-    `binding-mismatch`; and, of its envelopes, the slugs of `EnvelopeError` and `ArtefactError`.
+    `key-other-policy`, `binding-mismatch`; and, of its envelopes, the slugs of `EnvelopeError` and `ArtefactError`.
     """
 
 
@@ -153,13 +154,20 @@ def _check_entitled(bundle: Bundle, vehicle: str, now_us: int) -> None:
     refusal = key_refusal(bundle.policy_key, vehicle=vehicle, now_us=now_us)
     if refusal:
         raise BundleError(refusal, f"the policy's key {bundle.policy_key.kid.hex()} may not speak for `{vehicle}` now")
-    for invocation in bundle.mission.invocations:
-        role, source = _speaker(bundle.policy, invocation)
-        refusal = speaker_refusal(bundle.mission_key, role=role, source=source, vehicle=vehicle, now_us=now_us)
+    check_proposer(bundle.mission_key, bundle.policy, bundle.mission.invocations, now_us)
+
+
+def check_proposer(key: VerificationKey, policy: Policy, invocations: Iterable[Invocation], now_us: int) -> None:
+    """Whether a mission key may sign each of these steps under a policy, on its vehicle. Raises `BundleError`."""
+    vehicle = policy.vehicle.identity
+    for invocation in invocations:
+        role, source = _speaker(policy, invocation)
+        refusal = proposer_refusal(key, role=role, source=source, policy=policy.name, vehicle=vehicle, now_us=now_us)
         if refusal:
-            kid = bundle.mission_key.kid.hex()
             raise BundleError(
-                refusal, f"the mission's key {kid} may not speak for role `{role}` through `{source}` on `{vehicle}`"
+                refusal,
+                f"the mission's key {key.kid.hex()} may not speak for role `{role}` through `{source}` "
+                f"under `{policy.name}` on `{vehicle}`",
             )
 
 

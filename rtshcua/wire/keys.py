@@ -17,7 +17,7 @@ KID_BYTES: Final = 16
 PUBLIC_BYTES: Final = 32
 SEED_BYTES: Final = 32
 
-#: stands for every role or every vehicle; a source is always named
+#: stands for every role, policy or vehicle; a source is always named
 ANY: Final = "*"
 
 _SOURCES: Final = frozenset(kind.name.lower() for kind in SourceKind)
@@ -65,8 +65,9 @@ def verified(public: bytes, signature: bytes, message: bytes) -> bool:
 class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A public key as the trust root names it.
 
-    `roles`, `sources` (`agent`, `operator`, ...) and `vehicles` (identities) are those that it may speak for; empty is
-    none, and `*` is every role or vehicle. `expires_us` is UTC in microseconds, None for as long as the root lives.
+    `roles`, `sources` (`agent`, `operator`, ...) and `vehicles` (identities) are those that it may speak for; a mission
+    key signs missions under `policies` (names) alone. Empty is none, and `*` is every role, policy or vehicle.
+    `expires_us` is UTC in microseconds, None for as long as the root lives.
     """
 
     duty: Duty
@@ -76,6 +77,7 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     vehicles: tuple[str, ...] = ()
     expires_us: int | None = None
     development: bool = False
+    policies: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.public) != PUBLIC_BYTES:
@@ -128,9 +130,11 @@ class SigningKey:
         sources: tuple[str, ...] = (),
         vehicles: tuple[str, ...] = (),
         expires_us: int | None = None,
+        policies: tuple[str, ...] = (),
     ) -> VerificationKey:
         """The public half, as a trust root would name it."""
-        return VerificationKey(self.duty, self.public, roles, sources, vehicles, expires_us, self.development)
+        development = self.development
+        return VerificationKey(self.duty, self.public, roles, sources, vehicles, expires_us, development, policies)
 
     def __repr__(self) -> str:
         mark = " development" if self.development else ""

@@ -18,7 +18,7 @@ class Artefact:
         return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
 
 
-ROOT: Final = Artefact("rtshcua/root", 1)
+ROOT: Final = Artefact("rtshcua/root", 2)  # 2: mission keys are bound to policies
 POLICY: Final = Artefact("rtshcua/policy", 4)  # 4: with what flies after a long silence of the vehicle
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)

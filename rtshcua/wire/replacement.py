@@ -11,15 +11,15 @@ from typing import Final, NamedTuple
 from msgspec.structs import replace
 
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.contract import Contract, SourceKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import cbor, names
 from rtshcua.wire.binding import bind
-from rtshcua.wire.bundle import Bundle, check_bundle
+from rtshcua.wire.bundle import Bundle, check_bundle, check_proposer
 from rtshcua.wire.digest import MISSION, digest
-from rtshcua.wire.document import DocumentError, open_document, sign_document
+from rtshcua.wire.document import HUMAN, DocumentError, open_document, sign_document
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import TrustRoot
 
@@ -86,7 +86,8 @@ def open_replacement(document: bytes, *, root: TrustRoot, vehicle: str, bundle: 
 def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle:
     """What is in force after a replacement of the mission in `bundle`, of which `released` steps were released.
 
-    Raises `DocumentError`: `superseded` (it replaces what is not in force), `already-released`, `other-steps`.
+    Raises `DocumentError`: `superseded` (it replaces what is not in force), `already-released`, `other-steps`; and
+    `BundleError` for a key that may not speak for what is replaced.
     """
     if found.supersedes != bundle.mission_digest:
         raise DocumentError("superseded", "it replaces another mission than the one in force")
@@ -94,11 +95,20 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle
         text = f"it changes step {found.kept}, and {released} steps were released already"
         raise DocumentError("already-released", text)
     _check_kept(bundle.mission, found.mission, found.kept)
+    _check_replacer(found, bundle)
     after = found.over(bundle)
     steps = after.mission.invocations
     if len({each.invocation_id for each in steps}) != len(steps):
         raise DocumentError("other-steps", "a new step has the id of one that stays")
     return after
+
+
+def _check_replacer(found: Replacement, bundle: Bundle) -> None:
+    """Who replaces steps may speak for those who proposed them: an agent sets aside what agents proposed, no more."""
+    replaced = bundle.mission.invocations[found.kept :]
+    if HUMAN in found.key.sources:
+        replaced = tuple(replace(each, source=SourceKind.OPERATOR) for each in replaced)
+    check_proposer(found.key, bundle.policy, replaced, now_us=0)  # whether the key expired was asked before
 
 
 def _check_kept(old: Mission, new: Mission, kept: int) -> None:

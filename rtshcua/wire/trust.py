@@ -145,6 +145,18 @@ def speaker_refusal(key: VerificationKey, *, role: str, source: str, vehicle: st
     return None
 
 
+def proposer_refusal(
+    key: VerificationKey, *, role: str, source: str, policy: str, vehicle: str, now_us: int
+) -> str | None:
+    """Why `key` may not sign a step for `role` through `source` under a policy of that name; None if it may.
+
+    As `speaker_refusal`, and `key-other-policy`: whoever may propose under one policy may not choose a laxer one.
+    """
+    if refusal := speaker_refusal(key, role=role, source=source, vehicle=vehicle, now_us=now_us):
+        return refusal
+    return None if policy in key.policies or ANY in key.policies else "key-other-policy"
+
+
 def _open(data: bytes, keys: dict[bytes, VerificationKey], now_us: int) -> TrustRoot:
     opened = cose.open1(data, keys=keys, duty=Duty.ROOT, content_type=names.ROOT.content_type, limit=MAX_ROOT)
     root = TrustRoot.decode(opened.payload)

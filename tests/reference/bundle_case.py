@@ -36,7 +36,12 @@ THE_MISSION = Mission(
 
 
 def root(**mission_key: tuple[str, ...]) -> TrustRoot:
-    speaks = {"roles": ("operator",), "sources": ("agent",), "vehicles": ("quad-07",), **mission_key}
+    speaks = {
+        "roles": ("operator",),
+        "sources": ("agent",),
+        "vehicles": ("quad-07",),
+        "policies": ("field",),
+    } | mission_key
     return TrustRoot(
         1,
         False,

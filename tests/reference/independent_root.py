@@ -10,7 +10,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 _CONTENT = "application/vnd.rtshcua.root+cbor"
-_KEY_FIELDS = {"duty", "public", "roles", "sources", "vehicles", "expires_us", "development"}
+_KEY_FIELDS = {"duty", "public", "roles", "sources", "vehicles", "expires_us", "development", "policies"}
 _ROOT_FIELDS = {"version", "development", "issued_at_us", "expires_at_us", "keys", "thresholds"}
 
 
@@ -84,10 +84,10 @@ def _open(envelope: bytes, pinned: bytes, now_us: int) -> Root:
 
 def _body(payload: bytes) -> dict:
     match _whole(payload):
-        case ["rtshcua/root", 1, {**body}] if set(body) == _ROOT_FIELDS:
+        case ["rtshcua/root", 2, {**body}] if set(body) == _ROOT_FIELDS:
             pass
         case _:
-            raise Untrusted("not a trust root, version 1")
+            raise Untrusted("not a trust root, version 2")
     for key in body["keys"]:
         if set(key) != _KEY_FIELDS or len(key["public"]) != 32:
             raise Untrusted("not a key")

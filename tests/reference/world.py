@@ -79,7 +79,9 @@ ROOT = TrustRoot(
     expires_at_us=ISSUED * 2,
     keys=(
         POLICY_KEY.verification(vehicles=(VEHICLE,)),
-        MISSION_KEY.verification(roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,)),
+        MISSION_KEY.verification(
+            roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,), policies=(POLICY.name,)
+        ),
         APPROVAL_KEY.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,)),
         LOG_KEY.verification(vehicles=(VEHICLE,)),
         ROOT_KEY.verification(),

@@ -112,6 +112,7 @@ def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
                 roles=(ANY,) if duty in speakers else (),
                 sources=("agent", "operator") if duty in speakers else (),
                 vehicles=() if duty is Duty.ROOT else (ANY,),
+                policies=(ANY,) if duty is Duty.MISSION else (),
             )
             for duty, key in KEYS.items()
         ),

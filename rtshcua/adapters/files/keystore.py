@@ -1,11 +1,13 @@
 """The user's signing keys and trust root: `<data folder>/keys/`, one file a key and `root.trust`.
 
+A mission key is for one source: `mission-agent.key` signs what agents propose, `mission-operator.key` what people do.
+
 A key file is readable by its owner alone and encrypted, unless its key is for development. The folder appears whole,
 with every key and the root that names them, or not at all.
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from msgspec import UNSET
@@ -15,14 +17,16 @@ from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
 from rtshcua.wire import cose
 from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
-from rtshcua.wire.keys import ANY, Duty, SigningKey
+from rtshcua.wire.keys import ANY, Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import MAX_ROOT, Thresholds, TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
 ROOT = "root.trust"
 
-_SOURCES = ("agent", "operator")
-_SPEAKERS = (Duty.MISSION, Duty.APPROVAL)
+#: who proposes missions, with a key each
+PROPOSERS = ("agent", "operator")
+#: the role that both speak for, where no other is named
+OPERATOR = "operator"
 
 
 class KeyStoreError(Untrusted):
@@ -39,17 +43,19 @@ class KeyStore:
         """Whether keys were made here."""
         return self.folder.is_dir()
 
-    def key_path(self, duty: Duty, number: int = 1) -> Path:
-        """Where the key of a duty is; there may be several of witnesses."""
-        return self.folder / (f"{duty}.key" if number == 1 else f"{duty}-{number}.key")
+    def key_path(self, duty: Duty, number: int = 1, *, whose: str = "") -> Path:
+        """Where the key of a duty is: of a mission key `whose` is its source. There may be several alike."""
+        stem = f"{duty}-{whose}" if whose else str(duty)
+        return self.folder / (f"{stem}.key" if number == 1 else f"{stem}-{number}.key")
 
     def paths(self, root: TrustRoot) -> dict[bytes, Path]:
         """Where the key of each `kid` in the root is, if it is here: they are numbered as the root names them."""
-        counts: Counter[Duty] = Counter()
+        counts: Counter[tuple[Duty, str]] = Counter()
         found = {}
         for key in root.keys:
-            counts[key.duty] += 1
-            found[key.kid] = self.key_path(key.duty, counts[key.duty])
+            name = (key.duty, whose(key))
+            counts[name] += 1
+            found[key.kid] = self.key_path(key.duty, counts[name], whose=name[1])
         return found
 
     @property
@@ -67,47 +73,56 @@ class KeyStore:
         expires_us: int,
         witnesses: int = 1,
         witness_threshold: int = 1,
+        roles: Sequence[str] = (OPERATOR,),
+        policies: Sequence[str] = (ANY,),
     ) -> TrustRoot:
         """Makes a key for each duty, from 32 secret bytes of `seed` each, and the root that names them.
 
-        The root trusts the mission and approval keys for every role, through agent and operator, on every vehicle. So
-        many `witnesses` have a key each; what `witness_threshold` of them cosigned counts as anchored.
+        There is a mission key for what agents propose and another for what people do; the root trusts them for `roles`
+        and under `policies` (names, or any), and the approval key for every role. So many `witnesses` have a key each;
+        what `witness_threshold` of them cosigned counts as anchored. All are for every vehicle.
         Raises `KeyStoreError` (`exists`), and `KeyFileError` for keys that are neither encrypted nor for development.
         """
         if self.exists():
             raise KeyStoreError("exists", f"there are keys already in `{self.folder}`")
-        counts = {duty: witnesses if duty is Duty.WITNESS else 1 for duty in Duty}
-        keys = {
-            self.key_path(duty, number).name: SigningKey.from_seed(seed(), duty=duty, development=development)
-            for duty, count in counts.items()
-            for number in range(1, count + 1)
-        }
+        keys: list[tuple[SigningKey, VerificationKey]] = []
+        for duty in Duty:
+            for source in PROPOSERS if duty is Duty.MISSION else range(witnesses) if duty is Duty.WITNESS else (0,):
+                key = SigningKey.from_seed(seed(), duty=duty, development=development)
+                vehicles = () if duty is Duty.ROOT else (ANY,)
+                named = key.verification(vehicles=vehicles)
+                if isinstance(source, str):
+                    named = key.verification(
+                        roles=tuple(roles), sources=(source,), vehicles=vehicles, policies=tuple(policies)
+                    )
+                elif duty is Duty.APPROVAL:
+                    named = key.verification(roles=(ANY,), sources=PROPOSERS, vehicles=vehicles)
+                keys.append((key, named))
         root = TrustRoot(
             version=1,
             development=development,
             issued_at_us=now_us,
             expires_at_us=expires_us,
-            keys=tuple(
-                key.verification(
-                    roles=(ANY,) if key.duty in _SPEAKERS else (),
-                    sources=_SOURCES if key.duty in _SPEAKERS else (),
-                    vehicles=() if key.duty is Duty.ROOT else (ANY,),
-                )
-                for key in keys.values()
-            ),
+            keys=tuple(named for _, named in keys),
             thresholds=Thresholds(witness=UNSET if witness_threshold == 1 else witness_threshold),
         )
+        paths = self.paths(root)
+        signed = root.sign(next(key for key, _ in keys if key.duty is Duty.ROOT))
         make_folder(self.folder.parent, mode=PRIVATE_FOLDER)
         with appearing(self.folder) as folder:
-            for name, key in keys.items():
-                write_new(folder / name, dump_signing_key(key, passphrase=passphrase), mode=PRIVATE_FILE)
-            write_new(folder / ROOT, root.sign(keys[self.key_path(Duty.ROOT).name]), mode=PRIVATE_FILE)
+            for key, _ in keys:
+                data = dump_signing_key(key, passphrase=passphrase)
+                write_new(folder / paths[key.kid].name, data, mode=PRIVATE_FILE)
+            write_new(folder / ROOT, signed, mode=PRIVATE_FILE)
         return root
 
-    def signing_key(self, duty: Duty, *, passphrase: bytes | None = None) -> SigningKey:
-        """The key of a duty. Raises `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`."""
+    def signing_key(self, duty: Duty, *, passphrase: bytes | None = None, whose: str = "") -> SigningKey:
+        """The key of a duty, of a mission key that of the source `whose`.
+
+        Raises `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`.
+        """
         self._expect()
-        return read_key(self.key_path(duty), duty, passphrase=passphrase)
+        return read_key(self.key_path(duty, whose=whose), duty, passphrase=passphrase)
 
     def root(self) -> bytes:
         """The signed trust root. Raises `KeyStoreError` (`no-keys`)."""
@@ -121,6 +136,11 @@ class KeyStore:
     def _expect(self) -> None:
         if not self.exists():
             raise KeyStoreError("no-keys", f"there are no keys in `{self.folder}`")
+
+
+def whose(key: VerificationKey) -> str:
+    """Whose a key is among those of its duty, as its file is named: the source of a mission key that has one."""
+    return key.sources[0] if key.duty is Duty.MISSION and len(key.sources) == 1 else ""
 
 
 def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:

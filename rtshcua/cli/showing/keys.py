@@ -74,6 +74,7 @@ def as_object(key: VerificationKey) -> dict[str, object]:
         "roles": key.roles,
         "sources": key.sources,
         "vehicles": key.vehicles,
+        "policies": key.policies,
         "expires_us": key.expires_us,
         "development": key.development,
     }
@@ -88,7 +89,8 @@ def speaks(key: VerificationKey) -> str:
         return f"cosigns logs of {_any(key.vehicles, 'vehicle')}{until}"
     who = f"{_any(key.roles, 'role')} through {' or '.join(key.sources)}, " if key.roles else ""
     until = "" if key.expires_us is None else f", until {utc(key.expires_us)}"
-    return f"{who}on {_any(key.vehicles, 'vehicle')}{until}"
+    under = f"under {_any(key.policies, 'policy')}, " if key.duty is Duty.MISSION else ""
+    return f"{who}{under}on {_any(key.vehicles, 'vehicle')}{until}"
 
 
 def _any(names: tuple[str, ...], what: str) -> str:

@@ -17,6 +17,7 @@ from rtshcua.ground.agent.mission import mission_of
 from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
 from rtshcua.ground.agent.shape import shape_errors
+from rtshcua.ground.compiler.pins import PROPOSED, Pins, claims
 from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.model.ir.missions import MissionDecl
@@ -66,11 +67,13 @@ def load_specification(
     library: str | None,
     listing: Listing | None = None,
     packs: Packs = no_packs,
+    pins: Pins = PROPOSED,
 ) -> tuple[Program, Specification]:
     """A program of a specification and the sources that it is checked against.
 
-    `policies` are sources named by the caller, beside what the specification imports from the library. The program's
-    findings include the specification's; pass what compiling it finds through `Specification.pointed`.
+    `policies` are sources named by the caller, beside what the specification imports from the library. What it claims
+    beyond `pins` is a finding: an agent's word is no authority. The program's findings include the specification's;
+    pass what compiling it finds through `Specification.pointed`.
     """
     name = shown(path)
     try:
@@ -79,6 +82,7 @@ def load_specification(
         message = f"cannot read `{path}`: {(error.strerror or 'it is unreadable').lower()}"
         specification = _specification(Source(name, ""), None, None, (Diagnostic(NO_SUCH_FILE, message),))
     found = list(specification.diagnostics)
+    found += [each for mission in specification.unit.missions for each in claims(mission, pins)]
     folders = {} if library is None else {"lib": library}
     wanted: list[str] = []
     for each in specification.unit.imports:

@@ -18,6 +18,7 @@ from rtshcua.ground.checker.uses import with_uses
 from rtshcua.ground.compiler.bounds import Bounds, bounds_of, most
 from rtshcua.ground.compiler.closure import Imports, beside
 from rtshcua.ground.compiler.mission import lower_mission
+from rtshcua.ground.compiler.pins import Pins, claims
 from rtshcua.ground.compiler.policy import LoweredPolicy, lower_policy
 from rtshcua.ground.compiler.proofs.prove import prove_mission, prove_policy, refused
 from rtshcua.ground.compiler.proofs.situation import Ground
@@ -66,12 +67,18 @@ class Checked:
 
 
 def compile_program(
-    program: Program, dialect: Dialect, *, mission: str | None, issued_at_us: int, settings: Settings | None = None
+    program: Program,
+    dialect: Dialect,
+    *,
+    mission: str | None,
+    issued_at_us: int,
+    settings: Settings | None = None,
+    pins: Pins | None = None,
 ) -> Compiled:
     """Compile one mission (None: the only one of the file that was asked for) and the policy that it is under.
 
-    `settings` are values for that mission's parameters. All declarations are checked, and all missions. Never raises
-    for what the sources say.
+    `settings` are values for that mission's parameters; what it claims beyond `pins` is a finding. All declarations are
+    checked, and all missions. Never raises for what the sources say.
     """
     settings = settings or Settings()
     candidates = _candidates(program)
@@ -79,6 +86,8 @@ def compile_program(
     run = Compilation(program, dialect, issued_at_us, name, settings)
     run.check()
     chosen = run.choose(mission)
+    if chosen is not None and pins is not None:
+        run.report.found += claims(chosen, pins)
     compiled = run.lowered(chosen)
     found = run.diagnostics()
     if compiled is None or run.report.failed() or chosen is None:

@@ -44,6 +44,7 @@ WITHOUT_TWINS = {
     codes.REFUSED_ON_BOARD,
     codes.NOT_ALWAYS_PERMITTED,
     codes.VERSION_NOT_RAISED,
+    codes.POLICY_NOT_NAMED,  # of the command line
     codes.NOT_FORMATTED,  # tests/golden/format has pairs
     codes.UNSAFE_FORMAT,
 }

@@ -39,6 +39,8 @@ TOLD = {
     codes.SPECIFICATION_SHAPE,
     codes.DUPLICATE_KEY,
     codes.SPECIFICATION_SIZE,
+    codes.CLAIMED_AUTHORITY,
+    codes.POLICY_NOT_NAMED,
     codes.TOO_MANY,
     codes.UNDECIDED,
     codes.NOT_FORMATTED,

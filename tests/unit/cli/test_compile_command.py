@@ -36,8 +36,9 @@ def proposal(checkout: Path) -> str:
 @pytest.mark.parametrize("name", ["short.rts", "standard.rts", "extended.rts", "proposal.json"])
 def test_what_ships_compiles_to_the_same_bytes_each_time(checkout: Path, tmp_path: Path, name: str) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
+    under = ["--policy", "bridge_inspection@7"] if name.endswith(".json") else []
     for target in (first, second):
-        assert main(["compile", str(checkout / "missions" / name), "-o", str(target), *AT]) == ExitCode.OK
+        assert main(["compile", str(checkout / "missions" / name), "-o", str(target), *AT, *under]) == ExitCode.OK
     assert first.read_bytes() == second.read_bytes()
 
 
@@ -81,7 +82,7 @@ def test_an_agent_repairs_its_proposal_from_the_answer_alone(
     wrong = json.loads(proposal(checkout))
     wrong["phases"][1]["steps"][1]["arguments"]["altitude"] = "35 m"
     (here / "p.json").write_text(json.dumps(wrong), encoding="utf-8")
-    assert main(["compile", "p.json", "--json"]) == ExitCode.DIAGNOSTICS
+    assert main(["compile", "p.json", "--json", "--policy", "bridge_inspection"]) == ExitCode.DIAGNOSTICS
     answer = json.loads(capsys.readouterr().out)
     assert answer["exit"] == "diagnostics"
     (found,) = answer["diagnostics"]
@@ -93,7 +94,7 @@ def test_an_agent_repairs_its_proposal_from_the_answer_alone(
         place = place[int(word)] if isinstance(place, list) else place[word]
     place[last] = value
     (here / "p.json").write_text(json.dumps(wrong), encoding="utf-8")
-    assert main(["compile", "p.json", "--json"]) == ExitCode.OK
+    assert main(["compile", "p.json", "--json", "--policy", "bridge_inspection"]) == ExitCode.OK
     answer = json.loads(capsys.readouterr().out)
     assert answer["diagnostics"] == []
     assert answer["bundle"]["steps"] == 4
@@ -158,7 +159,7 @@ def test_what_a_bundle_must_not_replace(checkout: Path, here: Path, target: str)
 
 
 def test_a_key_of_the_wrong_duty_signs_nothing(checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    key = Path(os.environ["RTSHCUA_DATA_DIR"]) / "keys" / "mission.key"
+    key = Path(os.environ["RTSHCUA_DATA_DIR"]) / "keys" / "mission-agent.key"
     words = ["compile", str(checkout / "missions" / "short.rts"), "-o", "x", "--policy-key", str(key)]
     assert main(words) == ExitCode.UNTRUSTED
     assert "the key is for `mission`, not for `policy`" in capsys.readouterr().err

@@ -7,21 +7,27 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.files.folders import data_folder
-from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.cli import app, keys, unlock
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.wire.keys import Duty
+from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.untrusted import Untrusted
 
 PASSPHRASE = "correct horse battery"
+
+
+def keys_of(store: KeyStore) -> list[SigningKey]:
+    """All signing keys of a store."""
+    whose = [(duty, each) for duty in Duty for each in (PROPOSERS if duty is Duty.MISSION else ("",))]
+    return [store.signing_key(duty, whose=each) for duty, each in whose]
 
 
 def test_init_makes_a_development_root(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["keys", "init"]) == ExitCode.OK
     out = capsys.readouterr().out
     assert "development root" in out
-    for duty in Duty:
-        assert KeyStore(data_folder()).signing_key(duty).kid.hex() in out
+    for key in keys_of(KeyStore(data_folder())):
+        assert key.kid.hex() in out
     assert all(line.isprintable() for line in out.splitlines())
 
 
@@ -30,9 +36,10 @@ def test_secrets_are_never_printed(capsys: pytest.CaptureFixture[str]) -> None:
         assert app.main(["keys", *words]) == ExitCode.OK
     out = capsys.readouterr().out
     store = KeyStore(data_folder())
-    for duty in Duty:
-        assert store.signing_key(duty).private.private_bytes_raw().hex() not in out
-        assert store.key_path(duty).read_text().splitlines()[3] not in out
+    for key in keys_of(store):
+        assert key.private.private_bytes_raw().hex() not in out
+    for path in store.folder.glob("*.key"):
+        assert path.read_text().splitlines()[3] not in out
 
 
 def test_init_twice_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,9 +58,15 @@ def test_listing_says_what_each_key_is_trusted_for(capsys: pytest.CaptureFixture
     listed = json.loads(capsys.readouterr().out)
     assert listed["expires_at_us"] - listed["issued_at_us"] == 2 * 86_400_000_000
     assert listed["development"] is True
-    assert {key["duty"]: key["roles"] for key in listed["keys"]} == {
-        "root": [], "policy": [], "mission": ["*"], "approval": ["*"], "log": [], "witness": [],
-    }  # fmt: skip
+    assert [(key["duty"], key["roles"], key["sources"], key["policies"]) for key in listed["keys"]] == [
+        ("root", [], [], []),
+        ("policy", [], [], []),
+        ("mission", ["operator"], ["agent"], ["*"]),
+        ("mission", ["operator"], ["operator"], ["*"]),
+        ("approval", ["*"], ["agent", "operator"], []),
+        ("log", [], [], []),
+        ("witness", [], [], []),
+    ]
     assert all(Path(key["file"]).is_file() for key in listed["keys"])
 
 
@@ -84,16 +97,24 @@ def test_a_damaged_root_is_not_listed(capsys: pytest.CaptureFixture[str]) -> Non
 def test_encrypted_keys_from_a_passphrase_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "passphrase"
     file.write_text(PASSPHRASE + "\n")
-    assert app.main(["keys", "init", "--encrypted", "--passphrase-file", str(file)]) == ExitCode.OK
+    assert app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(file)]) == ExitCode.OK
     assert "development" not in capsys.readouterr().out
     store = KeyStore(data_folder())
     assert unlock.unlock(store, Duty.LOG, passphrase_file=file).duty is Duty.LOG
     assert unlock.unlock(store, Duty.LOG, path=store.key_path(Duty.LOG), passphrase_file=file).duty is Duty.LOG
 
 
+def test_mission_keys_in_earnest_are_for_named_policies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "passphrase"
+    file.write_text(PASSPHRASE)
+    assert app.main(["keys", "init", "--encrypted", "--passphrase-file", str(file)]) == ExitCode.USAGE
+    assert "`--policy NAME`" in capsys.readouterr().err
+    assert not KeyStore(data_folder()).exists()
+
+
 def test_a_short_passphrase_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "short").write_text("12345678901\n")
-    words = ["keys", "init", "--encrypted", "--passphrase-file", str(tmp_path / "short")]
+    words = ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "short")]
     assert app.main(words) == ExitCode.USAGE
     assert not KeyStore(data_folder()).exists()
     assert "12 characters" in capsys.readouterr().err
@@ -102,9 +123,9 @@ def test_a_short_passphrase_is_none(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_without_a_terminal_nobody_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(unlock, "getpass", lambda prompt: pytest.fail("asked"))
     monkeypatch.setattr(keys, "getpass", lambda prompt: pytest.fail("asked"))
-    assert app.main(["keys", "init", "--encrypted"]) == ExitCode.USAGE
+    assert app.main(["keys", "init", "--encrypted", "--policy", "field"]) == ExitCode.USAGE
     (tmp_path / "passphrase").write_text(PASSPHRASE)
-    app.main(["keys", "init", "--encrypted", "--passphrase-file", str(tmp_path / "passphrase")])
+    app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "passphrase")])
     with pytest.raises(Untrusted) as refused:
         unlock.unlock(KeyStore(data_folder()), Duty.LOG)
     assert refused.value.slug == "passphrase-needed"
@@ -122,8 +143,8 @@ def test_at_a_terminal_the_passphrase_is_typed(monkeypatch: pytest.MonkeyPatch) 
     typed = iter([PASSPHRASE, "another one, mistyped", PASSPHRASE, PASSPHRASE, PASSPHRASE])
     for module in (keys, unlock):
         monkeypatch.setattr(module, "getpass", lambda prompt: next(typed))
-    assert app.main(["keys", "init", "--encrypted"]) == ExitCode.USAGE
-    assert app.main(["keys", "init", "--encrypted"]) == ExitCode.OK
+    assert app.main(["keys", "init", "--encrypted", "--policy", "field"]) == ExitCode.USAGE
+    assert app.main(["keys", "init", "--encrypted", "--policy", "field"]) == ExitCode.OK
     assert unlock.unlock(KeyStore(data_folder()), Duty.LOG).duty is Duty.LOG
 
 

@@ -154,8 +154,11 @@ def test_a_root_and_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     capsys.readouterr()
     store = KeyStore(data_folder())
     root = shown(store.root_path, capsys)
-    for duty in Duty:
+    for duty in set(Duty) - {Duty.MISSION}:
         assert store.signing_key(duty).kid.hex() in root
+    for source in ("agent", "operator"):
+        assert store.signing_key(Duty.MISSION, whose=source).kid.hex() in root
+        assert f"role operator through {source}, under any policy, on any vehicle" in root
     assert "expired" not in root
     (tmp_path / "old").write_bytes(case.root()[1])
     assert "(expired)" in shown(tmp_path / "old", capsys)
@@ -167,7 +170,7 @@ def test_a_root_and_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 
 def test_an_encrypted_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "passphrase").write_text("correct horse battery")
-    app.main(["keys", "init", "--encrypted", "--passphrase-file", str(tmp_path / "passphrase")])
+    app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "passphrase")])
     capsys.readouterr()
     assert "Signing key of duty log, encrypted" in shown(KeyStore(data_folder()).key_path(Duty.LOG), capsys)
 

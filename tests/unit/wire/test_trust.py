@@ -15,6 +15,7 @@ from rtshcua.wire.trust import (
     key_refusal,
     open_root,
     open_successor,
+    proposer_refusal,
     speaker_refusal,
 )
 from rtshcua.wire.untrusted import Untrusted
@@ -29,7 +30,9 @@ ROOT = signing_key(1, Duty.ROOT)
 NEXT = signing_key(2, Duty.ROOT)
 POLICY = signing_key(3, Duty.POLICY)
 AGENT = signing_key(4, Duty.MISSION)
-AGENT_KEY = AGENT.verification(roles=("operator",), sources=("agent",), vehicles=("quad-07",), expires_us=500)
+AGENT_KEY = AGENT.verification(
+    roles=("operator",), sources=("agent",), vehicles=("quad-07",), expires_us=500, policies=("field",)
+)
 KEYS = (ROOT.verification(), POLICY.verification(vehicles=(ANY,)), AGENT_KEY)
 TRUST = TrustRoot(1, False, 100, 1000, KEYS)
 SIGNED = TRUST.sign(ROOT)
@@ -68,8 +71,9 @@ def test_the_format_is_stable():
         "vehicles": ("quad-07",),
         "expires_us": 500,
         "development": False,
+        "policies": ("field",),
     }
-    assert hashlib.sha256(SIGNED).hexdigest() == "72d492e8e30e7ab9fd343e5e9433e1d6a63f0267d2004823542f415cfbfa43ad"
+    assert hashlib.sha256(SIGNED).hexdigest() == "eb472892e932cd2ba9a954ad84031dd77ad0971bb25702f46287a48b9ec790a2"
 
 
 def test_keys_are_found_by_duty():
@@ -202,8 +206,9 @@ def test_malformed_payloads(payload):
 def test_another_format_or_version_is_refused():
     other = artefact.wrap(names.POLICY, artefact.unwrap(names.ROOT, TRUST.encode()))
     assert opening(envelope(other)) == "unknown-format"
-    newer = artefact.wrap(names.Artefact("rtshcua/root", 2), None)
-    assert opening(envelope(newer)) == "unknown-version"
+    for version in (1, 3):
+        other = artefact.wrap(names.Artefact("rtshcua/root", version), None)
+        assert opening(envelope(other)) == "unknown-version"
 
 
 def test_a_huge_root_is_refused_unread():
@@ -253,6 +258,18 @@ def test_an_agents_host_speaks_as_agent_only():
     assert speaking(vehicle="quad-08") == "wrong-vehicle"
     assert speaking(now_us=499) is None
     assert speaking(now_us=500) == "key-expired"
+
+
+def proposing(key=AGENT_KEY, *, policy="field", source="agent"):
+    return proposer_refusal(key, role="operator", source=source, policy=policy, vehicle="quad-07", now_us=200)
+
+
+def test_a_mission_key_is_for_named_policies():
+    assert proposing() is None
+    assert proposing(policy="laxer") == "key-other-policy"
+    assert proposing(source="operator", policy="laxer") == "wrong-source"
+    assert proposing(msgspec.structs.replace(AGENT_KEY, policies=())) == "key-other-policy"
+    assert proposing(msgspec.structs.replace(AGENT_KEY, policies=(ANY,)), policy="laxer") is None
 
 
 def test_any_stands_for_roles_and_vehicles_but_never_for_sources():

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.files import folders, keystore
-from rtshcua.adapters.files.keystore import KeyStore, KeyStoreError, read_root
+from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, KeyStoreError, read_root
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.trust import open_root
@@ -33,11 +33,22 @@ def test_every_duty_has_its_key_and_the_root_names_it(store: KeyStore) -> None:
     root = open_root(store.root(), pinned=store.pin(), now_us=NOW)
     assert root.development
     for duty in Duty:
-        key = store.signing_key(duty)
-        assert key.duty is duty
-        assert key.development
-        assert list(root.keys_for(duty)) == [key.kid]
+        keys = [store.signing_key(duty, whose=whose) for whose in (PROPOSERS if duty is Duty.MISSION else ("",))]
+        assert {(key.duty, key.development) for key in keys} == {(duty, True)}
+        assert list(root.keys_for(duty)) == [key.kid for key in keys]
     assert store.pin() == store.signing_key(Duty.ROOT).kid
+
+
+def test_a_mission_key_is_for_one_source_and_for_named_roles_and_policies(
+    tmp_path: Path, seeds: Callable[[], bytes]
+) -> None:
+    store = KeyStore(tmp_path)
+    root = store.create(
+        seeds, development=True, passphrase=None, now_us=NOW, expires_us=LATER, roles=("pilot",), policies=("field",)
+    )
+    for source in PROPOSERS:
+        key = root.keys_for(Duty.MISSION)[store.signing_key(Duty.MISSION, whose=source).kid]
+        assert (key.sources, key.roles, key.policies) == ((source,), ("pilot",), ("field",))
 
 
 def test_nobody_else_can_read_any_of_it(store: KeyStore) -> None:

@@ -4,7 +4,8 @@ derives a log again.
 
 What is in force is changed by signed documents. Whatever is wrong with a document, it changes nothing. An approval is
 what later decisions are told of; a recall ends the mission; a replacement puts its steps in the place of those that
-were not released.
+were not released. It brings no step back under an id that was there before, and none that was refused: a refusal is of
+what it refused, wherever that stands now.
 """
 
 from typing import Final, NamedTuple
@@ -70,6 +71,8 @@ class InForce:
         self._issued_at_us = bundle.mission.issued_at_us
         #: of the mission that was opened, and of all that replaced it since
         self._digests: tuple[bytes, ...] = (bundle.mission_digest,)
+        #: the ids of all steps that ever were in force
+        self._seen = frozenset(each.invocation_id for each in bundle.mission.invocations)
 
     def approvals(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
         """The verified answers that a decision on an invocation is told of."""
@@ -112,7 +115,7 @@ class InForce:
         answered = open_approval(
             document, root=self._root, vehicle=self._vehicle, policy=policy, mission=mission, now=now
         )
-        step = answered.step
+        step = answered.about.step
         if step < decided:
             raise DocumentError("already-decided", f"step {step} was decided before")
         if not self._approvals.add(answered, now):
@@ -148,11 +151,15 @@ class InForce:
                 check_key(key, self._vehicle, now)
             found = ahead.found
         after = fit_replacement(found, self.bundle, released)
+        new = frozenset(each.invocation_id for each in found.mission.invocations[found.kept :])
+        if new & self._seen:
+            raise DocumentError("id-seen", "a new step has the id of one that this flight knew before")
         prepared = self._prepared(found.mission) if ahead is None else ahead.prepared
+        self._seen |= new
         self.bundle = after
         self.invocations = (*self.invocations[: found.kept], *prepared[found.kept :])
         self._digests = (*self._digests, found.digest)
-        self._approvals.forget(found.kept)
+        self._approvals.keep(after.mission.invocations)
         steps = len(prepared)
         return Receipt(REPLACEMENT, ACCEPTED, f"the mission has {steps} steps now, new from {found.kept}", found.kept)
 

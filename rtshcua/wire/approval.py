@@ -29,9 +29,9 @@ class ApprovalDocument(Flat, frozen=True):
 
 
 class Answered(NamedTuple):
-    """A verified answer: the step and the role by their numbers, `monotonic_us` when it came, `expires_us` UTC."""
+    """A verified answer: about which invocation, by which role, `monotonic_us` when it came, `expires_us` UTC."""
 
-    step: int
+    about: Invocation
     role: int
     granted: int
     monotonic_us: int
@@ -66,7 +66,7 @@ def open_approval(
     if role < 0 or not confirms(policy, invocation, role):
         text = f"no `confirm` of the policy asks role `{said.role[:80]}` about step {invocation.step}"
         raise DocumentError("not-asked", text)
-    return Answered(invocation.step, role, said.granted, now.monotonic_us, said.expires_at_us)
+    return Answered(invocation, role, said.granted, now.monotonic_us, said.expires_at_us)
 
 
 def confirms(policy: Policy, invocation: Invocation, role: int) -> tuple[int, ...]:
@@ -88,26 +88,32 @@ def _concerns(rule: Rule, invocation: Invocation) -> bool:
 class Approvals:
     """The verified answers of one flight, and what a decision is told of them.
 
-    What is kept is bounded: one grant and one refusal for each step and role. A grant counts until it expires; a
-    refusal counts for good.
+    A grant is for one invocation, by its id, until it expires. A refusal is for good, and for what it refused: the
+    skill with its arguments, in whatever step of whatever mission of this flight they stand. What is kept is bounded:
+    one grant for each step in force and role, one refusal for each step that ever was.
     """
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
-        self._answers: dict[tuple[int, int, int], Answered] = {}
+        self._answers: dict[_Subject, Answered] = {}
 
     def add(self, answered: Answered, now: Now) -> bool:
         """Take an answer in; False for one that is there already, which changes nothing."""
-        key = (answered.step, answered.role, answered.granted)
+        key = _subject(answered.about, answered.role, answered.granted)
         held = self._answers.get(key)
         if held is not None and _counts(held, now):
             return False
         self._answers[key] = answered
         return True
 
-    def forget(self, first: int) -> None:
-        """The steps from `first` on were replaced: nobody has answered about what stands there now."""
-        self._answers = {key: answered for key, answered in self._answers.items() if answered.step < first}
+    def keep(self, invocations: tuple[Invocation, ...]) -> None:
+        """These are the steps now. Grants of others are dropped; refusals stay."""
+        ids = {each.invocation_id for each in invocations}
+        self._answers = {
+            key: answered
+            for key, answered in self._answers.items()
+            if not answered.granted or answered.about.invocation_id in ids
+        }
 
     def about(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
         """What `decide` reads of them: one entry for each answer that counts and each rule that it answers."""
@@ -115,10 +121,20 @@ class Approvals:
             return ()
         return tuple(
             Approval(rule, answered.role, answered.granted, answered.monotonic_us)
-            for answered in self._answers.values()
-            if answered.step == invocation.step and _counts(answered, now)
+            for key, answered in self._answers.items()
+            if key == _subject(invocation, answered.role, answered.granted) and _counts(answered, now)
             for rule in confirms(self._policy, invocation, answered.role)
         )
+
+
+#: what an answer is about, by which role it is, and whether it grants
+_Subject = tuple[bytes | tuple[int, tuple[int, ...]], int, int]
+
+
+def _subject(invocation: Invocation, role: int, granted: int) -> _Subject:
+    """A grant is about one invocation, a refusal about what any invocation asks for."""
+    about = invocation.invocation_id if granted else (invocation.skill, invocation.arguments)
+    return about, role, granted
 
 
 def _counts(answered: Answered, now: Now) -> bool:

@@ -27,12 +27,10 @@ def bind(mission: Mission, policy_digest: bytes, *, after: bytes = b"") -> Missi
     and no other mission or time of issue gives it again. `after` names what the mission replaces, if it does; a mission
     that replaces another has other ids than the same one by itself.
     """
-    blank = tuple(msgspec.structs.replace(each, invocation_id=b"", binding=b"") for each in mission.invocations)
-    mission = msgspec.structs.replace(mission, policy_digest=policy_digest, invocations=blank)
-    root = digest(_INVOCATION, _encoded(mission) + after)
+    mission = msgspec.structs.replace(mission, policy_digest=policy_digest)
     identified = [
-        msgspec.structs.replace(each, invocation_id=digest(_INVOCATION, cbor.encode([root, each.step]))[:ID_BYTES])
-        for each in blank
+        msgspec.structs.replace(each, invocation_id=name, binding=b"")
+        for each, name in zip(mission.invocations, _ids(mission, after), strict=True)
     ]
     bound = tuple(msgspec.structs.replace(each, binding=binding_of(mission, each)) for each in identified)
     return msgspec.structs.replace(mission, invocations=bound)
@@ -53,12 +51,30 @@ def binding_of(mission: Mission, invocation: Invocation) -> bytes:
     return digest(BINDING, cbor.encode([around, own]))
 
 
+def first_misnamed(mission: Mission, *, after: bytes = b"") -> int | None:
+    """The index of the first invocation whose id is not the one that `bind` gives it, or None.
+
+    Nobody chooses ids, so one that stood for something else before never comes again.
+    """
+    for index, (invocation, name) in enumerate(zip(mission.invocations, _ids(mission, after), strict=True)):
+        if invocation.invocation_id != name:
+            return index
+    return None
+
+
 def first_unbound(mission: Mission) -> int | None:
     """The index of the first invocation whose binding is not the one it must carry, or None."""
     for index, invocation in enumerate(mission.invocations):
         if invocation.binding != binding_of(mission, invocation):
             return index
     return None
+
+
+def _ids(mission: Mission, after: bytes) -> list[bytes]:
+    """The ids of a mission's steps, from all that it says without them and the bindings."""
+    blank = tuple(msgspec.structs.replace(each, invocation_id=b"", binding=b"") for each in mission.invocations)
+    root = digest(_INVOCATION, _encoded(msgspec.structs.replace(mission, invocations=blank)) + after)
+    return [digest(_INVOCATION, cbor.encode([root, each.step]))[:ID_BYTES] for each in blank]
 
 
 def _encoded(part: Flat) -> bytes:

@@ -29,7 +29,8 @@ class BundleError(Untrusted):
     """A bundle that is refused.
 
     `too-large`, `malformed`, `wrong-policy`, `wrong-vehicle`, `key-expired`, `wrong-source`, `wrong-role`,
-    `key-other-policy`, `binding-mismatch`; and, of its envelopes, the slugs of `EnvelopeError` and `ArtefactError`.
+    `key-other-policy`, `id-mismatch`, `binding-mismatch`; and, of its envelopes, the slugs of `EnvelopeError` and
+    `ArtefactError`.
     """
 
 
@@ -98,9 +99,12 @@ def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: in
     return bundle
 
 
-def check_bundle(bundle: Bundle, vehicle: str, now_us: int) -> None:
-    """Whether the parts belong together, and their keys may speak for them on this vehicle. Raises `BundleError`."""
-    _check_belonging(bundle)
+def check_bundle(bundle: Bundle, vehicle: str, now_us: int, *, after: bytes = b"") -> None:
+    """Whether the parts belong together, and their keys may speak for them on this vehicle; `after` is as for `bind`.
+
+    Raises `BundleError`.
+    """
+    _check_belonging(bundle, after)
     _check_entitled(bundle, vehicle, now_us)
 
 
@@ -128,7 +132,7 @@ def open_envelope(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact, 
     return cose.open1(envelope, keys=keys, duty=duty, content_type=kind.content_type, limit=limit)
 
 
-def _check_belonging(bundle: Bundle) -> None:
+def _check_belonging(bundle: Bundle, after: bytes) -> None:
     policy, mission = bundle.policy, bundle.mission
     if mission.policy_digest != bundle.policy_digest:
         raise BundleError("wrong-policy", "the mission was signed for another policy than the one beside it")
@@ -145,6 +149,9 @@ def _check_belonging(bundle: Bundle) -> None:
     unbound = binding.first_unbound(mission)
     if unbound is not None:
         raise BundleError("binding-mismatch", f"the binding of step {unbound} is not the one over its fields")
+    misnamed = binding.first_misnamed(mission, after=after)
+    if misnamed is not None:
+        raise BundleError("id-mismatch", f"the id of step {misnamed} is not the one that follows from the mission")
 
 
 def _check_entitled(bundle: Bundle, vehicle: str, now_us: int) -> None:

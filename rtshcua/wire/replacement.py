@@ -60,8 +60,7 @@ def sign_replacement(mission: Mission, *, over: Bundle, kept: int, key: SigningK
     are not those of `over`.
     """
     _check_kept(over.mission, mission, kept)
-    after = cbor.encode([over.mission_digest, kept])  # so that the ids are those of no bundle with the same mission
-    bound = bind(mission, over.policy_digest, after=after)
+    bound = bind(mission, over.policy_digest, after=_after(over.mission_digest, kept))
     body = ReplacementDocument(over.mission_digest, kept, bound)
     return sign_document(names.REPLACEMENT, body, key, Duty.MISSION)
 
@@ -75,7 +74,7 @@ def open_replacement(document: bytes, *, root: TrustRoot, vehicle: str, bundle: 
     said, opened = open_document(document, names.REPLACEMENT, ReplacementDocument, Duty.MISSION, root, now)
     found = Replacement(said.supersedes, said.kept, said.mission, digest(MISSION, opened.payload), opened.key)
     candidate = with_fields(bundle, mission=found.mission, mission_digest=found.digest, mission_key=opened.key)
-    check_bundle(candidate, vehicle, now.utc_us + now.utc_error_us)
+    check_bundle(candidate, vehicle, now.utc_us + now.utc_error_us, after=_after(said.supersedes, said.kept))
     if found.mission.issued_at_us > now.utc_us + now.utc_error_us:
         raise DocumentError("issued-in-future", "it says that it will be issued later than now")
     if not found.mission.invocations:
@@ -96,11 +95,12 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle
         raise DocumentError("already-released", text)
     _check_kept(bundle.mission, found.mission, found.kept)
     _check_replacer(found, bundle)
-    after = found.over(bundle)
-    steps = after.mission.invocations
-    if len({each.invocation_id for each in steps}) != len(steps):
-        raise DocumentError("other-steps", "a new step has the id of one that stays")
-    return after
+    return found.over(bundle)
+
+
+def _after(supersedes: bytes, kept: int) -> bytes:
+    """What the ids of a replacement follow from beside its mission: so they are those of no bundle."""
+    return cbor.encode([supersedes, kept])
 
 
 def _check_replacer(found: Replacement, bundle: Bundle) -> None:

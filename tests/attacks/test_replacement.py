@@ -31,7 +31,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Ending
-from rtshcua.wire import cose, names
+from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.document import DocumentError, sign_document
 from rtshcua.wire.keys import Duty, SigningKey
@@ -52,7 +52,7 @@ def forged(
 ) -> bytes:
     """A document that an honest compiler would not make, rightly signed."""
     over = of.bundle.mission_digest if supersedes is None else supersedes
-    whole = bind(mission, of.bundle.policy_digest, after=b"x") if bound else mission
+    whole = bind(mission, of.bundle.policy_digest, after=cbor.encode([over, kept])) if bound else mission
     return sign_document(names.REPLACEMENT, ReplacementDocument(over, kept, whole), MISSION_KEY, Duty.MISSION)
 
 
@@ -248,12 +248,12 @@ def test_numbers_and_names_that_do_not_fit(mission: Mission, kept: int, slug: st
 
 def test_a_new_step_with_the_id_of_one_that_stays() -> None:
     of = fresh()
-    bound = bind(shorter(of), of.bundle.policy_digest, after=b"x")
+    bound = bind(shorter(of), of.bundle.policy_digest, after=b"")
     first, second, last = bound.invocations
     twin = replace(last, invocation_id=of.bundle.mission.invocations[0].invocation_id)
     twin = replace(twin, binding=binding_of(bound, twin))
     assert (
-        presented(of, forged(of, replace(bound, invocations=(first, second, twin)), bound=False)).slug == "other-steps"
+        presented(of, forged(of, replace(bound, invocations=(first, second, twin)), bound=False)).slug == "id-mismatch"
     )
 
 

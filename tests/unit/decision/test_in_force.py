@@ -13,7 +13,7 @@ from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT, START, VEHICLE
 from rtshcua.decision.session import MOST_AHEAD, InForce
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
-from rtshcua.wire import cose, names
+from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.approval import ApprovalDocument
 from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.document import MAX_DOCUMENT, MAX_WITHOUT_MISSION, DocumentError, sign_document
@@ -50,7 +50,7 @@ def later(us: int) -> Now:
 def forged(mission: Mission, kept: int = 2, supersedes: bytes | None = None, *, bound: bool = True) -> bytes:
     """A replacement that an honest compiler would not make, rightly signed."""
     over = OF.bundle.mission_digest if supersedes is None else supersedes
-    whole = bind(mission, OF.bundle.policy_digest, after=b"x") if bound else mission
+    whole = bind(mission, OF.bundle.policy_digest, after=cbor.encode([over, kept])) if bound else mission
     return sign_document(names.REPLACEMENT, ReplacementDocument(over, kept, whole), MISSION_KEY, Duty.MISSION)
 
 
@@ -256,12 +256,12 @@ def test_a_replacement_of_a_released_step_is_refused() -> None:
 
 
 def test_a_new_step_with_the_id_of_one_that_stays_is_refused() -> None:
-    bound = bind(shorter(OF), OF.bundle.policy_digest, after=b"x")
+    bound = bind(shorter(OF), OF.bundle.policy_digest, after=b"")
     first, second, last = bound.invocations
     twin = replace(last, invocation_id=OF.bundle.mission.invocations[0].invocation_id)
     twin = replace(twin, binding=binding_of(bound, twin))
     document = forged(replace(bound, invocations=(first, second, twin)), bound=False)
-    assert take(flight(), document).slug == "other-steps"
+    assert take(flight(), document).slug == "id-mismatch"
 
 
 def test_a_replacement_whose_kept_steps_differ_is_not_signed() -> None:

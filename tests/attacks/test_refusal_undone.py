@@ -1,0 +1,171 @@
+"""Threat: a refusal is undone, by a replacement that brings the refused step back.
+
+The attacker holds the runtime and a mission key, signs byte by byte, keeps back what it likes, and replays what a
+person signed before.
+"""
+
+import pytest
+from msgspec.structs import replace
+
+from reference.documents import ASKED, approval, hand, low, low_mission, presented, replacement
+from reference.world import (
+    MISSION_KEY,
+    POLICY_KEY,
+    ROOT,
+    ROOT_KEY,
+    START,
+    VEHICLE,
+    Run,
+    answer_to,
+    renewed,
+    request_for,
+    try_load,
+)
+from rtshcua.decision.session import InForce
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.auditor.audit import audit
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.wire import bundle as bundles
+from rtshcua.wire import cbor, names
+from rtshcua.wire.binding import bind, binding_of
+from rtshcua.wire.document import sign_document
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.replacement import ReplacementDocument
+from rtshcua.wire.response import Answer
+
+OF = low()
+
+
+def with_ids(mission: Mission, ids: dict[int, bytes]) -> Mission:
+    """A bound mission, its steps under chosen ids and bound anew."""
+    steps = [
+        replace(each, invocation_id=ids.get(each.step, each.invocation_id), binding=b"") for each in mission.invocations
+    ]
+    return replace(mission, invocations=tuple(replace(each, binding=binding_of(mission, each)) for each in steps))
+
+
+def same_again(of: Loaded, kept: int = ASKED, ids: dict[int, bytes] | None = None) -> bytes:
+    """A replacement by the very same mission; its ids are those of `ids`, or as an honest compiler makes them."""
+    over = of.bundle.mission_digest
+    bound = bind(of.bundle.mission, of.bundle.policy_digest, after=cbor.encode([over, kept]))
+    bound = with_ids(bound, ids) if ids else bound
+    return sign_document(names.REPLACEMENT, ReplacementDocument(over, kept, bound), MISSION_KEY, Duty.MISSION)
+
+
+def old_ids(of: Loaded) -> dict[int, bytes]:
+    return {each.step: each.invocation_id for each in of.bundle.mission.invocations}
+
+
+def flown_to_the_inspection() -> Loaded:
+    of = renewed(OF)
+    for step in range(ASKED):
+        answer_to(of, request_for(of, step=step))
+    return of
+
+
+def asked(of: Loaded) -> tuple[Outcome, Reason]:
+    answer = answer_to(of, request_for(of, step=ASKED))
+    assert isinstance(answer, Answer)
+    return answer.outcome, answer.reason
+
+
+def test_a_replayed_grant_does_not_undo_a_refusal() -> None:
+    """The attack as it was found: same steps, same ids, and a grant that was signed before the refusal."""
+    of = flown_to_the_inspection()
+    grant = approval(of)
+    assert presented(of, approval(of, granted=0)).accepted
+    assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
+    assert presented(of, same_again(of, ids=old_ids(of))).slug == "id-mismatch"
+    presented(of, same_again(of))
+    assert presented(of, grant).slug != "accepted"
+    assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
+
+
+@pytest.mark.parametrize("kept", [0, 1, ASKED])
+def test_a_refusal_stays_with_what_was_refused_wherever_it_stands_now(kept: int) -> None:
+    of = renewed(OF)
+    assert presented(of, approval(of, granted=0)).accepted
+    first, second, third, last = of.bundle.mission.invocations
+    moved = replace(low_mission(), invocations=(first, second, replace(third, step=2), replace(last, step=3)))
+    assert presented(of, replacement(of, kept, moved)).accepted
+    for step in range(ASKED):
+        answer_to(of, request_for(of, step=step))
+    assert presented(of, approval(of)).accepted
+    assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
+
+
+def test_the_step_behind_another_stays_refused() -> None:
+    """It has another index now."""
+    of = flown_to_the_inspection()
+    assert presented(of, approval(of, granted=0)).accepted
+    first, second, third, last = of.bundle.mission.invocations
+    hop = replace(second, step=2)
+    later = replace(low_mission(), invocations=(first, second, hop, replace(third, step=3), replace(last, step=4)))
+    assert presented(of, replacement(of, ASKED, later)).accepted
+    answer_to(of, request_for(of, step=2))
+    assert presented(of, approval(of, step=3)).accepted
+    answer = answer_to(of, request_for(of, step=3))
+    assert isinstance(answer, Answer)
+    assert (answer.outcome, answer.reason) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
+
+
+def test_another_step_is_another_question() -> None:
+    """What was refused is a skill with its arguments: at another height it is asked about anew."""
+    of = flown_to_the_inspection()
+    assert presented(of, approval(of, granted=0)).accepted
+    first, second, third, last = of.bundle.mission.invocations
+    area, height, *rest = third.arguments
+    other = replace(third, arguments=(area, height - 1_000, *rest), plan=replace(third.plan, altitude=height - 1_000))
+    assert presented(
+        of, replacement(of, ASKED, replace(low_mission(), invocations=(first, second, other, last)))
+    ).accepted
+    assert asked(of) == (Outcome.DEFER, Reason.AWAITING_APPROVAL)
+    assert presented(of, approval(of)).accepted
+    assert asked(of)[0] is Outcome.ALLOW
+
+
+def test_a_bundle_with_ids_of_its_own_making_is_not_loaded() -> None:
+    policy = OF.bundle.policy
+    payload = bundles.policy_payload(policy)
+    bound = bind(low_mission(), bundles.policy_digest(payload))
+    chosen = with_ids(bound, {ASKED: bytes(16)})
+    data = bundles.seal(payload, bundles.mission_payload(chosen), policy_key=POLICY_KEY, mission_key=MISSION_KEY)
+    found = try_load(data)
+    assert isinstance(found, Refusal)
+    assert found.slug == "id-mismatch"
+
+
+def test_an_id_that_was_seen_before_is_refused() -> None:
+    """A flight whose bundle had, against all odds, the id that a replacement's step will have."""
+    bound = bind(low_mission(), OF.bundle.policy_digest, after=cbor.encode([OF.bundle.mission_digest, ASKED]))
+    taken = with_ids(OF.bundle.mission, {3: bound.invocations[ASKED].invocation_id})
+    bundle = bundles.Bundle(
+        OF.bundle.policy, taken, OF.bundle.policy_digest, OF.bundle.mission_digest, OF.bundle.digest,
+        OF.bundle.policy_key, OF.bundle.mission_key,
+    )  # fmt: skip
+    of = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE)
+    document = sign_document(
+        names.REPLACEMENT, ReplacementDocument(OF.bundle.mission_digest, ASKED, bound), MISSION_KEY, Duty.MISSION
+    )
+    assert of.take(document, START, decided=0, released=0).slug == "id-seen"
+
+
+def test_the_audit_finds_a_refusal_undone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A boundary that forgot the refusal decided and recorded the step as if nobody had said no."""
+    run = Run(renewed(OF)).until_flies("goto")
+    assert hand(run, approval(run.loaded, granted=0, now=run.clock.now())) == "accepted"
+    assert hand(run, same_again(run.loaded)) == "accepted"
+    assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
+    told = run.loaded.in_force.approvals
+    monkeypatch.setattr(
+        run.loaded.in_force, "approvals", lambda of, now: tuple(each for each in told(of, now) if each.granted)
+    )
+    run.until(lambda run: "inspect_area" in run.flown or run.ending is not None)
+    assert run.flown[-1] == "inspect_area"
+    run.until_over()
+    close = run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)
+    failure = audit([*run.lines, close], ROOT_KEY.public).report.failure
+    assert failure is not None
+    assert failure.slug == "decision/approvals"

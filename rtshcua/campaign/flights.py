@@ -4,11 +4,13 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from time import process_time_ns
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import msgspec
 
 from rtshcua.campaign.results import Failed, Result
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario
 from rtshcua.virtual import development
 from rtshcua.virtual.flown import ScenarioFlown
@@ -32,15 +34,24 @@ class Flight:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """What all flights of a campaign share: the bundle, and the trust root that it is signed under (`development`)."""
+    """What all flights of a campaign share: the bundle, the trust root that it is signed under (`development`), and the
+    roles of the policy, of whom there are people to ask.
+    """
 
     bundle: bytes
     root: bytes
+    roles: tuple[str, ...]
+
+    @classmethod
+    def of(cls, policy: Policy, mission: Mission, issued_at_us: int) -> Self:
+        """The field of a mission under a policy."""
+        roles = policy.roles
+        return cls(development.seal(policy, mission), development.root(issued_at_us, roles), roles)
 
     def flown(self, scenario: Scenario, flavour: str, seed: int) -> ScenarioFlown:
         """A flight of a scenario, as it was."""
         made = development.keys()
-        keys = Keys(log=made[Duty.LOG], approval=made[Duty.APPROVAL], mission=made[Duty.MISSION])
+        keys = Keys(made[Duty.LOG], development.approvers(self.roles), made[Duty.MISSION])
         return fly(self.bundle, self.root, keys, scenario, flavour, seed)
 
     def fly(self, flight: Flight) -> Result:

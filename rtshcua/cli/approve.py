@@ -10,13 +10,12 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.documents import WHERE, deliver, subject
 from rtshcua.cli.faults import fail, refuse, untrusted
-from rtshcua.cli.unlock import unlock
+from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.document import MAX_LIFE_US
-from rtshcua.wire.keys import Duty
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -38,6 +37,9 @@ def approve(
     to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer here")] = None,
     root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    person: Annotated[
+        str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
+    ] = None,
     approval_key: Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
@@ -69,7 +71,8 @@ def approve(
             issued_at_us=now_us,
             expires_at_us=now_us + seconds * 1_000_000,
         )
-        key = unlock(KeyStore(data_folder()), Duty.APPROVAL, path=approval_key, passphrase_file=passphrase_file)
+        store = KeyStore(data_folder())
+        key = unlock_person(store, person, role, path=approval_key, passphrase_file=passphrase_file)
         document = sign_approval(said, key)
     except Untrusted as error:
         return refuse(untrusted(error))

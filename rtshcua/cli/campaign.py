@@ -34,7 +34,6 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario, Start
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import Kind
-from rtshcua.virtual import development
 from rtshcua.virtual.flight import LATER_US
 
 app = typer.Typer(add_completion=False)
@@ -94,7 +93,7 @@ def campaign(
     compiled, sources = compile_sources([source, *(with_ or ())], mission=mission, issued_at_us=issued_us)
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
-    field = Field(development.seal(compiled.policy, compiled.mission), development.root(issued_us))
+    field = Field.of(compiled.policy, compiled.mission, issued_us)
     identity = Identity(
         compiled.mission.name, issued_us, sha256(field.bundle).hexdigest(), seed, flavours,
         tuple(sorted(kind.__name__ for kind in kinds)), __version__,

@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+import re
 import secrets
 import sys
 import time
+from collections.abc import Callable
 from getpass import getpass
 from pathlib import Path
 from typing import Annotated
@@ -12,16 +14,16 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.files.folders import data_folder
-from rtshcua.adapters.files.keystore import OPERATOR, KeyStore
+from rtshcua.adapters.files.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
 from rtshcua.adapters.files.signing import fingerprint, write_link_key
 from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.showing.keys import as_object, speaks
-from rtshcua.cli.shown import utc
-from rtshcua.cli.unlock import read_passphrase
+from rtshcua.cli.shown import plain, utc
+from rtshcua.cli.unlock import read_passphrase, unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.signing import KEY_OCTETS
-from rtshcua.wire.keys import ANY, SEED_BYTES
-from rtshcua.wire.trust import TrustRoot, open_root
+from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
+from rtshcua.wire.trust import HUMAN, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -29,6 +31,8 @@ app = typer.Typer(add_completion=False)
 _DAY_US = 86_400_000_000
 _SHORTEST = 12  # characters of a passphrase
 _MOST_WITNESSES = 16
+_ROLE = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,99}")
+_NO_PASSPHRASE = f"encrypted keys need a passphrase of {_SHORTEST} characters or more, typed alike"
 
 
 @app.callback()
@@ -55,11 +59,13 @@ def init(
         list[str] | None,
         typer.Option(help="a policy that missions may be under; encrypted keys need one [default: any] (repeatable)"),
     ] = None,
+    owner: Annotated[str, typer.Option("--approver", help="who may recall, and answer as operator")] = OWNER,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
     """Make a key for each duty, and the trust root that names them.
 
-    There are two mission keys: one signs what agents propose, and nothing else, the other what people do. A development
+    There are two mission keys: one signs what agents propose, and nothing else, the other what people do. The approval
+    key is one person's, and `rtshcua keys approver` makes those of others. A development
     root says so of itself: its keys lie unencrypted in your data folder, readable by you alone. A witness is worth
     something only away from the vehicle: move its key to where `rtshcua witness` runs, and the log's aboard.
     """
@@ -79,22 +85,84 @@ def init(
     if not development:
         passphrase = _new_passphrase(passphrase_file)
         if passphrase is None:
-            return fail(
-                ExitCode.USAGE, f"encrypted keys need a passphrase of {_SHORTEST} characters or more, typed alike"
-            )
+            return fail(ExitCode.USAGE, _NO_PASSPHRASE)
     now_us = time.time_ns() // 1000
-    store.create(
-        lambda: secrets.token_bytes(SEED_BYTES),
-        development=development,
-        passphrase=passphrase,
-        now_us=now_us,
-        expires_us=now_us + days * _DAY_US,
-        witnesses=witnesses,
-        witness_threshold=witness_threshold,
-        roles=role or (OPERATOR,),
-        policies=policy or (ANY,),
-    )
+    try:
+        store.create(
+            lambda: secrets.token_bytes(SEED_BYTES),
+            development=development,
+            passphrase=passphrase,
+            now_us=now_us,
+            expires_us=now_us + days * _DAY_US,
+            witnesses=witnesses,
+            witness_threshold=witness_threshold,
+            roles=role or (OPERATOR,),
+            policies=policy or (ANY,),
+            approver=owner,
+        )
+    except Untrusted as error:
+        return _refused(error)
     return _listed(store, as_json=as_json)
+
+
+@app.command()
+def approver(
+    name: Annotated[str, typer.Argument(help="the person: lower-case letters, digits, `.`, `_`, `-`")],
+    role: Annotated[str, typer.Option(help="the role in which they answer")],
+    vehicle: Annotated[
+        list[str] | None, typer.Option(help="the identity of a vehicle [default: any] (repeatable)")
+    ] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
+    own_passphrase_file: Annotated[
+        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Make an approval key for one person in one role, and the next version of the trust root, which names it.
+
+    The same name is the same person: where a rule asks two people, two keys of one name are one. Hand the key file
+    over, and keep it nowhere else. Who pinned the root key trusts the new root too.
+    """
+    if not _ROLE.fullmatch(role):
+        return fail(ExitCode.USAGE, f"`{plain(role)}` is no role", "accepted: a name, as policies write it")
+    return _added(
+        Duty.APPROVAL,
+        lambda key: key.verification(roles=(role,), sources=(HUMAN,), vehicles=tuple(vehicle or (ANY,)), person=name),
+        passphrase_file,
+        own_passphrase_file,
+        as_json=as_json,
+    )
+
+
+@app.command()
+def mission(
+    source: Annotated[str, typer.Argument(metavar="agent|operator", help="who proposes what it signs")],
+    role: Annotated[list[str], typer.Option(help="a role that missions are for (repeatable)")],
+    policy: Annotated[list[str], typer.Option(help="a policy that missions are under (repeatable)")],
+    vehicle: Annotated[
+        list[str] | None, typer.Option(help="the identity of a vehicle [default: any] (repeatable)")
+    ] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
+    own_passphrase_file: Annotated[
+        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Make a mission key for one source, bound to roles and policies, and the next version of the trust root.
+
+    `rtshcua compile --mission-key FILE` signs with it.
+    """
+    if source not in PROPOSERS:
+        return fail(ExitCode.USAGE, f"`{source}` proposes no missions", f"accepted: {' or '.join(PROPOSERS)}")
+    return _added(
+        Duty.MISSION,
+        lambda key: key.verification(
+            roles=tuple(role), sources=(source,), vehicles=tuple(vehicle or (ANY,)), policies=tuple(policy)
+        ),
+        passphrase_file,
+        own_passphrase_file,
+        as_json=as_json,
+    )
 
 
 @app.command(name="list")
@@ -148,6 +216,36 @@ def link(
         return fail(ExitCode.REFUSED, f"there is a file `{file}` already", "a key that is in use is not overwritten")
     print(f"{file}: link key {fingerprint(key)}")
     return ExitCode.OK
+
+
+def _added(
+    duty: Duty,
+    named: Callable[[SigningKey], VerificationKey],
+    passphrase_file: Path | None,
+    own_passphrase_file: Path | None,
+    *,
+    as_json: bool,
+) -> ExitCode:
+    """Make a key more, and say what the root trusts now."""
+    store = KeyStore(data_folder())
+    try:
+        own = None
+        if not _root(store).development:
+            own = _new_passphrase(own_passphrase_file)
+            if own is None:
+                return fail(ExitCode.USAGE, _NO_PASSPHRASE)
+        signer = unlock(store, Duty.ROOT, passphrase_file=passphrase_file)
+        store.add(
+            secrets.token_bytes(SEED_BYTES),
+            named,
+            duty=duty,
+            passphrase=own,
+            signer=signer,
+            now_us=time.time_ns() // 1000,
+        )
+    except Untrusted as error:
+        return _refused(error)
+    return _listed(store, as_json=as_json)
 
 
 def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:

@@ -4,7 +4,7 @@ import sys
 from getpass import getpass
 from pathlib import Path
 
-from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, read_key
+from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, KeyStoreError, read_key, whose
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -37,6 +37,35 @@ def unlock_for(
     """The mission key that is for what this mission's source proposes; of the store's keys no other would do."""
     source = next((SourceKind(each.source).name.lower() for each in mission.invocations), PROPOSERS[0])
     return unlock(store, Duty.MISSION, path=path, passphrase_file=passphrase_file, whose=source)
+
+
+def unlock_person(
+    store: KeyStore,
+    person: str | None,
+    role: str | None,
+    *,
+    path: Path | None = None,
+    passphrase_file: Path | None = None,
+) -> SigningKey:
+    """The approval key of a person (None: of the only one) in a role (None: in whatever one), from `path` or the store.
+
+    Raises `Untrusted` (`no-approver`, `several-approvers`, ...) and OSError.
+    """
+    if path is not None:
+        return unlock(store, Duty.APPROVAL, path=path, passphrase_file=passphrase_file)
+    root = open_root(store.root(), pinned=store.pin(), now_us=0)
+    keys = [
+        key
+        for key in root.keys_for(Duty.APPROVAL).values()
+        if person in (None, key.person) and role in (None, *key.roles)
+    ]
+    who = f"{person or 'anybody'} as {role or 'anything'}"
+    if not keys:
+        raise KeyStoreError("no-approver", f"there is no approval key of {who}: `rtshcua keys approver` makes one")
+    if len({key.person for key in keys}) > 1:
+        names = ", ".join(f"`{each}`" for each in sorted({key.person for key in keys}))
+        raise KeyStoreError("several-approvers", f"there are approval keys of {names}: `--as NAME` says whose to use")
+    return unlock(store, Duty.APPROVAL, whose=whose(keys[0]), passphrase_file=passphrase_file)
 
 
 def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mission) -> None:

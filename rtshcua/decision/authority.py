@@ -6,13 +6,18 @@ is compared here is the digest that they cover.
 3: the source may use the timing class, no `forbid` matches, and some `permit` does. An unknown `forbid` may match, so
 it defers; an unknown `permit` may not, so it does not count.
 
-3b: a `confirm` rule that matches, or may match, needs an approval by its role. The approval moves the release (design
-4.3). A refusal, or an approval that did not come within the rule's time after the release, denies.
+3b: a `confirm` rule that matches, or may match, needs an approval by its role, or by two different people, one for
+each of its two roles. The approval (of two, the later one) moves the release (design 4.3). A refusal, or an approval
+that did not come within the rule's time after the release, denies.
 """
+
+from collections.abc import Sequence
 
 from rtshcua.decision.case import PASSED, Case, Found, Verdict, concluded
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.model.flat.contract import SourceKind, TimingClass
+from rtshcua.model.flat.policy import Rule
+from rtshcua.model.flat.situation import Approval
 from rtshcua.model.outcome import Outcome, Reason
 
 _BINDING = (Verdict(Outcome.DENY, Reason.BINDING_MISMATCH, None),)
@@ -81,6 +86,19 @@ def authority(case: Case) -> Found:
     return concluded(verdicts, doubt, unforbidden)
 
 
+def _granted(rule: Rule, answers: Sequence[Approval]) -> list[int]:
+    """When grants that came in time were enough, monotonic us: one of the role, or those of two people."""
+    first = [each for each in answers if each.role == rule.approver]
+    if rule.second == -1:
+        return [each.monotonic_us for each in first]
+    return [
+        max(one.monotonic_us, other.monotonic_us)
+        for one in first
+        for other in answers
+        if other.role == rule.second and other.person != one.person
+    ]
+
+
 def confirmation(case: Case) -> Found:
     """Denied when any rule's answer denies, else deferred when any is awaited."""
     verdicts: list[Verdict] = []
@@ -92,10 +110,10 @@ def confirmation(case: Case) -> Found:
         if truth == FALSE:
             continue
         certain, end = not truth & FALSE, released_us + rule.rule.within_us
-        key = (rule.number, rule.rule.approver)
-        answers = [each for each in case.context.approvals if (each.rule, each.role) == key]
+        asked = (rule.rule.approver, rule.rule.second)
+        answers = [each for each in case.context.approvals if each.rule == rule.number and each.role in asked]
         refused = not all(each.granted for each in answers)
-        times = [] if refused else [each.monotonic_us for each in answers if each.monotonic_us <= end]
+        times = [] if refused else _granted(rule.rule, [each for each in answers if each.monotonic_us <= end])
         if times:
             granted, (first, last) = min(times), case.release
             case.release = (max(first, granted) if certain else first, max(last, granted))

@@ -269,8 +269,8 @@ class Recorder:
         return self._head.seal(record, self._origin, self._public, certify)
 
 
-def _approvals(context: Context) -> tuple[tuple[int, int, int, int], ...]:
-    return tuple([(a.rule, a.role, a.granted, a.monotonic_us) for a in context.approvals])
+def _approvals(context: Context) -> tuple[tuple[int, int, int, int, int], ...]:
+    return tuple([(a.rule, a.role, a.granted, a.monotonic_us, a.person) for a in context.approvals])
 
 
 def _storable(text: str) -> str:

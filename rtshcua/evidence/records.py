@@ -85,7 +85,7 @@ class RecordedState(
 class RecordedContext(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
     """`decide`'s context but for the binding; an approval is [rule, role, granted, monotonic us]."""
 
-    approvals: tuple[tuple[Integer, Integer, Integer, Integer], ...]
+    approvals: tuple[tuple[Integer, Integer, Integer, Integer, Integer], ...]
     consumed: Integer
     phase: Integer
     policy_version: Integer

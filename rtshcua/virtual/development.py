@@ -6,6 +6,7 @@ development, and so does each of its keys.
 
 from collections.abc import Mapping
 from functools import cache
+from hashlib import sha256
 from typing import Final
 
 from msgspec.structs import replace
@@ -15,25 +16,46 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.virtual.flight import LATER_US
 from rtshcua.wire.keys import ANY, Duty, SigningKey
-from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.trust import HUMAN, TrustRoot
 
-_SPEAKERS: Final = (Duty.MISSION, Duty.APPROVAL)
+#: how many people there are in each role
+_PEOPLE: Final = 2
 _LIFETIME_US: Final = 10 * 366 * 86_400 * 1_000_000
 
 
 @cache
 def keys() -> Mapping[Duty, SigningKey]:
-    """One key for each duty; the same in each process."""
+    """One key for each duty but approvals; the same in each process."""
     return {
         duty: SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True)
         for number, duty in enumerate(Duty)
-    }  # fmt: skip
+        if duty is not Duty.APPROVAL
+    }
 
 
 @cache
-def root(issued_at_us: int) -> bytes:
-    """A signed root that lets them speak for any role and vehicle, from a UTC time on."""
+def approvers(roles: tuple[str, ...]) -> Mapping[str, tuple[SigningKey, ...]]:
+    """By role the approval keys of the people in it; the same in each process."""
+    return {
+        role: tuple(
+            SigningKey.from_seed(sha256(f"{role} {n}".encode()).digest(), duty=Duty.APPROVAL, development=True)
+            for n in range(_PEOPLE)
+        )
+        for role in roles
+    }
+
+
+@cache
+def root(issued_at_us: int, roles: tuple[str, ...]) -> bytes:
+    """A signed root that lets them speak for any role, policy and vehicle, from a UTC time on; and people of `roles`
+    answer in person.
+    """
     made = keys()
+    people = tuple(
+        key.verification(roles=(role,), sources=(HUMAN,), vehicles=(ANY,), person=f"person-{number}-{n}")
+        for number, (role, each) in enumerate(approvers(roles).items())
+        for n, key in enumerate(each)
+    )
     signed = TrustRoot(
         version=1,
         development=True,
@@ -41,13 +63,14 @@ def root(issued_at_us: int) -> bytes:
         expires_at_us=issued_at_us + _LIFETIME_US,
         keys=tuple(
             key.verification(
-                roles=(ANY,) if duty in _SPEAKERS else (),
-                sources=("agent", "operator") if duty in _SPEAKERS else (),
+                roles=(ANY,) if duty is Duty.MISSION else (),
+                sources=("agent", "operator") if duty is Duty.MISSION else (),
                 vehicles=() if duty is Duty.ROOT else (ANY,),
                 policies=(ANY,) if duty is Duty.MISSION else (),
             )
             for duty, key in made.items()
-        ),
+        )
+        + people,
     )
     return signed.sign(made[Duty.ROOT])
 

@@ -7,7 +7,7 @@ What goes wrong with the vehicle, its link and its surroundings is the simulatio
 with our own computer and with those who hand in documents happens here, between two turns of the loop.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from heapq import heappop, heappush
@@ -64,10 +64,12 @@ _LONGEST_BABBLE: Final = 400
 
 @dataclass(frozen=True, slots=True)
 class Keys:
-    """Who signs: the log, approvals and recalls, replacements. The trust root must name them for that."""
+    """Who signs: the log, by role the people who approve (the first of all recalls), replacements. The trust root must
+    name them for that. A second person of a role answers where a rule asks two.
+    """
 
     log: SigningKey
-    approval: SigningKey
+    approvals: Mapping[str, Sequence[SigningKey]]
     mission: SigningKey
 
 
@@ -524,21 +526,24 @@ class _Flight:
         policy, vehicle = bundle.policy, bundle.policy.vehicle.identity
         if role not in policy.roles:
             return []
+        number, people = policy.roles.index(role), self._keys.approvals.get(role, ())
         return [
             sign_approval(
                 ApprovalDocument(
                     step.invocation_id, step.binding, vehicle, role, granted, utc_us, utc_us + _SPEAKS_US
                 ),
-                self._keys.approval,
+                key,
             )
             for step in bundle.mission.invocations
-            if confirms(policy, step, policy.roles.index(role))
+            if (asked := confirms(policy, step, number))
+            for key in people[: 2 if any(policy.rules[each].second == number for each in asked) else 1]
         ]  # fmt: skip
 
     def _recall(self, loaded: Loaded, utc_us: int) -> bytes:
         vehicle = loaded.bundle.policy.vehicle.identity
         said = RecallDocument(vehicle, loaded.bundle.mission_digest, b"", utc_us, utc_us + _SPEAKS_US)
-        return sign_recall(said, self._keys.approval)
+        anybody = next(key for people in self._keys.approvals.values() for key in people)
+        return sign_recall(said, anybody)
 
     def _replacement(self, loaded: Loaded) -> bytes:
         """The mission in force, its steps after the present one under other ids."""

@@ -29,10 +29,13 @@ class ApprovalDocument(Flat, frozen=True):
 
 
 class Answered(NamedTuple):
-    """A verified answer: about which invocation, by which role, `monotonic_us` when it came, `expires_us` UTC."""
+    """A verified answer: about which invocation, by which role and person (numbers), `monotonic_us` when it came,
+    `expires_us` UTC.
+    """
 
     about: Invocation
     role: int
+    person: int
     granted: int
     monotonic_us: int
     expires_us: int
@@ -66,13 +69,15 @@ def open_approval(
     if role < 0 or not confirms(policy, invocation, role):
         text = f"no `confirm` of the policy asks role `{said.role[:80]}` about step {invocation.step}"
         raise DocumentError("not-asked", text)
-    return Answered(invocation, role, said.granted, now.monotonic_us, said.expires_at_us)
+    return Answered(invocation, role, root.person(opened.key), said.granted, now.monotonic_us, said.expires_at_us)
 
 
 def confirms(policy: Policy, invocation: Invocation, role: int) -> tuple[int, ...]:
     """The numbers of the `confirm` rules that may ask this role about an invocation, whatever their conditions say."""
     return tuple(
-        number for number, rule in enumerate(policy.rules) if rule.approver == role and _concerns(rule, invocation)
+        number
+        for number, rule in enumerate(policy.rules)
+        if role in (rule.approver, rule.second) and _concerns(rule, invocation)
     )
 
 
@@ -90,7 +95,7 @@ class Approvals:
 
     A grant is for one invocation, by its id, until it expires. A refusal is for good, and for what it refused: the
     skill with its arguments, in whatever step of whatever mission of this flight they stand. What is kept is bounded:
-    one grant for each step in force and role, one refusal for each step that ever was.
+    of each person in each role one grant for each step in force, and one refusal for each step that ever was.
     """
 
     def __init__(self, policy: Policy) -> None:
@@ -99,7 +104,7 @@ class Approvals:
 
     def add(self, answered: Answered, now: Now) -> bool:
         """Take an answer in; False for one that is there already, which changes nothing."""
-        key = _subject(answered.about, answered.role, answered.granted)
+        key = _subject(answered.about, answered)
         held = self._answers.get(key)
         if held is not None and _counts(held, now):
             return False
@@ -120,21 +125,21 @@ class Approvals:
         if not self._answers:
             return ()
         return tuple(
-            Approval(rule, answered.role, answered.granted, answered.monotonic_us)
+            Approval(rule, answered.role, answered.granted, answered.monotonic_us, answered.person)
             for key, answered in self._answers.items()
-            if key == _subject(invocation, answered.role, answered.granted) and _counts(answered, now)
+            if key == _subject(invocation, answered) and _counts(answered, now)
             for rule in confirms(self._policy, invocation, answered.role)
         )
 
 
-#: what an answer is about, by which role it is, and whether it grants
-_Subject = tuple[bytes | tuple[int, tuple[int, ...]], int, int]
+#: what an answer is about, by which role and person it is, and whether it grants
+_Subject = tuple[bytes | tuple[int, tuple[int, ...]], int, int, int]
 
 
-def _subject(invocation: Invocation, role: int, granted: int) -> _Subject:
+def _subject(invocation: Invocation, answered: Answered) -> _Subject:
     """A grant is about one invocation, a refusal about what any invocation asks for."""
-    about = invocation.invocation_id if granted else (invocation.skill, invocation.arguments)
-    return about, role, granted
+    about = invocation.invocation_id if answered.granted else (invocation.skill, invocation.arguments)
+    return about, answered.role, answered.person, answered.granted
 
 
 def _counts(answered: Answered, now: Now) -> bool:

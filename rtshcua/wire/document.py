@@ -14,7 +14,7 @@ from rtshcua.wire.cbor_strict import CborError, head
 from rtshcua.wire.cose import Opened
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.names import Artefact
-from rtshcua.wire.trust import TrustRoot, key_refusal, speaker_refusal
+from rtshcua.wire.trust import HUMAN, TrustRoot, key_refusal, speaker_refusal
 from rtshcua.wire.untrusted import Untrusted
 
 #: a document larger than this is refused unread, in bytes; one that holds no mission has no reason to be large
@@ -22,8 +22,6 @@ MAX_DOCUMENT: Final = 1 << 18
 MAX_WITHOUT_MISSION: Final = 1 << 11
 #: how long an approval or a recall may speak at most, in us
 MAX_LIFE_US: Final = 3_600_000_000
-#: what a human answer comes through; a key that may speak through an agent only answers nothing
-HUMAN: Final = "operator"
 
 _OUTSET: Final = b"\xd2\x84"  # tag 18, an array of four
 _STRING: Final = 2

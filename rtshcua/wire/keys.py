@@ -66,8 +66,9 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A public key as the trust root names it.
 
     `roles`, `sources` (`agent`, `operator`, ...) and `vehicles` (identities) are those that it may speak for; a mission
-    key signs missions under `policies` (names) alone. Empty is none, and `*` is every role, policy or vehicle.
-    `expires_us` is UTC in microseconds, None for as long as the root lives.
+    key signs missions under `policies` (names) alone, and an approval key is of one `person` in one role. Empty is
+    none, and `*` is every role, policy or vehicle. `expires_us` is UTC in microseconds, None for as long as the root
+    lives.
     """
 
     duty: Duty
@@ -78,6 +79,7 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     expires_us: int | None = None
     development: bool = False
     policies: tuple[str, ...] = ()
+    person: str = ""
 
     def __post_init__(self) -> None:
         if len(self.public) != PUBLIC_BYTES:
@@ -131,10 +133,12 @@ class SigningKey:
         vehicles: tuple[str, ...] = (),
         expires_us: int | None = None,
         policies: tuple[str, ...] = (),
+        person: str = "",
     ) -> VerificationKey:
         """The public half, as a trust root would name it."""
-        development = self.development
-        return VerificationKey(self.duty, self.public, roles, sources, vehicles, expires_us, development, policies)
+        return VerificationKey(
+            self.duty, self.public, roles, sources, vehicles, expires_us, self.development, policies, person
+        )
 
     def __repr__(self) -> str:
         mark = " development" if self.development else ""

@@ -18,15 +18,15 @@ class Artefact:
         return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
 
 
-ROOT: Final = Artefact("rtshcua/root", 2)  # 2: mission keys are bound to policies
-POLICY: Final = Artefact("rtshcua/policy", 4)  # 4: with what flies after a long silence of the vehicle
+ROOT: Final = Artefact("rtshcua/root", 2)  # 2: with policies of mission keys, persons of approval keys
+POLICY: Final = Artefact("rtshcua/policy", 5)  # 5: a rule may ask for two different people
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 1)
 RECALL: Final = Artefact("rtshcua/recall", 1)
 REPLACEMENT: Final = Artefact("rtshcua/replacement", 1)
 RECEIPT: Final = Artefact("rtshcua/receipt", 1)
-LOG: Final = Artefact("rtshcua/log", 2, "")  # JSON lines (RFC 8785), which have no registered suffix
+LOG: Final = Artefact("rtshcua/log", 3, "")  # JSON lines (RFC 8785), which have no registered suffix
 PROOF: Final = Artefact("rtshcua/proof", 1)  # what a proof of a log carries
 REQUEST: Final = Artefact("rtshcua/request", 2)  # 2: with temporal monitors
 RESPONSE: Final = Artefact("rtshcua/response", 1)

@@ -10,7 +10,6 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import names
 from rtshcua.wire.document import (
-    HUMAN,
     DocumentError,
     check_key,
     check_times,
@@ -19,7 +18,7 @@ from rtshcua.wire.document import (
     sign_document,
 )
 from rtshcua.wire.keys import Duty, SigningKey
-from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.trust import HUMAN, TrustRoot
 
 
 class RecallDocument(Flat, frozen=True):

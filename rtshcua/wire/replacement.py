@@ -19,9 +19,9 @@ from rtshcua.wire import cbor, names
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import Bundle, check_bundle, check_proposer
 from rtshcua.wire.digest import MISSION, digest
-from rtshcua.wire.document import HUMAN, DocumentError, open_document, sign_document
+from rtshcua.wire.document import DocumentError, open_document, sign_document
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
-from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.trust import HUMAN, TrustRoot
 
 #: how many replacements one flight takes
 MAX_REPLACEMENTS: Final = 64

@@ -4,6 +4,7 @@ After The Update Framework (specification 1.0, sections 2.1, 4.3 and 5.3): a roo
 by one of them; versions only rise, one by one, and each root is signed by a key of the one before it.
 """
 
+import re
 from typing import Final, Self
 
 import msgspec
@@ -12,6 +13,11 @@ from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import ANY, KID_BYTES, PUBLIC_BYTES, Duty, SigningKey, VerificationKey
 from rtshcua.wire.untrusted import Untrusted
 
+#: what a human answer comes through; a key that may speak through an agent only answers nothing
+HUMAN: Final = "operator"
+#: how people are named: one way to write each name, so that two names are two people
+_PERSON: Final = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
+
 #: a root larger than this is refused unread, in bytes
 MAX_ROOT: Final = 1 << 20
 
@@ -19,8 +25,9 @@ MAX_ROOT: Final = 1 << 20
 class RootError(Untrusted):
     """A trust root that is refused.
 
-    `malformed`, `unsupported-threshold`, `unreachable-threshold`, `shared-key`, `development-key`, `not-self-signed`,
-    `expired`, `key-expired`, `unpinned`, `unknown-key`, `rollback`, `version-gap`, `development-root`.
+    `malformed`, `whose-approval`, `unsupported-threshold`, `unreachable-threshold`, `shared-key`, `development-key`,
+    `not-self-signed`, `expired`, `key-expired`, `unpinned`, `unknown-key`, `rollback`, `version-gap`,
+    `development-root`.
     """
 
 
@@ -57,6 +64,10 @@ class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """The public keys that may witness logs of a vehicle at a UTC time."""
         keys = self.keys_for(Duty.WITNESS).values()
         return frozenset(key.public for key in keys if key_refusal(key, vehicle=vehicle, now_us=now_us) is None)
+
+    def person(self, key: VerificationKey) -> int:
+        """The number of the person whose approval key this is: the same for all keys of one person."""
+        return next(number for number, each in enumerate(self.keys) if each.person == key.person)
 
     @property
     def witness_threshold(self) -> int:
@@ -191,8 +202,23 @@ def _check(root: TrustRoot) -> None:
             raise RootError("malformed", f"`{duty}` asks for {threshold} signatures")
     if len({key.public for key in root.keys}) != len(root.keys):
         raise RootError("shared-key", "one public key is named twice: a key has one duty")
+    for key in root.keys:
+        _check_bound(key)
     if not root.development and any(key.development for key in root.keys):
         raise RootError("development-key", "a root that is not for development names a development key")
+
+
+def _check_bound(key: VerificationKey) -> None:
+    """An approval is one person's, in one role and in person: what two people are asked, no one key answers."""
+    if (key.person and key.duty is not Duty.APPROVAL) or (key.policies and key.duty is not Duty.MISSION):
+        raise RootError("malformed", f"a key of duty `{key.duty}` has a person or policies")
+    if key.duty is not Duty.APPROVAL:
+        return
+    if not _PERSON.fullmatch(key.person):
+        text = f"approval key {key.kid.hex()} is of no person: a name has lower-case letters, digits, `.`, `_` and `-`"
+        raise RootError("whose-approval", text)
+    if len(key.roles) != 1 or ANY in key.roles or key.sources != (HUMAN,):
+        raise RootError("whose-approval", f"the approval key of `{key.person}` is not for one role, in person")
 
 
 def _check_witnesses(root: TrustRoot, threshold: int) -> None:

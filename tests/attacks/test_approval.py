@@ -285,8 +285,8 @@ def test_a_log_cannot_make_one_up() -> None:
     assert forged(at, step=1) == ("document/other", at)
     context = json.loads(lines[decided])["context"]
     assert forged(decided, context=context | {"approvals": []}) == ("decision/approvals", decided)
-    rule, role, granted, moment = context["approvals"][0]
-    moved = context | {"approvals": [[rule, role, granted, moment - 1]]}
+    rule, role, granted, moment, person = context["approvals"][0]
+    moved = context | {"approvals": [[rule, role, granted, moment - 1, person]]}
     assert forged(decided, context=moved) == ("decision/approvals", decided)
     first = next(n for n, line in enumerate(lines) if json.loads(line)["type"] == "decision")
     elsewhere = json.loads(lines[first])["context"] | {"approvals": context["approvals"]}

@@ -43,7 +43,8 @@ def test_a_forged_field(fields: dict[str, object], slug: str) -> None:
     [
         ({"format": "rtshcua/diary"}, "genesis/format"),
         ({"version": 1}, "genesis/format"),
-        ({"version": 3}, "genesis/format"),
+        ({"version": 2}, "genesis/format"),
+        ({"version": 4}, "genesis/format"),
         ({"boot": "00"}, "record/malformed"),
         ({"log_key": "00"}, "record/malformed"),
         ({"log_kid": "00" * 16}, "genesis/log-key"),

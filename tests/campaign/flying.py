@@ -12,7 +12,6 @@ from rtshcua.campaign.flights import Field, Flight, moments
 from rtshcua.campaign.results import Failed, Result
 from rtshcua.cli.sources import compile_sources
 from rtshcua.model.scenario import Scenario, Start
-from rtshcua.virtual import development
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
@@ -21,7 +20,7 @@ _COMPILED, _ = compile_sources([Path(__file__).with_name("field.rts")], mission=
 assert _COMPILED.policy is not None, _COMPILED.diagnostics
 assert _COMPILED.mission is not None
 POLICY, MISSION = _COMPILED.policy, _COMPILED.mission
-FIELD: Final = Field(development.seal(POLICY, MISSION), development.root(ISSUED_US))
+FIELD: Final = Field.of(POLICY, MISSION, ISSUED_US)
 SKILLS: Final = tuple(POLICY.contracts[each.skill].name for each in MISSION.invocations)
 #: us: how long a calm flight takes
 LASTS_US: Final = {"px4": 76_650_000, "ardupilot": 77_700_000}

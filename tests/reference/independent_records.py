@@ -116,7 +116,7 @@ def _context(value: object) -> bool:
     return (
         type(value) is dict
         and set(value) == {"approvals", "consumed", "phase", "policy_version", "released_us", "remaining_us", "vehicle"}
-        and listed(lambda each: listed(integer)(each) and len(each) == 4)(value["approvals"])
+        and listed(lambda each: listed(integer)(each) and len(each) == 5)(value["approvals"])
         and text(value["vehicle"])
         and all(integer(value[name]) for name in value if name not in ("approvals", "vehicle"))
     )
@@ -157,7 +157,7 @@ FORMS = {
         "sync_us": count,
         "type": text,
         "vehicle": text,
-        "version": one_of(2),
+        "version": one_of(3),
     },
     "decision": _ALL
     | dict.fromkeys(_INTEGERS, integer)

@@ -4,13 +4,14 @@ Written apart from `rtshcua.wire`, for `independent_verifier`. RFC 9052 section 
 """
 
 import hashlib
+import re
 from dataclasses import dataclass
 
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 _CONTENT = "application/vnd.rtshcua.root+cbor"
-_KEY_FIELDS = {"duty", "public", "roles", "sources", "vehicles", "expires_us", "development", "policies"}
+_KEY_FIELDS = {"duty", "public", "roles", "sources", "vehicles", "expires_us", "development", "policies", "person"}
 _ROOT_FIELDS = {"version", "development", "issued_at_us", "expires_at_us", "keys", "thresholds"}
 
 
@@ -91,6 +92,13 @@ def _body(payload: bytes) -> dict:
     for key in body["keys"]:
         if set(key) != _KEY_FIELDS or len(key["public"]) != 32:
             raise Untrusted("not a key")
+        approves = key["duty"] == "approval"
+        if (key["policies"] and key["duty"] != "mission") or (key["person"] and not approves):
+            raise Untrusted("a key with what only others have")
+        if approves and not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,63}", key["person"]):
+            raise Untrusted("an approval key of nobody")
+        if approves and (len(key["roles"]) != 1 or key["roles"] == ["*"] or key["sources"] != ["operator"]):
+            raise Untrusted("an approval key that is not for one role, in person")
         if key["development"] and not body["development"]:
             raise Untrusted("a development key")
     if body["version"] < 1 or body["expires_at_us"] <= body["issued_at_us"]:

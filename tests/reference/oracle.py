@@ -195,11 +195,20 @@ class Oracle:
             if self.truth(rule.when, invocation.arguments) == "F":
                 continue
             number = next(n for n, other in enumerate(self.policy.rules) if other is rule)
-            answers = [a for a in context.approvals if (a.rule, a.role) == (number, rule.approver)]
+            asked = {rule.approver} if rule.second < 0 else {rule.approver, rule.second}
+            answers = [a for a in context.approvals if a.rule == number and a.role in asked]
             end = context.released_us + rule.within_us
             if any(not a.granted for a in answers):
                 return Outcome.DENY, Reason.APPROVAL_REFUSED, 3
             granted = [a.monotonic_us for a in answers if a.monotonic_us <= end]
+            if rule.second >= 0:
+                pairs = [
+                    (one, other)
+                    for one in answers
+                    for other in answers
+                    if (one.role, other.role) == (rule.approver, rule.second) and one.person != other.person
+                ]
+                granted = [t for t in (max(a.monotonic_us for a in pair) for pair in pairs) if t <= end]
             if granted:
                 self.released = max(self.released, min(granted))
             elif self.now.monotonic_us > end:

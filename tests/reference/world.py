@@ -56,7 +56,7 @@ from rtshcua.onboard.ports import (
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire import binding, bundle
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.request import CONTINGENCY_LINK, Request, encode
 from rtshcua.wire.response import Answer, Status, decode
 from rtshcua.wire.trust import TrustRoot
@@ -80,9 +80,9 @@ ROOT = TrustRoot(
     keys=(
         POLICY_KEY.verification(vehicles=(VEHICLE,)),
         MISSION_KEY.verification(
-            roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,), policies=(POLICY.name,)
+            roles=("operator",), sources=("agent", "operator"), vehicles=(VEHICLE,), policies=(ANY,)
         ),
-        APPROVAL_KEY.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,)),
+        APPROVAL_KEY.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,), person="ada"),
         LOG_KEY.verification(vehicles=(VEHICLE,)),
         ROOT_KEY.verification(),
     ),

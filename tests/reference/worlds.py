@@ -148,6 +148,7 @@ def rule(of: Random, contracts: tuple[Contract, ...], reach: Reach) -> Rule:
         sources=of.choice([(), (0, 1), (2,)]),
         when=None if of.random() < 0.2 else clause(of, contracts[skills[0]] if len(skills) == 1 else None, reach),
         approver=of.randrange(2),
+        second=of.choice([-1, -1, 0, 1]) if kind == RuleKind.CONFIRM else -1,
         within_us=30 * S,
         target=target if kind == RuleKind.DEGRADE else None,
     )
@@ -300,7 +301,13 @@ def context(of: Random, invocation: Invocation) -> Context:
 
     at = flat.NOW.monotonic_us
     answers = [
-        Approval(of.choice([flat.CONFIRM_RULE, 0, 1, 2]), of.randrange(2), of.randrange(2), of.choice([at - S, at]))
+        Approval(
+            of.choice([flat.CONFIRM_RULE, 0, 1, 2]),
+            of.randrange(2),
+            of.randrange(2),
+            of.choice([at - S, at]),
+            of.randrange(2),
+        )
         for _ in range(of.choice([0, 0, 1, 2]))
     ]
     return Context(

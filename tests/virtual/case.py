@@ -104,15 +104,15 @@ def seal(of: Mission, under: Policy | None = None, keys: Mapping[Duty, SigningKe
 
 def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
     """The development root that names the keys, and its signed bytes."""
-    speakers = (Duty.MISSION, Duty.APPROVAL)
     made = TrustRoot(
         version=1, development=True, issued_at_us=issued_at_us, expires_at_us=issued_at_us + YEAR_US,
         keys=tuple(
             key.verification(
-                roles=(ANY,) if duty in speakers else (),
-                sources=("agent", "operator") if duty in speakers else (),
+                roles={Duty.MISSION: (ANY,), Duty.APPROVAL: ("supervisor",)}.get(duty, ()),
+                sources={Duty.MISSION: ("agent", "operator"), Duty.APPROVAL: ("operator",)}.get(duty, ()),
                 vehicles=() if duty is Duty.ROOT else (ANY,),
                 policies=(ANY,) if duty is Duty.MISSION else (),
+                person="ada" if duty is Duty.APPROVAL else "",
             )
             for duty, key in KEYS.items()
         ),

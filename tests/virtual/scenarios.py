@@ -11,7 +11,7 @@ from rtshcua.wire.keys import Duty
 from virtual import case
 
 CALM = Start()
-KEYS = Keys(case.KEYS[Duty.LOG], case.KEYS[Duty.APPROVAL], case.KEYS[Duty.MISSION])
+KEYS = Keys(case.KEYS[Duty.LOG], {"supervisor": (case.KEYS[Duty.APPROVAL],)}, case.KEYS[Duty.MISSION])
 
 
 def incident(at_s: float, fault: Fault) -> Incident:

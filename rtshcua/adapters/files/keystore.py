@@ -1,6 +1,7 @@
 """The user's signing keys and trust root: `<data folder>/keys/`, one file a key and `root.trust`.
 
 A mission key is for one source: `mission-agent.key` signs what agents propose, `mission-operator.key` what people do.
+An approval key is of one person in one role, as `approval-ada-supervisor.key`.
 
 A key file is readable by its owner alone and encrypted, unless its key is for development. The folder appears whole,
 with every key and the root that names them, or not at all.
@@ -11,14 +12,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from msgspec import UNSET
+from msgspec.structs import replace
 
 from rtshcua.adapters.store.laying import appearing
 from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
+from rtshcua.adapters.store.writing import replace as write_file
 from rtshcua.wire import cose
 from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import ANY, Duty, SigningKey, VerificationKey
-from rtshcua.wire.trust import MAX_ROOT, Thresholds, TrustRoot
+from rtshcua.wire.trust import HUMAN, MAX_ROOT, Thresholds, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 ROOT = "root.trust"
@@ -27,6 +30,8 @@ ROOT = "root.trust"
 PROPOSERS = ("agent", "operator")
 #: the role that both speak for, where no other is named
 OPERATOR = "operator"
+#: whoever made the keys, where nobody is named
+OWNER = "owner"
 
 
 class KeyStoreError(Untrusted):
@@ -75,12 +80,14 @@ class KeyStore:
         witness_threshold: int = 1,
         roles: Sequence[str] = (OPERATOR,),
         policies: Sequence[str] = (ANY,),
+        approver: str = OWNER,
     ) -> TrustRoot:
         """Makes a key for each duty, from 32 secret bytes of `seed` each, and the root that names them.
 
         There is a mission key for what agents propose and another for what people do; the root trusts them for `roles`
-        and under `policies` (names, or any), and the approval key for every role. So many `witnesses` have a key each;
-        what `witness_threshold` of them cosigned counts as anchored. All are for every vehicle.
+        and under `policies` (names, or any). The one approval key is of `approver` in the role `operator`: it recalls,
+        and `add` makes more. So many `witnesses` have a key each; what `witness_threshold` of them cosigned counts as
+        anchored. All are for every vehicle.
         Raises `KeyStoreError` (`exists`), and `KeyFileError` for keys that are neither encrypted nor for development.
         """
         if self.exists():
@@ -96,7 +103,7 @@ class KeyStore:
                         roles=tuple(roles), sources=(source,), vehicles=vehicles, policies=tuple(policies)
                     )
                 elif duty is Duty.APPROVAL:
-                    named = key.verification(roles=(ANY,), sources=PROPOSERS, vehicles=vehicles)
+                    named = key.verification(roles=(OPERATOR,), sources=(HUMAN,), vehicles=vehicles, person=approver)
                 keys.append((key, named))
         root = TrustRoot(
             version=1,
@@ -116,8 +123,28 @@ class KeyStore:
             write_new(folder / ROOT, signed, mode=PRIVATE_FILE)
         return root
 
+    def add(
+        self, seed: bytes, named: Callable[[SigningKey], VerificationKey], *, duty: Duty, passphrase: bytes | None,
+        signer: SigningKey, now_us: int,
+    ) -> TrustRoot:  # fmt: skip
+        """Makes one key more, of 32 secret bytes, and the next version of the root, which names it as `named` says and
+        which the root key `signer` signs.
+
+        Who pinned the root key trusts that root too. Raises `KeyStoreError` (`no-keys`, `exists`), `KeyFileError`, and
+        `RootError` for a root that would not be accepted.
+        """
+        root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
+        key = SigningKey.from_seed(seed, duty=duty, development=root.development)
+        newer = replace(root, version=root.version + 1, issued_at_us=now_us, keys=(*root.keys, named(key)))
+        if any(whose(each) == whose(newer.keys[-1]) for each in root.keys if each.duty is duty is Duty.APPROVAL):
+            raise KeyStoreError("exists", f"there is a key `{whose(newer.keys[-1])}` already")
+        signed, path = newer.sign(signer), self.paths(newer)[key.kid]
+        write_new(path, dump_signing_key(key, passphrase=passphrase), mode=PRIVATE_FILE)
+        write_file(self.root_path, signed, mode=PRIVATE_FILE)
+        return newer
+
     def signing_key(self, duty: Duty, *, passphrase: bytes | None = None, whose: str = "") -> SigningKey:
-        """The key of a duty, of a mission key that of the source `whose`.
+        """The key of a duty: of mission keys that of the source `whose`, of approval keys that of the person and role.
 
         Raises `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`.
         """
@@ -139,7 +166,9 @@ class KeyStore:
 
 
 def whose(key: VerificationKey) -> str:
-    """Whose a key is among those of its duty, as its file is named: the source of a mission key that has one."""
+    """Whose a key is among those of its duty, as its file is named: a source, or a person in a role."""
+    if key.duty is Duty.APPROVAL:
+        return f"{key.person}-{key.roles[0]}"
     return key.sources[0] if key.duty is Duty.MISSION and len(key.sources) == 1 else ""
 
 

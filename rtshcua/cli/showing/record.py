@@ -129,7 +129,7 @@ def _decision(page: Page, record: Decision, told: Told, genesis: Genesis) -> Non
     left = f"at most {given.remaining_us / 1_000:g} ms until it is sent"
     page.row("timing", f"released {max(record.at_us - given.released_us, 0) / 1_000:g} ms before, {left}")
     if given.approvals:
-        page.row("approvals", ", ".join("granted" if granted else "refused" for _, _, granted, _ in given.approvals))
+        page.row("approvals", ", ".join("granted" if granted else "refused" for _, _, granted, _, _ in given.approvals))
 
 
 def _state(record: Decision, genesis: Genesis) -> list[str]:

@@ -41,7 +41,7 @@ class Flying:
         policy, mission, start = scenario.policy.lowered.policy, scenario.mission, scenario.scenario.start
         if start.utc_us is not None:
             mission = development.flies_at(mission, start.utc_us)
-        field = Field(development.seal(policy, mission), development.root(mission.issued_at_us))
+        field = Field.of(policy, mission, mission.issued_at_us)
         wanted = list(tries(scenario.scenario))
         workers: Workers = Here()
         if len(wanted) >= _FEW and cores() > 1:

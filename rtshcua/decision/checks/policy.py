@@ -138,8 +138,11 @@ def rule(rule: Rule, policy: Policy, scope: Scope) -> Iterator[str]:
     yield from ascending("source", rule.sources, len(SourceKind))
     if rule.when is not None:
         yield from at("when", clause(rule.when, scope.about(*(policy.contracts[skill] for skill in rule.skills))))
+    if rule.second != -1 and rule.kind != RuleKind.CONFIRM:
+        yield "a rule that confirms nothing asks a second person"
     if rule.kind == RuleKind.CONFIRM:
         yield from index("role", rule.approver, len(policy.roles))
+        yield from within("role of the second person", rule.second, -1, len(policy.roles) - 1)
         yield from within("within", rule.within_us, 1, limits.MAX_DURATION)
     if rule.kind == RuleKind.DEGRADE:
         if rule.target is None:

@@ -1,5 +1,7 @@
 """Each decision once more: from the inputs that its record holds, by the same rules that decided on board."""
 
+from msgspec.structs import astuple
+
 from rtshcua.decision.case import SINGLE
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.session import Session
@@ -51,7 +53,7 @@ class Deriver:
         """What is wrong with how durable a record that derived again says it was."""
         if record.kind == STEP:
             contract = self._basis.invocations[record.step].invocation.contract
-            approved = any(granted for _, _, granted, _ in record.context.approvals)
+            approved = any(granted for _, _, granted, _, _ in record.context.approvals)
             asked = durability_of(contract, Outcome[record.outcome.upper()], confirmed=approved, kind=STEP)
         else:
             asked = WRITTEN
@@ -114,7 +116,7 @@ class Deriver:
     def _step(self, record: Decision, state: State, now: Now) -> Decided | Flaw:
         given = record.context
         approvals = self._basis.in_force.approvals(self._basis.invocations[record.step].invocation, now)
-        if given.approvals != tuple((each.rule, each.role, each.granted, each.monotonic_us) for each in approvals):
+        if given.approvals != tuple(astuple(each) for each in approvals):
             text = "the approvals that it read are not those that the log holds and that are verified"
             return Flaw("decision/approvals", text, str(given.approvals), str(approvals))
         binding = _octets(record.binding)

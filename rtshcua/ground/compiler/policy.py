@@ -152,7 +152,8 @@ def _skills(context: Context, policy: PolicyDecl, files: frozenset[str]) -> list
 def _roles(policy: PolicyDecl) -> tuple[str, ...]:
     """The roles of a policy, sorted: those that its rules name, and the one that every vehicle has."""
     named = {OPERATOR, *(role.text for rule in policy.rules for role in rule.roles)}
-    return tuple(sorted(named | {rule.approver.text for rule in policy.rules if rule.approver is not None}))
+    asked = {name.text for rule in policy.rules for name in (rule.approver, rule.another) if name is not None}
+    return tuple(sorted(named | asked))
 
 
 def _well_known(context: Context, policy: PolicyDecl, read: Mapping[str, Type], files: frozenset[str]) -> bool:

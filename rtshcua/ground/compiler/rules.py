@@ -85,6 +85,7 @@ class Rules:
             source=source,
             start=start,
             end=end,
+            second=-1 if rule.another is None else self._roles[rule.another.text],
         )
 
     def _when(self, when: Condition, rule: RuleDecl, place: Place) -> Clause:

@@ -39,7 +39,7 @@ KEYWORDS: Mapping[str, str] = {
     "policy": "Who may have what done, where and when. Its version only rises.",
     "permit": "Allows. What no permit allows is denied.",
     "forbid": "Denies, and outweighs every permit; where its condition is unknown the step waits.",
-    "confirm": "Waits for a person of a role, and denies after `within`.",
+    "confirm": "Waits for a person of a role, or for two different people, and denies after `within`.",
     "degrade": "Flies its target instead, whatever is asked, while its condition holds.",
     "delegate": "Gives another role what this one is permitted, narrowed by the condition and the sources.",
     "through": "The sources that may speak for the role: `agent`, `operator`, `onboard`, `reflex`.",

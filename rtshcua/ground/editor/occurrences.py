@@ -119,7 +119,7 @@ class _Walk(Conditions):
     def _rule(self, rule: Rule, own: Scope | None) -> Iterator[Occurrence]:
         """A rule; `own` are the parameters of the template that it stands in."""
         yield from self.names(rule.skills, Sort.DECLARED)
-        for role in (*rule.roles, *(() if rule.approver is None else (rule.approver,))):
+        for role in (*rule.roles, *(each for each in (rule.approver, rule.another) if each is not None)):
             yield from self.role(role, own or {})
         yield from self.names(rule.through, Sort.SOURCE)
         scope = self._of_skills(rule.skills) | dict(own or {})

@@ -128,7 +128,7 @@ def _readable(context: Context, delegation: Delegation, skills: Sequence[SkillDe
         return True
     as_rule = Rule(
         span=delegation.span, kind="permit", skills=delegation.skills, roles=(delegation.grantee,), through=(),
-        when=delegation.when, approver=None, within=None, target=None,
+        when=delegation.when, approver=None, another=None, within=None, target=None,
     )  # fmt: skip
     return shared_arguments(context, as_rule, skills) is not None
 

@@ -25,6 +25,8 @@ def substitute_roles(rule: Rule, roles: Mapping[str, str]) -> Rule:
     changes: dict[str, Any] = {"roles": tuple(_role(name, roles) for name in rule.roles)}
     if rule.approver is not None:
         changes["approver"] = _role(rule.approver, roles)
+    if rule.another is not None:
+        changes["another"] = _role(rule.another, roles)
     return rule.copied(**changes)
 
 

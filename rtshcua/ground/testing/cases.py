@@ -1,7 +1,7 @@
 """E1408 to E1410: tests become cases, one a row of a table; what they rest on is the policy as it was lowered."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
@@ -19,7 +19,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.ir.places import VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.skills import ArgumentValue
-from rtshcua.model.ir.tests import Expectation, Named, Request, Row, Subject, TestDecl
+from rtshcua.model.ir.tests import Answer, Expectation, Named, Request, Row, Subject, TestDecl
 
 #: what validation and dispatch are taken to need, in us: what is assumed on board until enough was measured
 REMAINING_US = 20_000
@@ -149,7 +149,7 @@ class _Cases:
         tampered = test.tampered or nominal.tampered
         in_force = test.in_force or nominal.in_force
         identity = test.identity or nominal.identity
-        answered = {answer.role.text: answer for answer in (*nominal.answers, *test.answers)}
+        answered = _numbered(nominal.answers) | _numbered(test.answers)
         phase = self._start.phase
         assert phase is not None
         return Standing(
@@ -176,3 +176,11 @@ class _Cases:
                 help=f"add to the nominal or the test what it is, or say so: `given {missing[0]} = unknown`",
                 labels=[(self._start.nominal.name.span, "the test starts from here")],
             )
+
+
+def _numbered(answers: Sequence[Answer]) -> dict[tuple[str, int], Answer]:
+    """Answers by the role, and which of its people it is."""
+    found: dict[tuple[str, int], Answer] = {}
+    for answer in answers:
+        found[answer.role.text, (answer.role.text, 0) in found] = answer
+    return found

@@ -67,21 +67,24 @@ class Situations:
         return State(state.values, state.ages, tuple(monitors))
 
     def approvals(self, answers: Iterable[Answer], at_us: int) -> tuple[Approval, ...]:
-        """What people answered to the `confirm` rules that wait for them, at monotonic times before `at_us`."""
+        """What people answered to the `confirm` rules that wait for them, at monotonic times before `at_us`.
+
+        Each answer is another person's.
+        """
         under = self._policy.lowered
         found: list[Approval] = []
-        for answer in answers:
+        for person, answer in enumerate(answers):
             role = under.roles.get(answer.role.text)
             rules = [
                 number
                 for number, rule in enumerate(under.policy.rules)
-                if rule.kind == RuleKind.CONFIRM and rule.approver == role
+                if rule.kind == RuleKind.CONFIRM and role in (rule.approver, rule.second)
             ]
             if role is None or not rules:
                 self._unasked(answer)
                 continue
             moment = at_us - (0 if answer.ago is None else answer.ago.value)
-            found += [Approval(number, role, int(answer.granted), moment) for number in rules]
+            found += [Approval(number, role, int(answer.granted), moment, person) for number in rules]
         return tuple(found)
 
     def missing(self, reads: Iterable[int], said: Iterable[Said]) -> list[str]:
@@ -127,7 +130,8 @@ class Situations:
 
     def _unasked(self, answer: Answer) -> None:
         under = self._policy.lowered
-        approvers = dict.fromkeys(rule.approver for rule in under.policy.rules if rule.kind == RuleKind.CONFIRM)
+        confirms = [rule for rule in under.policy.rules if rule.kind == RuleKind.CONFIRM]
+        approvers = dict.fromkeys(role for rule in confirms for role in (rule.approver, rule.second) if role != -1)
         names = [under.policy.roles[role] for role in approvers]
         waits = f"its rules wait for {listed(names)}" if names else "it has no `confirm`"
         self._context.report.add(

@@ -139,6 +139,7 @@ class Meaning:
             frozenset(rule.sources),
             None if rule.when is None else self._code(rule.when, parameters),
             "" if rule.approver == -1 else policy.roles[rule.approver],
+            "" if rule.second == -1 else policy.roles[rule.second],
             rule.within_us,
             None if rule.target is None else self._link(rule.target),
         )

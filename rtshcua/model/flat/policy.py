@@ -22,7 +22,8 @@ class Rule(Flat, frozen=True):
     """A rule. `skills` are contract indexes and `roles` role indexes, ascending; empty means any.
 
     `sources` are `SourceKind` values, ascending; empty means any. `approver` is a role index (confirm, else -1),
-    `within_us` how long an approval is awaited, `target` what a degrade rule flies.
+    `within_us` how long an approval is awaited, `target` what a degrade rule flies. `second` is the role index of
+    another person whose approval is needed too, -1 where one person is enough.
     """
 
     kind: int
@@ -37,6 +38,7 @@ class Rule(Flat, frozen=True):
     source: int
     start: int
     end: int
+    second: int = -1
 
 
 class WithoutEvidence(IntEnum):

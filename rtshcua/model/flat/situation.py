@@ -25,12 +25,16 @@ class Now(Flat, frozen=True):
 
 
 class Approval(Flat, frozen=True):
-    """An operator's verified answer to a `confirm` rule: `granted` 1 or 0, at a monotonic time in us."""
+    """A person's verified answer to a `confirm` rule: `granted` 1 or 0, at a monotonic time in us.
+
+    `person` is a number: the same for all answers of one person, another for each other.
+    """
 
     rule: int
     role: int
     granted: int
     monotonic_us: int
+    person: int = 0
 
 
 class Context(Flat, frozen=True):

@@ -21,6 +21,7 @@ class Rule(Node):
     through: tuple[Name, ...]
     when: Condition | None
     approver: Name | None  # confirm: `by role supervisor`
+    another: Name | None  # confirm: `and another of role supervisor`, who is another person
     within: Quantity | None  # confirm: `within 30 s`
     target: LinkDecl | None  # degrade: `to return_home`
     #: the `use` and `delegate` that brought an elaborated rule about, the outermost first; empty as written

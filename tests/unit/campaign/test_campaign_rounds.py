@@ -17,7 +17,7 @@ from rtshcua.campaign.workers import Here, Processes
 
 S = 1_000_000
 SPACE = Space(("takeoff", "goto", "return_home"), {"px4": 60 * S, "ardupilot": 70 * S})
-FIELD = Field(b"bundle", b"root")
+FIELD = Field(b"bundle", b"root", ())
 ORDER = Order(5, 230, SPACE)
 
 
@@ -158,19 +158,19 @@ def few() -> list[Flight]:
 
 def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
     processes = Processes(1)
-    flown = list(processes.fly(DiesOnce(b"", str(tmp_path / "died").encode()), few()))
+    flown = list(processes.fly(DiesOnce(b"", str(tmp_path / "died").encode(), ()), few()))
     processes.close()
     assert sorted(flown, key=lambda each: each.number) == [result(flight) for flight in few()]
 
 
 def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown() -> None:
     processes = Processes(1)
-    flown = sorted(processes.fly(DiesAlways(b"", b""), few()), key=lambda each: each.number)
+    flown = sorted(processes.fly(DiesAlways(b"", b"", ()), few()), key=lambda each: each.number)
     processes.close()
     assert flown == [FIELD.lost(flight) if flight.number == 3 else result(flight) for flight in few()]
     assert flown[3].failures[0].slug == LOST
 
 
 def test_one_process_is_enough() -> None:
-    assert list(Here().fly(Nothing(b"", b""), few())) == [result(flight) for flight in few()]
+    assert list(Here().fly(Nothing(b"", b"", ()), few())) == [result(flight) for flight in few()]
     assert campaign.FIRST < campaign.ROUND

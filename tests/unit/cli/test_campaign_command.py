@@ -85,13 +85,12 @@ def fly_one_again(line: dict[str, Any]) -> Result:
     from rtshcua.campaign.drawing import FLAVOURS
     from rtshcua.cli.campaign import _kinds, _space
     from rtshcua.cli.sources import compile_sources
-    from rtshcua.virtual import development
 
     begun = json.loads(Path("made/campaign.json").read_text())
     compiled, _ = compile_sources([Path(SHORT)], mission=None, issued_at_us=begun["issued_at_us"])
     assert compiled.policy is not None
     assert compiled.mission is not None
-    field = Field(development.seal(compiled.policy, compiled.mission), development.root(begun["issued_at_us"]))
+    field = Field.of(compiled.policy, compiled.mission, begun["issued_at_us"])
     kinds = _kinds(["link-silence", "wind"])
     assert isinstance(kinds, frozenset)
     space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds)

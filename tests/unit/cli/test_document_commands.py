@@ -42,6 +42,7 @@ SHORTER = LOW.replace("    inspect_area(bridge_a, altitude = 9 m, pattern = peri
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
     monkeypatch.chdir(tmp_path)
     assert main(["keys", "init"]) == ExitCode.OK
+    assert main(["keys", "approver", "owner", "--role", "supervisor"]) == ExitCode.OK
     (tmp_path / "low.rts").write_text(LOW)
     (tmp_path / "shorter.rts").write_text(SHORTER)
     assert main(["compile", "low.rts"]) == ExitCode.OK

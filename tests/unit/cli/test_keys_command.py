@@ -11,6 +11,7 @@ from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.cli import app, keys, unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted
 
 PASSPHRASE = "correct horse battery"
@@ -18,7 +19,8 @@ PASSPHRASE = "correct horse battery"
 
 def keys_of(store: KeyStore) -> list[SigningKey]:
     """All signing keys of a store."""
-    whose = [(duty, each) for duty in Duty for each in (PROPOSERS if duty is Duty.MISSION else ("",))]
+    names = {Duty.MISSION: PROPOSERS, Duty.APPROVAL: ("owner-operator",)}
+    whose = [(duty, each) for duty in Duty for each in names.get(duty, ("",))]
     return [store.signing_key(duty, whose=each) for duty, each in whose]
 
 
@@ -63,7 +65,7 @@ def test_listing_says_what_each_key_is_trusted_for(capsys: pytest.CaptureFixture
         ("policy", [], [], []),
         ("mission", ["operator"], ["agent"], ["*"]),
         ("mission", ["operator"], ["operator"], ["*"]),
-        ("approval", ["*"], ["agent", "operator"], []),
+        ("approval", ["operator"], ["operator"], []),
         ("log", [], [], []),
         ("witness", [], [], []),
     ]
@@ -156,3 +158,73 @@ def test_keys_stay_where_only_their_owner_reads(capsys: pytest.CaptureFixture[st
         os.umask(before)
     folder = KeyStore(data_folder()).folder
     assert {path.stat().st_mode & 0o077 for path in (folder, *folder.iterdir())} == {0}
+
+
+def test_an_approver_is_a_person_in_a_role(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init", "--approver", "eve"])
+    assert app.main(["keys", "approver", "ada", "--role", "supervisor", "--vehicle", "quad-07"]) == ExitCode.OK
+    assert "ada in person as supervisor, on vehicle quad-07" in capsys.readouterr().out
+    store = KeyStore(data_folder())
+    root = open_root(store.root(), pinned=store.pin(), now_us=0)
+    assert root.version == 2
+    key = store.signing_key(Duty.APPROVAL, whose="ada-supervisor")
+    named = root.keys_for(Duty.APPROVAL)[key.kid]
+    assert (named.person, named.roles, named.sources) == ("ada", ("supervisor",), ("operator",))
+    assert store.paths(root)[key.kid].stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["ada", "--role", "supervisor"], ExitCode.UNTRUSTED),  # there is one already
+        (["Ada", "--role", "pilot"], ExitCode.UNTRUSTED),
+        (["../ada", "--role", "pilot"], ExitCode.UNTRUSTED),
+        (["ada", "--role", "*"], ExitCode.USAGE),
+        (["ada", "--role", "../pilot"], ExitCode.USAGE),
+    ],
+)
+def test_who_is_no_approver(words: list[str], code: ExitCode, capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    app.main(["keys", "approver", "ada", "--role", "supervisor"])
+    store = KeyStore(data_folder())
+    before = (store.root(), sorted(store.folder.iterdir()))
+    assert app.main(["keys", "approver", *words]) == code
+    assert (store.root(), sorted(store.folder.iterdir())) == before
+
+
+def test_a_further_mission_key_is_for_what_it_names(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    words = ["keys", "mission", "agent", "--role", "surveyor", "--policy", "field", "--json"]
+    capsys.readouterr()
+    assert app.main(words) == ExitCode.OK
+    made = json.loads(capsys.readouterr().out)["keys"][-1]
+    assert (made["sources"], made["roles"], made["policies"]) == (["agent"], ["surveyor"], ["field"])
+    assert Path(made["file"]).name == "mission-agent-2.key"
+    assert app.main(["keys", "mission", "reflex", "--role", "r", "--policy", "p"]) == ExitCode.USAGE
+
+
+def test_keys_in_earnest_are_added_under_passphrases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, own = tmp_path / "first", tmp_path / "own"
+    first.write_text(PASSPHRASE)
+    own.write_text("another long passphrase")
+    app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(first)])
+    words = ["keys", "approver", "ada", "--role", "supervisor"]
+    assert app.main([*words, "--passphrase-file", str(first)]) == ExitCode.USAGE
+    assert app.main([*words, "--own-passphrase-file", str(own), "--passphrase-file", str(own)]) == ExitCode.UNTRUSTED
+    assert app.main([*words, "--own-passphrase-file", str(own), "--passphrase-file", str(first)]) == ExitCode.OK
+    store = KeyStore(data_folder())
+    assert store.signing_key(Duty.APPROVAL, whose="ada-supervisor", passphrase=own.read_bytes()).duty is Duty.APPROVAL
+
+
+def test_whose_key_approves(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    store = KeyStore(data_folder())
+    assert unlock.unlock_person(store, None, None).kid == store.signing_key(Duty.APPROVAL, whose="owner-operator").kid
+    app.main(["keys", "approver", "ada", "--role", "supervisor"])
+    ada = store.signing_key(Duty.APPROVAL, whose="ada-supervisor")
+    assert unlock.unlock_person(store, "ada", None).kid == ada.kid
+    assert unlock.unlock_person(store, None, "supervisor").kid == ada.kid
+    for person, role, slug in ((None, None, "several-approvers"), ("ada", "operator", "no-approver")):
+        with pytest.raises(Untrusted) as refused:
+            unlock.unlock_person(store, person, role)
+        assert refused.value.slug == slug

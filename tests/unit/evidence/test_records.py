@@ -73,7 +73,7 @@ states = st.builds(
 )
 contexts = st.builds(
     RecordedContext,
-    st.lists(st.tuples(integers, integers, integers, integers), max_size=2).map(tuple),
+    st.lists(st.tuples(integers, integers, integers, integers, integers), max_size=2).map(tuple),
     integers,
     integers,
     integers,

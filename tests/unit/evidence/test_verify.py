@@ -161,9 +161,10 @@ def test_a_log_begins_with_its_genesis(log: list[bytes]) -> None:
 @pytest.mark.parametrize(
     ("fields", "found"),
     [
-        ({"version": 3}, "rtshcua/log version 3"),
+        ({"version": 4}, "rtshcua/log version 4"),
         ({"version": 1, "later": 1}, "rtshcua/log version 1"),
-        ({"format": "other/log"}, "other/log version 2"),
+        ({"format": "other/log"}, "other/log version 3"),
+        ({"version": 2}, "rtshcua/log version 2"),
     ],
 )
 def test_a_format_must_be_known(fields: dict[str, object], found: str, log: list[bytes]) -> None:

@@ -38,7 +38,7 @@ def _says(rules: Ruleset, number: int, candidate: int, skill: int) -> bool:
     if not covers(wider.roles, rule.roles) or not covers(wider.sources, rule.sources):
         return False
     if rule.kind == RuleKind.CONFIRM:
-        if rule.approver != wider.approver or rule.within_us < wider.within_us:
+        if (rule.approver, rule.second) != (wider.approver, wider.second) or rule.within_us < wider.within_us:
             return False
         return isinstance(rules.ask([(number, TRUE | UNKNOWN), (candidate, FALSE)], skill), No)
     if not _alike(rule, wider) or (candidate > number and _between(rules, number, candidate)):

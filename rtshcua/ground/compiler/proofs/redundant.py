@@ -136,6 +136,15 @@ def _same(rules: Ruleset, one: Group, other: Group) -> bool:
 def _said(rules: Ruleset, group: Group) -> set[tuple[object, ...]]:
     every = ((rules.code(number), rules.rule(number)) for number in group.rules)
     return {
-        (code, each.skills, each.roles, each.sources, each.approver, each.within_us, each.target and each.target.text)
+        (
+            code,
+            each.skills,
+            each.roles,
+            each.sources,
+            each.approver,
+            each.second,
+            each.within_us,
+            each.target and each.target.text,
+        )
         for code, each in every
     }

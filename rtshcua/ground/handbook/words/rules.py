@@ -64,6 +64,8 @@ def _rule(rule: Rule, names: Vocabulary) -> str:
 def approver(rule: Rule) -> str:
     """Who confirms, and how long is waited."""
     who = "somebody" if rule.approver is None else f"a person of the role {name(rule.approver.text)}"
+    if rule.another is not None:
+        who += f" and by another person of the role {name(rule.another.text)}"
     if rule.within is None:
         return who
     return f"{who} (within {display(rule.within.value, Dimension.DURATION)}, or it is denied)"

@@ -25,30 +25,36 @@ class Policies(Skills):
         """`permit takeoff by role operator through agent when altitude <= 40 m`."""
         return Rule(
             span=span, kind="permit", skills=skills, roles=roles, through=through or (), when=when,
-            approver=None, within=None, target=None,
+            approver=None, another=None, within=None, target=None,
         )  # fmt: skip
 
     def forbid(self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None) -> Rule:
         """`forbid track_target by any`."""
         return Rule(
             span=span, kind="forbid", skills=skills, roles=roles, through=through or (), when=when,
-            approver=None, within=None, target=None,
+            approver=None, another=None, within=None, target=None,
         )  # fmt: skip
 
     def confirm(
-        self, span: Span, skills: Names, when: Condition | None, approver: Name, within: Quantity | None
+        self,
+        span: Span,
+        skills: Names,
+        when: Condition | None,
+        approver: Name,
+        another: Name | None,
+        within: Quantity | None,
     ) -> Rule:
-        """`confirm inspect_area when altitude < 10 m by role supervisor within 30 s`."""
+        """`confirm inspect_area when altitude < 10 m by role supervisor and another of role safety within 30 s`."""
         return Rule(
             span=span, kind="confirm", skills=skills, roles=(), through=(), when=when,
-            approver=approver, within=within, target=None,
+            approver=approver, another=another, within=within, target=None,
         )  # fmt: skip
 
     def degrade(self, span: Span, skills: Names, when: Condition | None, target: LinkDecl) -> Rule:
         """`degrade any when battery < 25 % to return_home`."""
         return Rule(
             span=span, kind="degrade", skills=skills, roles=(), through=(), when=when,
-            approver=None, within=None, target=target,
+            approver=None, another=None, within=None, target=target,
         )  # fmt: skip
 
     def airspace(self, span: Span, inside: Names | None, outside: Names | None) -> Part:

@@ -197,7 +197,7 @@ class Tests(Policies):
         """What holds, and the other parts by their key."""
         once = [part for part in given if part.key not in _LISTED]
         found = {key: part.value for key, part in self.parts(owner, name, once, required).items()}
-        answers: dict[str, Answer] = {}
+        answers: list[Answer] = []
         for part in given:
             if part.key == "answer":
                 self._answer(answers, part.value)
@@ -206,7 +206,7 @@ class Tests(Policies):
             given=tuple(each for part in given if part.key == "given" for each in part.value),
             instant=found.get("at"),
             phase=found.get("phase"),
-            answers=tuple(answers.values()),
+            answers=tuple(answers),
             released=found.get("released"),
             issued=found.get("issued"),
             in_force=found.get("version"),
@@ -216,16 +216,23 @@ class Tests(Policies):
         )
         return premises, found
 
-    def _answer(self, answers: dict[str, Answer], answer: Answer) -> None:
-        first = answers.setdefault(answer.role.text, answer)
-        if first is not answer:
-            self.report(
-                WRITTEN_TWICE,
-                f"`{short(answer.role.text)}` answers twice",
-                answer.span,
-                "keep one of them",
-                labels=(Label(first.span, "first written here"),),
-            )
+    def _answer(self, answers: list[Answer], answer: Answer) -> None:
+        """Each answer is of another person; no rule asks more than two."""
+        same = [each for each in answers if each.role.text == answer.role.text]
+        if len(same) < _PEOPLE:
+            answers.append(answer)
+            return
+        self.report(
+            WRITTEN_TWICE,
+            f"`{short(answer.role.text)}` answers more than twice",
+            answer.span,
+            "keep two of them: a rule asks two people at most",
+            labels=(Label(same[0].span, "first written here"),),
+        )
+
+
+#: of how many people a rule may ask for an approval
+_PEOPLE = 2
 
 
 def _subject(subject: Name | OverTime) -> Subject:

@@ -131,7 +131,17 @@ def _written(rules: Iterable[Rule]) -> Iterable[list[Rule]]:
     """
     groups: dict[object, list[list[Rule]]] = {}
     for rule in rules:
-        key = (rule.kind, rule.source, rule.start, rule.end, rule.text, rule.roles, rule.sources, rule.approver)
+        key = (
+            rule.kind,
+            rule.source,
+            rule.start,
+            rule.end,
+            rule.text,
+            rule.roles,
+            rule.sources,
+            rule.approver,
+            rule.second,
+        )
         made = groups.setdefault(key, [])
         if made and (len(rule.text) < MAX_TEXT or _apart(rule, made[-1])):
             made[-1].append(rule)

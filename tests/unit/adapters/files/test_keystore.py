@@ -33,7 +33,8 @@ def test_every_duty_has_its_key_and_the_root_names_it(store: KeyStore) -> None:
     root = open_root(store.root(), pinned=store.pin(), now_us=NOW)
     assert root.development
     for duty in Duty:
-        keys = [store.signing_key(duty, whose=whose) for whose in (PROPOSERS if duty is Duty.MISSION else ("",))]
+        names = {Duty.MISSION: PROPOSERS, Duty.APPROVAL: ("owner-operator",)}
+        keys = [store.signing_key(duty, whose=whose) for whose in names.get(duty, ("",))]
         assert {(key.duty, key.development) for key in keys} == {(duty, True)}
         assert list(root.keys_for(duty)) == [key.kid for key in keys]
     assert store.pin() == store.signing_key(Duty.ROOT).kid

@@ -257,6 +257,7 @@ class _Line(msgspec.Struct):
     id: int = 0
     slug: str = ""
     text: str = ""
+    flight: str = ""
 
 
 _read_line = msgspec.json.Decoder(_Line).decode
@@ -266,6 +267,21 @@ _NUMBER = 1
 def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answered:
     """Hand a document to the flight that listens at `path`. Raises OSError, TimeoutError without an answer."""
     line = msgspec.json.encode({"id": _NUMBER, "document": b64encode(document).decode()}) + b"\n"
+    said = _asked(path, line, lambda said: said.type == "answer" and said.id in (0, _NUMBER), patience_s)
+    return Answered(said.slug, said.text)
+
+
+def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
+    """The id of the flight that listens at `path`, as it says itself. Raises OSError."""
+    said = _asked(path, b"", lambda said: said.type == "hello", patience_s)
+    try:
+        return bytes.fromhex(said.flight)
+    except ValueError:
+        raise ConnectionError(f"what listens at `{path}` says no id of a flight") from None
+
+
+def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s: float) -> _Line:
+    """The first line that is wanted, after sending one. Raises OSError, TimeoutError without an answer."""
     until_s = time.monotonic() + patience_s
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
         link.settimeout(patience_s)
@@ -283,6 +299,6 @@ def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answere
             *lines, waiting = (waiting + chunk).split(b"\n")
             for each in lines:
                 said = _read_line(each)
-                if said.type == "answer" and said.id in (0, _NUMBER):
-                    return Answered(said.slug, said.text)
+                if wanted(said):
+                    return said
     raise TimeoutError("the flight did not answer")

@@ -86,6 +86,7 @@ class Agents:
             "format": FORMAT,
             "version": VERSION,
             "vehicle": loaded.vehicle,
+            "flight": loaded.in_force.flight.hex(),
             "mode": loaded.mode.value,
         }
         return _encode(hello) + b"\n" + self._mission()

@@ -8,7 +8,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import WHERE, deliver, subject
+from rtshcua.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
 from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
@@ -37,6 +37,9 @@ def approve(
     to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer here")] = None,
     root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    flight: Annotated[
+        str | None, typer.Option(metavar="ID", help="the flight: its id, or its agent socket [default: --to]")
+    ] = None,
     person: Annotated[
         str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
     ] = None,
@@ -62,7 +65,12 @@ def approve(
             role = asked[0]
         if role is None or role not in asked:
             return _not_asked(steps[step], role, asked)
+        name = flight_id(flight, to)
+        if name is None:
+            return fail(ExitCode.USAGE, "the answer is for one flight", WHOSE)
         said = ApprovalDocument(
+            flight=name,
+            mission=flying.mission_digest,
             invocation_id=steps[step].invocation_id,
             binding=steps[step].binding,
             vehicle=flying.policy.vehicle.identity,

@@ -60,6 +60,9 @@ def compile(
     first: Annotated[
         int | None, typer.Option("--from", min=0, help="with --replaces: the first step that is another one")
     ] = None,
+    flight: Annotated[
+        str | None, typer.Option(metavar="ID", help="with --replaces: the flight, by its id or its agent socket")
+    ] = None,
     root: Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (the key store's)")] = None,
     deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
@@ -83,8 +86,8 @@ def compile(
         text = f"`--source {proposer}`" if proposer not in (None, *PROPOSERS) else f"`--policy {policy}`"
         help = f"accepted: {' or '.join(PROPOSERS)}" if "--source" in text else "accepted: a name, or as in `rules@7`"
         return findings.refuse(ExitCode.USAGE, "usage", f"{text} is none", help)
-    if (first is None) != (not replaces):
-        return findings.refuse(ExitCode.USAGE, "usage", "`--replaces` and `--from` go together")
+    if len({first is None, flight is None, not replaces}) > 1:
+        return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` go together")
     target = output or source.with_suffix(".replacement" if replaces else ".bundle")
     if not target.parent.is_dir():
         return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
@@ -97,8 +100,8 @@ def compile(
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
-    if replaces and first is not None:
-        order = Replacing(replaces, first, root, mission_key, passphrase_file, issued_at, target)
+    if replaces and first is not None and flight is not None:
+        order = Replacing(replaces, first, flight, root, mission_key, passphrase_file, issued_at, target)
         return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
     try:
         signers = (

@@ -1,9 +1,10 @@
 """What the commands that sign or hand in a document for a flight share: what it is about, and where it goes."""
 
 import json
+import re
 from pathlib import Path
 
-from rtshcua.adapters.agent_socket import hand_in
+from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.store.reading import read_regular
@@ -17,7 +18,9 @@ from rtshcua.wire.document import MAX_DOCUMENT
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 
+_FLIGHT = re.compile(r"[0-9a-f]{32}")
 #: help for what a document may be handed to
+WHOSE = "give `--flight` (32 hexadecimal digits, or the flight's agent socket)"
 WHERE = "give `--to` (the flight's agent socket) or `--output`"
 
 
@@ -31,9 +34,21 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
     vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
     for path in replacements:
         document = read_regular(path, MAX_DOCUMENT)
-        newer = open_replacement(document, root=trusted, vehicle=vehicle, bundle=found, now=now)
+        newer = open_replacement(document, root=trusted, vehicle=vehicle, flight=None, bundle=found, now=now)
         found = fit_replacement(newer, found, released=0)
     return found
+
+
+def flight_id(flight: str | None, to: Path | None) -> bytes | None:
+    """The id of the flight that is meant: given as 32 hexadecimal digits, or told by the flight itself at its agent
+    socket. None where neither was given. Raises OSError for a socket that tells none.
+
+    A flight that tells another's id gains nothing: what is signed for that one names its mission too.
+    """
+    if flight is not None and _FLIGHT.fullmatch(flight):
+        return bytes.fromhex(flight)
+    place = to if flight is None else Path(flight)
+    return None if place is None else flight_at(place)
 
 
 def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:

@@ -36,7 +36,6 @@ from rtshcua.wire.keys import Duty, SigningKey
 if TYPE_CHECKING:
     from rtshcua.cli.incidents import Incidents, Watch
 
-BOOT_BYTES = 16
 _SEED_BYTES = 32
 
 EXIT_CODES = {
@@ -106,7 +105,7 @@ class Flight:
         self._steps = StepWatch()
         self._sink = EvidenceWriter(log)
         genesis = self._recorder.genesis(
-            now, bundle=bundle, root=root, boot=secrets.token_bytes(BOOT_BYTES), vehicle=loaded.vehicle,
+            now, bundle=bundle, root=root, boot=loaded.in_force.flight, vehicle=loaded.vehicle,
             mission=mission.name, mode=loaded.mode, before=past.hash, sync_us=clock.us_in(SYNC_US / 1e6),
         )  # fmt: skip
         self._sink.append(genesis, SYNCED_FIRST)

@@ -44,6 +44,7 @@ from rtshcua.onboard.ports import Ending
 from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
+from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
@@ -199,7 +200,8 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
         identity = open_bundle(bundle, root=root, vehicle=None, now_us=now.utc_us).policy.vehicle.identity
     loaded = load(
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
-        session_key=secrets.token_bytes(SESSION_KEY_BYTES), peer_is_own_simulator=order.link is None,
+        session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=secrets.token_bytes(FLIGHT_BYTES),
+        peer_is_own_simulator=order.link is None,
     )  # fmt: skip
     if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)

@@ -8,7 +8,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import WHERE, deliver, subject
+from rtshcua.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
 from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
@@ -30,6 +30,9 @@ def recall(
     to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed recall here")] = None,
     root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    flight: Annotated[
+        str | None, typer.Option(metavar="ID", help="the flight: its id, or its agent socket [default: --to]")
+    ] = None,
     person: Annotated[
         str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
     ] = None,
@@ -47,8 +50,11 @@ def recall(
     try:
         flying = subject(bundle, [], root, now_us)
         vehicle = flying.policy.vehicle.identity
+        name = b"" if policy else flight_id(flight, to)
+        if name is None:
+            return fail(ExitCode.USAGE, "the recall of a mission is for one flight", f"{WHOSE}, or `--policy`")
         digests = (b"", flying.policy_digest) if policy else (flying.mission_digest, b"")
-        said = RecallDocument(vehicle, *digests, now_us, now_us + seconds * 1_000_000)
+        said = RecallDocument(vehicle, name, *digests, now_us, now_us + seconds * 1_000_000)
         store = KeyStore(data_folder())
         key = unlock_person(store, person, None, path=approval_key, passphrase_file=passphrase_file)
         document = sign_recall(said, key)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.store.writing import replace
-from rtshcua.cli.documents import subject
+from rtshcua.cli.documents import flight_id, subject
 from rtshcua.cli.faults import code_of
 from rtshcua.cli.findings import Findings
 from rtshcua.cli.unlock import check_trusted, unlock_for
@@ -21,10 +21,13 @@ _SAME_POLICY = "a replacement flies under the policy in force: compile it with t
 
 
 class Replacing(NamedTuple):
-    """What was asked for: the bundle and its replacements so far, the first step that changes, and where it goes."""
+    """What was asked for: the bundle and its replacements so far, the first step that changes, the flight, and where it
+    goes.
+    """
 
     replaces: list[Path]
     first: int
+    flight: str
     root: Path | None
     mission_key: Path | None
     passphrase_file: Path | None
@@ -45,9 +48,11 @@ def replace_with(
         if policy_digest(policy_payload(policy)) != over.policy_digest:
             text = f"the sources make another policy than the `{over.policy.name}@{over.policy.version}` that is flown"
             return findings.refuse(ExitCode.REFUSED, "wrong-policy", text, _SAME_POLICY)
+        name = flight_id(order.flight, None)
+        assert name is not None
         key = unlock_for(store, mission, path=order.mission_key, passphrase_file=order.passphrase_file)
         check_trusted(store, key, policy, mission)
-        document = sign_replacement(mission, over=over, kept=order.first, key=key)
+        document = sign_replacement(mission, over=over, flight=name, kept=order.first, key=key)
     except DocumentError as error:
         return findings.refuse(ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` stay as they fly")
     except Untrusted as error:

@@ -48,6 +48,7 @@ class _Ahead(NamedTuple):
 class InForce:
     """The verified bundle and its invocations; after a replacement, with those of the mission that flies now.
 
+    `flight` is the id of this one flight: documents name it, so that none serves another flight of the same mission.
     `recalled` says that no step may begin any more.
     """
 
@@ -58,6 +59,7 @@ class InForce:
         invocations: tuple[PreparedInvocation, ...],
         root: TrustRoot,
         vehicle: str,
+        flight: bytes,
     ) -> None:
         self.bundle = bundle
         self.invocations = invocations
@@ -65,6 +67,7 @@ class InForce:
         self._policy = policy
         self._root = root
         self._vehicle = vehicle
+        self.flight = flight
         self._approvals = Approvals(policy.policy)
         #: the last replacements that were considered, by their bytes
         self._ahead: dict[bytes, _Ahead] = {}
@@ -111,9 +114,9 @@ class InForce:
             return Receipt(kind, error.slug, str(error))
 
     def _approval(self, document: bytes, now: Now, decided: int) -> Receipt:
-        policy, mission = self.bundle.policy, self.bundle.mission
+        policy = self.bundle.policy
         answered = open_approval(
-            document, root=self._root, vehicle=self._vehicle, policy=policy, mission=mission, now=now
+            document, root=self._root, vehicle=self._vehicle, flight=self.flight, bundle=self.bundle, now=now
         )
         step = answered.about.step
         if step < decided:
@@ -129,6 +132,7 @@ class InForce:
             document,
             root=self._root,
             vehicle=self._vehicle,
+            flight=self.flight,
             missions=self._digests,
             policy=self.bundle.policy_digest,
             issued_at_us=self._issued_at_us,
@@ -164,7 +168,9 @@ class InForce:
         return Receipt(REPLACEMENT, ACCEPTED, f"the mission has {steps} steps now, new from {found.kept}", found.kept)
 
     def _opened(self, document: bytes, now: Now) -> Replacement:
-        return open_replacement(document, root=self._root, vehicle=self._vehicle, bundle=self.bundle, now=now)
+        return open_replacement(
+            document, root=self._root, vehicle=self._vehicle, flight=self.flight, bundle=self.bundle, now=now
+        )
 
     def _prepared(self, mission: Mission) -> tuple[PreparedInvocation, ...]:
         prepared = prepare_mission(mission, self._policy)

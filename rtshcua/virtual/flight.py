@@ -25,6 +25,7 @@ from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.vehicle import SECOND, START, TICK_US, VirtualClock, VirtualVehicle
 from rtshcua.wire import bundle as bundles
 from rtshcua.wire import cose, names
+from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, open_root
 
@@ -156,7 +157,7 @@ class VirtualFlight:
         trusted = open_root(root, pinned=self._root_key, now_us=now.utc_us)
         loaded = load(
             bundle, root=trusted, vehicle=policy.vehicle.identity, now=now, mode=mode,
-            session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
+            session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=True,
         )  # fmt: skip
         if isinstance(loaded, Refusal):
             raise ValueError(f"{loaded.slug}: {loaded.text}")
@@ -178,7 +179,7 @@ class VirtualFlight:
                 now,
                 bundle=bundle,
                 root=root,
-                boot=bytes(16),
+                boot=loaded.in_force.flight,
                 vehicle=loaded.vehicle,
                 mission=mission.name,
                 mode=mode,

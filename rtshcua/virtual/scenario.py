@@ -530,7 +530,8 @@ class _Flight:
         return [
             sign_approval(
                 ApprovalDocument(
-                    step.invocation_id, step.binding, vehicle, role, granted, utc_us, utc_us + _SPEAKS_US
+                    loaded.in_force.flight, bundle.mission_digest, step.invocation_id, step.binding, vehicle, role,
+                    granted, utc_us, utc_us + _SPEAKS_US,
                 ),
                 key,
             )
@@ -541,7 +542,8 @@ class _Flight:
 
     def _recall(self, loaded: Loaded, utc_us: int) -> bytes:
         vehicle = loaded.bundle.policy.vehicle.identity
-        said = RecallDocument(vehicle, loaded.bundle.mission_digest, b"", utc_us, utc_us + _SPEAKS_US)
+        flight, mission = loaded.in_force.flight, loaded.bundle.mission_digest
+        said = RecallDocument(vehicle, flight, mission, b"", utc_us, utc_us + _SPEAKS_US)
         anybody = next(key for people in self._keys.approvals.values() for key in people)
         return sign_recall(said, anybody)
 
@@ -550,7 +552,9 @@ class _Flight:
         bundle = loaded.bundle
         present = self._flight.runtime.view(self._flight.clock.now()).step
         kept = min(present + 1, len(bundle.mission.invocations))
-        return sign_replacement(bundle.mission, over=bundle, kept=kept, key=self._keys.mission)
+        return sign_replacement(
+            bundle.mission, over=bundle, flight=loaded.in_force.flight, kept=kept, key=self._keys.mission
+        )
 
     def _babbled(self, loaded: Loaded, utc_us: int, copies: int, chance: Random) -> Iterator[bytes]:
         """Random octets, and documents that were real before an octet of them was changed, lost or doubled."""

@@ -1,17 +1,27 @@
 """Approvals: a person's signed answer to the `confirm` rules that ask for one, about one step of one mission.
 
-It names the step by its invocation's id and binding, so it means nothing for any other step, mission or flight. The key
-must have duty `approval`, and the root must let it speak for the role in person on this vehicle.
+It names the flight by its id, the mission by its digest, and the step by its invocation's id and binding, so it means
+nothing for any other. The key must have duty `approval`, and the root must let it speak for the role in person on this
+vehicle.
 """
 
 from typing import NamedTuple
 
-from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Approval, Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import names
-from rtshcua.wire.document import DocumentError, check_person, check_times, check_vehicle, open_document, sign_document
+from rtshcua.wire.bundle import Bundle
+from rtshcua.wire.document import (
+    DocumentError,
+    check_flight,
+    check_person,
+    check_times,
+    check_vehicle,
+    open_document,
+    sign_document,
+)
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 
@@ -19,6 +29,8 @@ from rtshcua.wire.trust import TrustRoot
 class ApprovalDocument(Flat, frozen=True):
     """What a person signs: `granted` 1 or 0 for `role`, from `issued_at_us` until `expires_at_us` (UTC)."""
 
+    flight: bytes
+    mission: bytes
     invocation_id: bytes
     binding: bytes
     vehicle: str
@@ -47,12 +59,12 @@ def sign_approval(approval: ApprovalDocument, key: SigningKey) -> bytes:
 
 
 def open_approval(
-    document: bytes, *, root: TrustRoot, vehicle: str, policy: Policy, mission: Mission, now: Now
+    document: bytes, *, root: TrustRoot, vehicle: str, flight: bytes, bundle: Bundle, now: Now
 ) -> Answered:
     """What a signed approval answers, if it is to be trusted here and now, about a step of the mission in force.
 
-    Raises `DocumentError`: its own slugs are `wrong-vehicle`, `unknown-invocation`, `binding-mismatch`, `not-asked`;
-    and `EnvelopeError`, `BundleError` and `ArtefactError`.
+    Raises `DocumentError`: its own slugs are `wrong-vehicle`, `other-flight`, `other-mission`, `unknown-invocation`,
+    `binding-mismatch`, `not-asked`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
     said, opened = open_document(document, names.APPROVAL, ApprovalDocument, Duty.APPROVAL, root, now)
     if said.granted not in (0, 1):
@@ -60,7 +72,11 @@ def open_approval(
     check_vehicle(said.vehicle, vehicle)
     check_person(opened.key, said.role, vehicle, now)
     check_times(said.issued_at_us, said.expires_at_us, now)
-    invocation = next((each for each in mission.invocations if each.invocation_id == said.invocation_id), None)
+    check_flight(said.flight, flight)
+    if said.mission != bundle.mission_digest:
+        raise DocumentError("other-mission", "it is about a step of another mission than the one in force")
+    policy = bundle.policy
+    invocation = next((each for each in bundle.mission.invocations if each.invocation_id == said.invocation_id), None)
     if invocation is None:
         raise DocumentError("unknown-invocation", "it is about no step of the mission in force")
     if invocation.binding != said.binding:

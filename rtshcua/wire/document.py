@@ -17,6 +17,8 @@ from rtshcua.wire.names import Artefact
 from rtshcua.wire.trust import HUMAN, TrustRoot, key_refusal, speaker_refusal
 from rtshcua.wire.untrusted import Untrusted
 
+#: length of a flight's id in bytes: random, drawn for each, and `boot` in the genesis of its log
+FLIGHT_BYTES: Final = 16
 #: a document larger than this is refused unread, in bytes; one that holds no mission has no reason to be large
 MAX_DOCUMENT: Final = 1 << 18
 MAX_WITHOUT_MISSION: Final = 1 << 11
@@ -36,8 +38,8 @@ _F = TypeVar("_F", bound=Flat)
 class DocumentError(Untrusted):
     """A document that is refused.
 
-    `too-large`, `unknown-document`, `malformed`, `root-expired`, `issued-in-future`, `expired`, `too-long-lived`, the
-    slugs of `speaker_refusal`, and those of what the document is about.
+    `too-large`, `unknown-document`, `malformed`, `other-flight`, `root-expired`, `issued-in-future`, `expired`,
+    `too-long-lived`, the slugs of `speaker_refusal`, and those of what the document is about.
     """
 
 
@@ -112,6 +114,12 @@ def check_vehicle(named: str, vehicle: str) -> None:
     """Whether a document is for this vehicle."""
     if named != vehicle:
         raise DocumentError("wrong-vehicle", f"it is for `{named[:80]}`, this vehicle is `{vehicle}`")
+
+
+def check_flight(named: bytes, flight: bytes) -> None:
+    """Whether a document is for this flight, and no other of the same mission."""
+    if named != flight:
+        raise DocumentError("other-flight", "it is for another flight than this one")
 
 
 def check_key(key: VerificationKey, vehicle: str, now: Now) -> None:

@@ -1,7 +1,7 @@
 """Recalls: a person's signed order to bring a vehicle home, which ends a mission and starts none.
 
-It names one mission by its digest, or all that fly under one policy. The key must have duty `approval`, and the root
-must let it speak in person on this vehicle, for whatever role.
+It names one mission by its digest and the flight by its id, or all flights under one policy. The key must have duty
+`approval`, and the root must let it speak in person on this vehicle, for whatever role.
 """
 
 from collections.abc import Collection
@@ -11,6 +11,7 @@ from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import names
 from rtshcua.wire.document import (
     DocumentError,
+    check_flight,
     check_key,
     check_times,
     check_vehicle,
@@ -22,9 +23,13 @@ from rtshcua.wire.trust import HUMAN, TrustRoot
 
 
 class RecallDocument(Flat, frozen=True):
-    """What a person signs. One of the digests of mission and policy is given, the other is empty. Times are UTC, us."""
+    """What a person signs: `flight` and `mission`, or `policy` for all that fly under it; the others are empty.
+
+    Times are UTC, us.
+    """
 
     vehicle: str
+    flight: bytes
     mission: bytes
     policy: bytes
     issued_at_us: int
@@ -41,6 +46,7 @@ def open_recall(
     *,
     root: TrustRoot,
     vehicle: str,
+    flight: bytes,
     missions: Collection[bytes],
     policy: bytes,
     issued_at_us: int,
@@ -50,17 +56,19 @@ def open_recall(
     replaced it) under the policy of that digest.
 
     One for a whole policy does not reach a mission that was issued (`issued_at_us`) after it. Raises `DocumentError`:
-    its own slugs are `wrong-vehicle`, `wrong-source`, `key-expired`, `other-mission`, `other-policy`,
-    `before-mission`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
+    its own slugs are `wrong-vehicle`, `wrong-source`, `key-expired`, `other-flight`, `other-mission`,
+    `other-policy`, `before-mission`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
     said, opened = open_document(document, names.RECALL, RecallDocument, Duty.APPROVAL, root, now)
-    if bool(said.mission) == bool(said.policy):
-        raise DocumentError("malformed", "a recall names either a mission or a policy")
+    if bool(said.mission) == bool(said.policy) or bool(said.mission) != bool(said.flight):
+        raise DocumentError("malformed", "a recall names either a mission and its flight or a policy")
     check_vehicle(said.vehicle, vehicle)
     check_key(opened.key, vehicle, now)
     if HUMAN not in opened.key.sources:
         raise DocumentError("wrong-source", f"key {opened.key.kid.hex()} may not speak in person")
     check_times(said.issued_at_us, said.expires_at_us, now)
+    if said.flight:
+        check_flight(said.flight, flight)
     if said.mission and said.mission not in missions:
         raise DocumentError("other-mission", "it recalls another mission than the one that flies")
     if said.policy and said.policy != policy:

@@ -19,7 +19,7 @@ from rtshcua.wire import cbor, names
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import Bundle, check_bundle, check_proposer
 from rtshcua.wire.digest import MISSION, digest
-from rtshcua.wire.document import DocumentError, open_document, sign_document
+from rtshcua.wire.document import DocumentError, check_flight, open_document, sign_document
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, TrustRoot
 
@@ -28,10 +28,11 @@ MAX_REPLACEMENTS: Final = 64
 
 
 class ReplacementDocument(Flat, frozen=True):
-    """What a mission key signs: the mission of digest `supersedes` keeps its first `kept` steps, and `mission` is the
-    whole that then flies.
+    """What a mission key signs: in this flight the mission of digest `supersedes` keeps its first `kept` steps, and
+    `mission` is the whole that then flies.
     """
 
+    flight: bytes
     supersedes: bytes
     kept: int
     mission: Mission
@@ -53,28 +54,36 @@ class Replacement(NamedTuple):
         return with_fields(bundle, mission=mission, mission_digest=self.digest, mission_key=self.key)
 
 
-def sign_replacement(mission: Mission, *, over: Bundle, kept: int, key: SigningKey) -> bytes:
+def sign_replacement(mission: Mission, *, over: Bundle, flight: bytes, kept: int, key: SigningKey) -> bytes:
     """The signed document, with the mission bound to the policy of `over`.
 
     Raises `WrongDuty` for a key of another duty, and `DocumentError` (`other-steps`) where the steps that are to stay
     are not those of `over`.
     """
     _check_kept(over.mission, mission, kept)
-    bound = bind(mission, over.policy_digest, after=_after(over.mission_digest, kept))
-    body = ReplacementDocument(over.mission_digest, kept, bound)
+    bound = bind(mission, over.policy_digest, after=_after(flight, over.mission_digest, kept))
+    body = ReplacementDocument(flight, over.mission_digest, kept, bound)
     return sign_document(names.REPLACEMENT, body, key, Duty.MISSION)
 
 
-def open_replacement(document: bytes, *, root: TrustRoot, vehicle: str, bundle: Bundle, now: Now) -> Replacement:
-    """A replacement that is to be trusted here and now, for a flight under the policy of `bundle`.
+def open_replacement(
+    document: bytes, *, root: TrustRoot, vehicle: str, flight: bytes | None, bundle: Bundle, now: Now
+) -> Replacement:
+    """A replacement that is to be trusted here and now, for a flight (None: whichever it names) under the policy of
+    `bundle`.
 
-    Whether it fits what has flown is for `fit_replacement`. Raises `DocumentError` (`issued-in-future`, `no-step`),
+    Whether it fits what has flown is for `fit_replacement`. Raises `DocumentError` (`other-flight`, `issued-in-future`,
+    `no-step`),
     `BundleError` as for a mission in a bundle, `EnvelopeError` and `ArtefactError`.
     """
     said, opened = open_document(document, names.REPLACEMENT, ReplacementDocument, Duty.MISSION, root, now)
+    if flight is not None:
+        check_flight(said.flight, flight)
     found = Replacement(said.supersedes, said.kept, said.mission, digest(MISSION, opened.payload), opened.key)
     candidate = with_fields(bundle, mission=found.mission, mission_digest=found.digest, mission_key=opened.key)
-    check_bundle(candidate, vehicle, now.utc_us + now.utc_error_us, after=_after(said.supersedes, said.kept))
+    check_bundle(
+        candidate, vehicle, now.utc_us + now.utc_error_us, after=_after(said.flight, said.supersedes, said.kept)
+    )
     if found.mission.issued_at_us > now.utc_us + now.utc_error_us:
         raise DocumentError("issued-in-future", "it says that it will be issued later than now")
     if not found.mission.invocations:
@@ -98,9 +107,11 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle
     return found.over(bundle)
 
 
-def _after(supersedes: bytes, kept: int) -> bytes:
-    """What the ids of a replacement follow from beside its mission: so they are those of no bundle."""
-    return cbor.encode([supersedes, kept])
+def _after(flight: bytes, supersedes: bytes, kept: int) -> bytes:
+    """What the ids of a replacement follow from beside its mission: so they are those of no bundle
+    and no other flight.
+    """
+    return cbor.encode([flight, supersedes, kept])
 
 
 def _check_replacer(found: Replacement, bundle: Bundle) -> None:

@@ -15,7 +15,7 @@ from reference import world
 from reference.documents import shorter
 from reference.flat_case import MISSION, POLICY
 from reference.forgery import edit, expect, flight, signed
-from reference.world import MISSION_KEY, ROOT, START, VEHICLE, sealed
+from reference.world import FLIGHT, MISSION_KEY, ROOT, START, VEHICLE, sealed
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
@@ -105,7 +105,7 @@ def test_a_laxer_policy_of_the_library_takes_no_place_of_the_one_handed_in(compi
 
 
 def test_a_replacement_claims_no_more_than_a_mission(compiles: Compile) -> None:
-    found = compiles(by("operator"), *UNDER, "--replaces", "flown.bundle", "--from", "0")
+    found = compiles(by("operator"), *UNDER, "--replaces", "flown.bundle", "--from", "0", "--flight", "0" * 32)
     assert found[:2] == (ExitCode.DIAGNOSTICS, ["E0905"])
 
 
@@ -142,7 +142,7 @@ def opened(root: TrustRoot, mission: Mission = MISSION) -> str:
     """What the boundary says to a mission that the attacker signed: a slug, or nothing."""
     found = load(
         sealed(POLICY, mission), root=root, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE,
-        session_key=bytes(32), peer_is_own_simulator=True,
+        session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=True,
     )  # fmt: skip
     return found.slug if isinstance(found, Refusal) else ""
 
@@ -185,12 +185,12 @@ def test_an_agent_does_not_set_aside_what_a_person_proposed() -> None:
     whole = replace(shorter(flying), invocations=tuple(
         replace(each, source=SourceKind.AGENT) for each in shorter(flying).invocations
     ))  # fmt: skip
-    document = sign_replacement(whole, over=flying.bundle, kept=0, key=MISSION_KEY)
+    document = sign_replacement(whole, over=flying.bundle, flight=FLIGHT, kept=0, key=MISSION_KEY)
     now = Now(START.monotonic_us + 1, START.utc_us + 1, START.utc_error_us)
     assert taken.in_force.take(document, now, decided=0, released=0).slug == "wrong-source"
     agents = world.loaded(POLICY, through(SourceKind.AGENT))
     again = world.renewed(agents, rooted(sources=("agent",)))
-    document = sign_replacement(whole, over=agents.bundle, kept=0, key=MISSION_KEY)
+    document = sign_replacement(whole, over=agents.bundle, flight=FLIGHT, kept=0, key=MISSION_KEY)
     assert again.in_force.take(document, now, decided=0, released=0).accepted
 
 

@@ -207,7 +207,7 @@ def test_the_approval_of_an_earlier_flight_does_not_serve() -> None:
     """The same mission, compiled again: other ids."""
     earlier = approval(OF)
     again = loaded(mission=replace(low_mission(), issued_at_us=ISSUED + S))
-    assert presented(again, earlier).slug == "unknown-invocation"
+    assert presented(again, earlier).slug == "other-mission"
 
 
 def test_one_that_is_replayed_changes_nothing() -> None:

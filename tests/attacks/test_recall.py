@@ -175,10 +175,10 @@ POLICY_DIGEST = OF.bundle.policy_digest
         ({"mission": bytes(32)}, "other-mission"),
         ({"mission": b""}, "malformed"),
         ({"policy": POLICY_DIGEST}, "malformed"),
-        ({"mission": b"", "policy": bytes(32)}, "other-policy"),
-        ({"mission": b"", "policy": POLICY_DIGEST}, "accepted"),
-        ({"mission": b"", "policy": POLICY_DIGEST, "issued_at_us": ISSUED - 1}, "before-mission"),
-        ({"mission": b"", "policy": POLICY_DIGEST, "issued_at_us": ISSUED}, "accepted"),
+        ({"flight": b"", "mission": b"", "policy": bytes(32)}, "other-policy"),
+        ({"flight": b"", "mission": b"", "policy": POLICY_DIGEST}, "accepted"),
+        ({"flight": b"", "mission": b"", "policy": POLICY_DIGEST, "issued_at_us": ISSUED - 1}, "before-mission"),
+        ({"flight": b"", "mission": b"", "policy": POLICY_DIGEST, "issued_at_us": ISSUED}, "accepted"),
         ({"issued_at_us": START.utc_us + START.utc_error_us + 1}, "issued-in-future"),
         ({"expires_at_us": START.utc_us + START.utc_error_us}, "expired"),
         ({"expires_at_us": START.utc_us + 61 * MIN}, "too-long-lived"),
@@ -193,7 +193,7 @@ def test_the_recall_of_an_earlier_flight_does_not_serve() -> None:
     earlier = recall(OF)
     again = loaded(mission=replace(MISSION, issued_at_us=ISSUED + S))
     assert presented(again, earlier).slug == "other-mission"
-    under_policy = recall(OF, mission=b"", policy=POLICY_DIGEST, issued_at_us=ISSUED)
+    under_policy = recall(OF, flight=b"", mission=b"", policy=POLICY_DIGEST, issued_at_us=ISSUED)
     assert presented(again, under_policy).slug == "before-mission"
 
 

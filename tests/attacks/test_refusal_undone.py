@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from reference.documents import ASKED, approval, hand, low, low_mission, presented, replacement
 from reference.world import (
+    FLIGHT,
     MISSION_KEY,
     POLICY_KEY,
     ROOT,
@@ -49,9 +50,9 @@ def with_ids(mission: Mission, ids: dict[int, bytes]) -> Mission:
 def same_again(of: Loaded, kept: int = ASKED, ids: dict[int, bytes] | None = None) -> bytes:
     """A replacement by the very same mission; its ids are those of `ids`, or as an honest compiler makes them."""
     over = of.bundle.mission_digest
-    bound = bind(of.bundle.mission, of.bundle.policy_digest, after=cbor.encode([over, kept]))
+    bound = bind(of.bundle.mission, of.bundle.policy_digest, after=cbor.encode([FLIGHT, over, kept]))
     bound = with_ids(bound, ids) if ids else bound
-    return sign_document(names.REPLACEMENT, ReplacementDocument(over, kept, bound), MISSION_KEY, Duty.MISSION)
+    return sign_document(names.REPLACEMENT, ReplacementDocument(FLIGHT, over, kept, bound), MISSION_KEY, Duty.MISSION)
 
 
 def old_ids(of: Loaded) -> dict[int, bytes]:
@@ -139,15 +140,18 @@ def test_a_bundle_with_ids_of_its_own_making_is_not_loaded() -> None:
 
 def test_an_id_that_was_seen_before_is_refused() -> None:
     """A flight whose bundle had, against all odds, the id that a replacement's step will have."""
-    bound = bind(low_mission(), OF.bundle.policy_digest, after=cbor.encode([OF.bundle.mission_digest, ASKED]))
+    bound = bind(low_mission(), OF.bundle.policy_digest, after=cbor.encode([FLIGHT, OF.bundle.mission_digest, ASKED]))
     taken = with_ids(OF.bundle.mission, {3: bound.invocations[ASKED].invocation_id})
     bundle = bundles.Bundle(
         OF.bundle.policy, taken, OF.bundle.policy_digest, OF.bundle.mission_digest, OF.bundle.digest,
         OF.bundle.policy_key, OF.bundle.mission_key,
     )  # fmt: skip
-    of = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE)
+    of = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT)
     document = sign_document(
-        names.REPLACEMENT, ReplacementDocument(OF.bundle.mission_digest, ASKED, bound), MISSION_KEY, Duty.MISSION
+        names.REPLACEMENT,
+        ReplacementDocument(FLIGHT, OF.bundle.mission_digest, ASKED, bound),
+        MISSION_KEY,
+        Duty.MISSION,
     )
     assert of.take(document, START, decided=0, released=0).slug == "id-seen"
 

@@ -44,6 +44,7 @@ def opened(data: bytes, vehicle: str, utc_us: int) -> Loaded | Refusal:
         now=Now(500 * S, utc_us, 20_000),
         mode=Mode.SOFTWARE,
         session_key=world.SESSION_KEY,
+        flight=world.FLIGHT,
         peer_is_own_simulator=False,
     )
 

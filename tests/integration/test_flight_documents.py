@@ -76,7 +76,11 @@ def fly(bundle: bytes, flavour: str, when: str, document: Callable[[Flight], byt
 def approval(flight: Flight, granted: int = 1) -> bytes:
     step = flight.loaded.bundle.mission.invocations[ASKED]
     utc_us = flight.clock.now().utc_us
-    said = ApprovalDocument(step.invocation_id, step.binding, "quad-07", "supervisor", granted, utc_us, utc_us + 60 * S)
+    flying = flight.loaded.in_force
+    said = ApprovalDocument(
+        flying.flight, flying.bundle.mission_digest, step.invocation_id, step.binding, "quad-07", "supervisor", granted,
+        utc_us, utc_us + 60 * S,
+    )  # fmt: skip
     return sign_approval(said, case.KEYS[Duty.APPROVAL])
 
 
@@ -96,7 +100,8 @@ def test_a_refusal_brings_it_home(low: bytes) -> None:
 
 def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
     def document(flight: Flight) -> bytes:
-        return sign_replacement(shorter, over=flight.loaded.bundle, kept=2, key=case.KEYS[Duty.MISSION])
+        flying = flight.loaded.in_force
+        return sign_replacement(shorter, over=flying.bundle, flight=flying.flight, kept=2, key=case.KEYS[Duty.MISSION])
 
     flown = fly(low, "ardupilot", '"detail":"goto"', document)
     assert flown.ending is Ending.COMPLETED
@@ -106,7 +111,8 @@ def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
 def test_a_recall_brings_it_home_by_the_contingency(low: bytes) -> None:
     def document(flight: Flight) -> bytes:
         utc_us = flight.clock.now().utc_us
-        said = RecallDocument("quad-07", flight.loaded.bundle.mission_digest, b"", utc_us, utc_us + 60 * S)
+        flying = flight.loaded.in_force
+        said = RecallDocument("quad-07", flying.flight, flying.bundle.mission_digest, b"", utc_us, utc_us + 60 * S)
         return sign_recall(said, case.KEYS[Duty.APPROVAL])
 
     flown = fly(low, "px4", '"detail":"goto"', document)

@@ -41,6 +41,8 @@ def approval(of: Loaded, step: int = ASKED, key: SigningKey = APPROVAL_KEY, now:
     """The supervisor's signed approval of a step, but for what is `changed`."""
     invocations = of.bundle.mission.invocations
     said = ApprovalDocument(
+        flight=of.in_force.flight,
+        mission=of.bundle.mission_digest,
         invocation_id=invocations[step].invocation_id,
         binding=invocations[step].binding,
         vehicle=VEHICLE,
@@ -54,7 +56,7 @@ def approval(of: Loaded, step: int = ASKED, key: SigningKey = APPROVAL_KEY, now:
 
 def recall(of: Loaded, key: SigningKey = APPROVAL_KEY, now: Now = START, **changed: Any) -> bytes:
     """A signed recall of the mission, but for what is `changed`."""
-    said = RecallDocument(VEHICLE, of.bundle.mission_digest, b"", now.utc_us, now.utc_us + MIN)
+    said = RecallDocument(VEHICLE, of.in_force.flight, of.bundle.mission_digest, b"", now.utc_us, now.utc_us + MIN)
     return sign_recall(replace(said, **changed), key)
 
 
@@ -67,7 +69,7 @@ def shorter(of: Loaded) -> Mission:
 
 def replacement(of: Loaded, kept: int = 2, mission: Mission | None = None, key: SigningKey = MISSION_KEY) -> bytes:
     """A signed replacement, by the mission without its inspection if nothing else is said."""
-    return sign_replacement(mission or shorter(of), over=of.bundle, kept=kept, key=key)
+    return sign_replacement(mission or shorter(of), over=of.bundle, flight=of.in_force.flight, kept=kept, key=key)
 
 
 def presented(of: Loaded, document: bytes, now: Now = START, released: int = 0) -> Receipt:

@@ -63,6 +63,7 @@ from rtshcua.wire.trust import TrustRoot
 
 VEHICLE = POLICY.vehicle.identity
 SESSION_KEY = bytes(range(32))
+FLIGHT = bytes(16)
 START = Now(monotonic_us=500 * S, utc_us=ISSUED + 60 * S, utc_error_us=20_000)
 TICK = 50_000  # us
 SKILL_US = 2 * S  # how long the fake vehicle takes for anything
@@ -143,6 +144,7 @@ def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = F
         now=START,
         mode=mode,
         session_key=SESSION_KEY,
+        flight=FLIGHT,
         peer_is_own_simulator=own_simulator,
     )
 
@@ -161,7 +163,7 @@ def _loaded(policy: The, mission: The, mode: Mode) -> Loaded:
 
 def renewed(of: Loaded, root: TrustRoot = ROOT) -> Loaded:
     """The same bundle in a new session, without opening it again."""
-    in_force = InForce(of.bundle, of.policy, of.invocations, root, VEHICLE)
+    in_force = InForce(of.bundle, of.policy, of.invocations, root, VEHICLE, FLIGHT)
     return session(in_force, of.policy, VEHICLE, of.mode, SESSION_KEY)
 
 
@@ -266,7 +268,7 @@ class Run:
                 START,
                 bundle=sealed_again(self.loaded),
                 root=_signed_root(),
-                boot=bytes(16),
+                boot=self.loaded.in_force.flight,
                 vehicle=VEHICLE,
                 mission=self.loaded.bundle.mission.name,
                 mode=self.loaded.mode,

@@ -76,12 +76,16 @@ def show_document(page: Page, data: bytes) -> dict[str, object]:
     match what.body:
         case ApprovalDocument() as answer:
             page.row("vehicle", answer.vehicle)
+            page.row("flight", answer.flight.hex())
+            page.row("mission", answer.mission.hex())
             page.row("step's id", answer.invocation_id.hex())
             page.row("issued", utc(answer.issued_at_us))
         case RecallDocument() as recall:
             page.row("vehicle", recall.vehicle)
+            page.row("flight", recall.flight.hex() or "any")
             page.row("issued", utc(recall.issued_at_us))
         case ReplacementDocument() as newer:
+            page.row("flight", newer.flight.hex())
             page.row("supersedes", newer.supersedes.hex())
             for step in newer.mission.invocations:
                 page.row("stays" if step.step < newer.kept else "new", f"step {step.step} {step.text}")

@@ -49,7 +49,7 @@ def establish(genesis: Genesis, pinned: bytes, *, bundle: bytes | None = None) -
     if isinstance(prepared, Flaw):
         return prepared
     policy, invocations = prepared
-    return Basis(root, policy, InForce(opened, policy, invocations, root, genesis.vehicle))
+    return Basis(root, policy, InForce(opened, policy, invocations, root, genesis.vehicle, bytes.fromhex(genesis.boot)))
 
 
 # A log that is asked several things (by the quick verifier and then the careful one, for one proof and the next) says

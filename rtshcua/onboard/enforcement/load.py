@@ -18,6 +18,7 @@ from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.executor import Commands, Executor
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.bundle import Bundle, open_bundle
+from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
@@ -68,14 +69,18 @@ def load(
     now: Now,
     mode: Mode,
     session_key: bytes,
+    flight: bytes,
     peer_is_own_simulator: bool,
 ) -> Loaded | Refusal:
-    """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else.
+    """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
+    `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log.
 
-    Raises ValueError for a session key of another length; whatever is wrong with the bundle is a `Refusal`.
+    Raises ValueError for a session key or an id of another length; whatever is wrong with the bundle is a `Refusal`.
     """
     if len(session_key) != SESSION_KEY_BYTES:
         raise ValueError(f"a session key has {SESSION_KEY_BYTES} bytes, not {len(session_key)}")
+    if len(flight) != FLIGHT_BYTES:
+        raise ValueError(f"the id of a flight has {FLIGHT_BYTES} bytes, not {len(flight)}")
     if mode is Mode.NONE and not peer_is_own_simulator:
         return Refusal("mode-refused", "mode `none` flies nothing but the simulated vehicle that this run started")
     try:
@@ -91,7 +96,7 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
-    return session(InForce(opened, policy, invocations, root, vehicle), policy, vehicle, mode, session_key)
+    return session(InForce(opened, policy, invocations, root, vehicle, flight), policy, vehicle, mode, session_key)
 
 
 def session(in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes) -> Loaded:

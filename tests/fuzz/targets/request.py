@@ -32,6 +32,7 @@ def worlds() -> tuple[Loaded, ...]:
         now=Now(500 * board.S, flat.ISSUED + board.S, 0),
         mode=Mode.SOFTWARE,
         session_key=reference.SESSION_KEY,
+        flight=reference.FLIGHT,
         peer_is_own_simulator=False,
     )
     assert isinstance(standard, Loaded), standard

@@ -38,6 +38,10 @@ SHORTER = LOW.replace("    inspect_area(bridge_a, altitude = 9 m, pattern = peri
 )
 
 
+#: the flight that `in_force` has
+FLIGHT = ("--flight", bytes(16).hex())
+
+
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -55,7 +59,7 @@ def in_force(bundle: Path) -> Loaded:
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
     found = load(
         bundle.read_bytes(), root=root, vehicle="quad-07", now=now(), mode=Mode.SOFTWARE,
-        session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
+        session_key=bytes(SESSION_KEY_BYTES), flight=bytes(16), peer_is_own_simulator=True,
     )  # fmt: skip
     assert isinstance(found, Loaded)
     return found
@@ -74,24 +78,27 @@ def presented(of: Loaded, document: Path) -> Receipt:
 
 def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     of = in_force(here / "low.bundle")
-    assert main(["approve", "low.bundle", "--step", "2", "-o", "yes"]) == ExitCode.OK
+    assert main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT]) == ExitCode.OK
     assert "approved as supervisor" in capsys.readouterr().out
     assert (here / "yes").stat().st_mode & 0o777 == 0o600
     assert presented(of, here / "yes").granted == 1
-    assert main(["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "2"]) == ExitCode.OK
+    assert main(["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT]) == ExitCode.OK
     assert "4 steps, new from 2" in capsys.readouterr().out
     assert presented(of, here / "shorter.replacement").slug == "accepted"
     assert [each.contract.name for each in of.bundle.mission.invocations] == ["takeoff", "goto", "hover", "return_home"]
-    again = ["--replaces", "low.bundle", "--replaces", "shorter.replacement"]
+    again = [*FLIGHT, "--replaces", "low.bundle", "--replaces", "shorter.replacement"]
     assert main(["compile", "low.rts", *again, "--from", "2", "-o", "back", "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["replacement"]["from"] == 2
     assert presented(of, here / "back").slug == "accepted"
-    assert presented(of, here / "yes").slug == "unknown-invocation", "what was approved stood there before"
+    assert presented(of, here / "yes").slug == "other-mission", "what was approved stood there before"
     put = ["--replacement", "shorter.replacement", "--replacement", "back"]
-    assert main(["approve", "low.bundle", *put, "--step", "2", "--refuse", "--role", "supervisor", "-o", "no"]) == 0
+    assert (
+        main(["approve", "low.bundle", *put, "--step", "2", "--refuse", "--role", "supervisor", "-o", "no", *FLIGHT])
+        == 0
+    )
     assert presented(of, here / "no").granted == 0
     for words in (["--policy"], []):
-        assert main(["recall", "low.bundle", *words, "-o", "home"]) == ExitCode.OK
+        assert main(["recall", "low.bundle", *words, "-o", "home", *FLIGHT]) == ExitCode.OK
     assert presented(of, here / "home").slug == "accepted"
 
 
@@ -102,6 +109,8 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
 
     says(ExitCode.USAGE, "has to go somewhere", "approve", "low.bundle", "--step", "2")
     says(ExitCode.USAGE, "has to go somewhere", "recall", "low.bundle")
+    says(ExitCode.USAGE, "for one flight", "approve", "low.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "for one flight", "recall", "low.bundle", "-o", "x")
     says(ExitCode.USAGE, "there is no step 4", "approve", "low.bundle", "--step", "4", "-o", "x")
     says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "1", "-o", "x")
     says(ExitCode.USAGE, "is not asked", "approve", "low.bundle", "--step", "2", "--role", "operator", "-o", "x")
@@ -109,20 +118,30 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     says(ExitCode.INPUT, "no such file", "approve", "nothing.bundle", "--step", "2", "-o", "x")
     says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--replaces", "low.bundle")
     says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--from", "2")
-    says(ExitCode.REFUSED, "step 2 is to stay", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "3")
+    says(
+        ExitCode.REFUSED,
+        "step 2 is to stay",
+        "compile",
+        "shorter.rts",
+        "--replaces",
+        "low.bundle",
+        "--from",
+        "3",
+        *FLIGHT,
+    )
     says(ExitCode.INPUT, "is no replacement", "replace", "low.bundle", "--to", "s")
-    assert main(["recall", "low.bundle", "-o", "home"]) == ExitCode.OK
+    assert main(["recall", "low.bundle", "-o", "home", *FLIGHT]) == ExitCode.OK
     says(ExitCode.INPUT, "but `rtshcua/recall`", "replace", "home", "--to", "s")
     says(ExitCode.INPUT, "no such file or directory: `s`", "recall", "low.bundle", "--to", "s")
     other = (here / "shorter.rts").read_text().replace("bridge_inspection", "training_field").replace("@7", "@2")
     other = other.replace("    goto(bridge_a.entry, altitude = 9 m)\n", "")
     (here / "other.rts").write_text(other)
-    says(ExitCode.REFUSED, "another policy", "compile", "other.rts", "--replaces", "low.bundle", "--from", "1")
+    says(ExitCode.REFUSED, "another policy", "compile", "other.rts", "--replaces", "low.bundle", "--from", "1", *FLIGHT)
     damaged = bytearray((here / "low.bundle").read_bytes())
     damaged[len(damaged) // 2] ^= 1
     (here / "damaged.bundle").write_bytes(damaged)
     says(ExitCode.UNTRUSTED, "key", "approve", "damaged.bundle", "--step", "2", "-o", "x")
-    says(ExitCode.USAGE, "has 4 steps", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "99")
+    says(ExitCode.USAGE, "has 4 steps", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "99", *FLIGHT)
     assert not (here / "x").exists()
     assert not (here / "other.replacement").exists()
 
@@ -136,7 +155,7 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
         "doctor --connect udpin:127.0.0.1:14999 cut.bundle",
         "approve cut.bundle --step 2 -o x",
         "recall cut.bundle -o x",
-        "compile shorter.rts --replaces cut.bundle --from 1",
+        "compile shorter.rts --replaces cut.bundle --from 1 --flight 00000000000000000000000000000000",
     ],
 )
 def test_a_bundle_that_was_cut_is_malformed_for_everybody(

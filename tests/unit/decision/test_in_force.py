@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from reference.documents import ASKED, MIN, approval, low, recall, replacement, shorter
 from reference.flat_case import GOTO, S
-from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT, START, VEHICLE
+from reference.world import APPROVAL_KEY, FLIGHT, MISSION_KEY, ROOT, START, VEHICLE
 from rtshcua.decision.session import MOST_AHEAD, InForce
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
@@ -29,7 +29,7 @@ IN_DOUBT = START.utc_us + START.utc_error_us
 
 
 def flight(root: TrustRoot = ROOT) -> InForce:
-    return InForce(OF.bundle, OF.policy, OF.invocations, root, VEHICLE)
+    return InForce(OF.bundle, OF.policy, OF.invocations, root, VEHICLE, FLIGHT)
 
 
 def entitled(**fields: object) -> TrustRoot:
@@ -50,8 +50,8 @@ def later(us: int) -> Now:
 def forged(mission: Mission, kept: int = 2, supersedes: bytes | None = None, *, bound: bool = True) -> bytes:
     """A replacement that an honest compiler would not make, rightly signed."""
     over = OF.bundle.mission_digest if supersedes is None else supersedes
-    whole = bind(mission, OF.bundle.policy_digest, after=cbor.encode([over, kept])) if bound else mission
-    return sign_document(names.REPLACEMENT, ReplacementDocument(over, kept, whole), MISSION_KEY, Duty.MISSION)
+    whole = bind(mission, OF.bundle.policy_digest, after=cbor.encode([FLIGHT, over, kept])) if bound else mission
+    return sign_document(names.REPLACEMENT, ReplacementDocument(FLIGHT, over, kept, whole), MISSION_KEY, Duty.MISSION)
 
 
 def as_content(content_type: str) -> bytes:
@@ -76,7 +76,7 @@ def test_a_document_that_is_too_large_or_unknown_is_refused() -> None:
     assert take(flight(), as_content("application/x")).slug == "unknown-document"
     long = sign_document(
         names.APPROVAL,
-        ApprovalDocument(bytes(16), bytes(32), "v" * MAX_WITHOUT_MISSION, "supervisor", 1, 0, 1),
+        ApprovalDocument(FLIGHT, bytes(32), bytes(16), bytes(32), "v" * MAX_WITHOUT_MISSION, "supervisor", 1, 0, 1),
         APPROVAL_KEY,
         Duty.APPROVAL,
     )
@@ -143,7 +143,7 @@ def test_after_a_recall_nothing_else_is_accepted() -> None:
 
 
 def test_a_recall_of_all_under_the_policy_is_accepted() -> None:
-    assert take(flight(), recall(OF, mission=b"", policy=OF.bundle.policy_digest)).accepted
+    assert take(flight(), recall(OF, flight=b"", mission=b"", policy=OF.bundle.policy_digest)).accepted
 
 
 @rows(
@@ -153,9 +153,10 @@ def test_a_recall_of_all_under_the_policy_is_accepted() -> None:
         ({"policy": OF.bundle.policy_digest}, "malformed"),
         ({"vehicle": "quad-08"}, "wrong-vehicle"),
         ({"mission": bytes(32)}, "other-mission"),
-        ({"mission": b"", "policy": bytes(32)}, "other-policy"),
+        ({"flight": b"", "mission": b"", "policy": bytes(32)}, "other-policy"),
         (
             {
+                "flight": b"",
                 "mission": b"",
                 "policy": OF.bundle.policy_digest,
                 "issued_at_us": OF.bundle.mission.issued_at_us - 1,
@@ -268,7 +269,7 @@ def test_a_replacement_whose_kept_steps_differ_is_not_signed() -> None:
     first, second, last = shorter(OF).invocations
     mission = replace(shorter(OF), invocations=(first, replace(second, skill=GOTO + 1), last))
     with pytest.raises(DocumentError, match="is not the same step"):
-        sign_replacement(mission, over=OF.bundle, kept=2, key=MISSION_KEY)
+        sign_replacement(mission, over=OF.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)
 
 
 @pytest.mark.unmeasured
@@ -276,12 +277,12 @@ def test_one_flight_takes_so_many_replacements_and_no_more() -> None:
     of = flight()
     for number in range(MAX_REPLACEMENTS):
         mission = replace(shorter(OF), issued_at_us=OF.bundle.mission.issued_at_us + number)
-        assert take(of, sign_replacement(mission, over=of.bundle, kept=2, key=MISSION_KEY)).accepted
-    last = sign_replacement(shorter(OF), over=of.bundle, kept=2, key=MISSION_KEY)
+        assert take(of, sign_replacement(mission, over=of.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)).accepted
+    last = sign_replacement(shorter(OF), over=of.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)
     assert take(of, last).slug == "too-many"
 
 
 def test_so_many_may_be_few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtshcua.decision.session.MAX_REPLACEMENTS", 0)
-    receipt = take(flight(), sign_replacement(shorter(OF), over=OF.bundle, kept=2, key=MISSION_KEY))
+    receipt = take(flight(), sign_replacement(shorter(OF), over=OF.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY))
     assert (receipt.slug, receipt.text) == ("too-many", "one flight takes at most 0 replacements")

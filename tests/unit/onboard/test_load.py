@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.flat_case import BATTERY, INVOCATIONS, ISSUED, MISSION, POLICY, SIGNALS, H
-from reference.world import MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, loaded, sealed, try_load
+from reference.world import FLIGHT, MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, loaded, sealed, try_load
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_SLOTS
 from rtshcua.model.flat.situation import Now
@@ -22,6 +22,7 @@ def refusal(data: bytes, **changed: object) -> Refusal:
         "now": START,
         "mode": Mode.SOFTWARE,
         "session_key": SESSION_KEY,
+        "flight": FLIGHT,
         "peer_is_own_simulator": False,
     }
     result = load(data, **(arguments | changed))  # type: ignore[arg-type]
@@ -127,6 +128,7 @@ def test_a_bundle_may_be_loaded_before_it_was_issued() -> None:
             now=early,
             mode=Mode.SOFTWARE,
             session_key=SESSION_KEY,
+            flight=FLIGHT,
             peer_is_own_simulator=False,
         ),
         Loaded,

@@ -1,4 +1,4 @@
-"""Threat: CI checks a pull request whose author put modules beside the sources, for Python to import in place of its own.
+"""Threat: CI checks a pull request with modules beside the sources, which Python might import in place of its own.
 
 Nor may what CI runs be changed by who owns an action's tag, or use a token that it has no need of.
 """

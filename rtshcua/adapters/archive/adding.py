@@ -13,6 +13,7 @@ from rtshcua.adapters.archive.examine import Task, Workers, missing
 from rtshcua.adapters.archive.folder import Folder, Source
 from rtshcua.adapters.archive.index import forget_unfinished, ingest, lay_out, read_catalogue, write_catalogue
 from rtshcua.wire.keys import PUBLIC_BYTES, Duty, key_id
+from rtshcua.wire.untrusted import Untrusted
 
 #: octets of logs that are taken in at once: what a crash has to be done again
 _BATCH = 256 << 20
@@ -88,7 +89,7 @@ def reindex(folder: Folder, check: Check) -> Iterator[Done]:
     with folder.writing():
         try:
             old = read_catalogue(folder)
-        except duckdb.Error:
+        except (duckdb.Error, Untrusted):
             old = {}
         for part in folder.parts():
             part.unlink()

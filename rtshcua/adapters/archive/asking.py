@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import duckdb
 
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
-from rtshcua.adapters.archive.index import quoted
+from rtshcua.adapters.archive.index import is_digest, misleading, quoted
 from rtshcua.wire.untrusted import Untrusted
 
 #: what an archive holds, by status of its logs
@@ -114,6 +114,8 @@ class Asker:
             raise Untrusted("no-archive", f"`{folder.path}` is an archive that nothing was ever added to")
         engine.execute(f"CREATE VIEW logs AS SELECT * FROM read_parquet({quoted(folder.catalogue)})")
         parts = engine.execute("SELECT DISTINCT part FROM logs WHERE part <> '' ORDER BY part").fetchall()
+        if not all(is_digest(part, 32) for (part,) in parts):
+            raise misleading(folder)
         for table in TABLES:
             files = ", ".join(
                 quoted(folder.table(table) / f"{part}.parquet") for part in (NOTHING, *(p for (p,) in parts))

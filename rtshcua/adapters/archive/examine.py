@@ -54,7 +54,7 @@ def examine(task: Task) -> Examined:
         if isinstance(record, Effect) and record.event == "replacement":
             replacements.append(record)
 
-    with open_regular(task.path) as file:
+    with open_regular(task.path, task.path.parents[3]) as file:  # the archive's folder: see `Folder`
         found = file_digest(file, "sha256").hexdigest()
         if found != entry.log:
             text = "the file in the archive is not the one that was taken in: it was changed where it lies"

@@ -9,16 +9,18 @@
 The logs are what is kept; the index is worked out from them and can be thrown away.
 """
 
+import errno
 import json
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
 
-from rtshcua.adapters.files.logs import ANCHORS, anchors_path
+from rtshcua.adapters.files.logs import ANCHORS, START, anchors_path
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
 from rtshcua.adapters.store.writing import (
@@ -32,6 +34,7 @@ from rtshcua.adapters.store.writing import (
     replace,
     write_new,
 )
+from rtshcua.evidence.witnessing.anchors import notes
 from rtshcua.wire.untrusted import Untrusted
 
 FORMAT, VERSION = "rtshcua/archive", 1
@@ -65,9 +68,10 @@ class Folder:
         if make and not (self.path / _MARK).exists():
             self._make()
         self._check(path)
+        self._expect_plain()
         if make:
             for folder in (self.path / "logs", self.scratch, *map(self.table, TABLES)):
-                make_folder(folder)
+                make_folder(folder, root=self.path)
 
     def _make(self) -> None:
         if self.path.exists() and not all(path.name.startswith(UNFINISHED) for path in self.path.iterdir()):
@@ -82,6 +86,19 @@ class Folder:
             raise Untrusted("no-archive", f"`{given}` is not an archive") from None
         if said != {"format": FORMAT, "version": VERSION}:
             raise Untrusted("archive-version", f"`{given}` is an archive of another version than {VERSION}")
+
+    def _expect_plain(self) -> None:
+        """An archive may be anybody's. Nothing in its folders leads out of it, or would be waited for; those of logs
+        are not looked at here, for no link is followed to a log.
+        """
+        index = self.catalogue.parent
+        for folder in (self.path, self.scratch, index, *map(self.table, TABLES)):
+            with suppress(FileNotFoundError), os.scandir(folder) as found:
+                for each in found:
+                    if not (each.is_dir(follow_symlinks=False) or each.is_file(follow_symlinks=False)):
+                        name = Path(each.path).relative_to(self.path)
+                        text = f"`{name}` in the archive `{self.path}` is neither a file nor a folder"
+                        raise Untrusted("archive-path", text)
 
     @property
     def catalogue(self) -> Path:
@@ -126,17 +143,17 @@ class Folder:
         """
         scratch = self.scratch / f"{os.getpid()}.taken"
         try:
-            with (
-                open_regular(*source) as reader,
-                naming(self.path),
-                os.fdopen(open_new(scratch, mode=0o444), "wb") as writer,
-            ):
-                digest, size = _copy(reader, writer)
+            with open_regular(*source) as reader:
+                if not reader.peek(len(START)).startswith(START):
+                    raise NotRegular(errno.ENXIO, "it is not a log of this program", str(source.path))
+                mode = _mode(reader, 0o444)
+                with naming(self.path), os.fdopen(open_new(scratch, mode=mode), "wb") as writer:
+                    digest, size = _copy(reader, writer)
             place = self.log(digest)
-            new = not _holds(place, digest, size)  # a copy that was damaged since is replaced
+            new = not _holds(place, digest, size, self.path)  # a copy that was damaged since is replaced
             if new:
-                make_folder(place.parent)
-                publish(scratch, place)
+                make_folder(place.parent, root=self.path)
+                publish(scratch, place, self.path)
         finally:
             scratch.unlink(missing_ok=True)
         return digest, size, self._take_anchors(source, digest) or new
@@ -148,21 +165,28 @@ class Folder:
         new = False
         for path in found:
             try:
-                data = read_regular(path, _MOST_ANCHORS, root or path.parent)
+                with open_regular(path, root or path.parent) as file:
+                    data, mode = file.read(_MOST_ANCHORS + 1), _mode(file, PUBLIC_FILE)
             except (FileNotFoundError, NotRegular):
                 continue
-            if len(data) > _MOST_ANCHORS:
-                continue
+            if len(data) > _MOST_ANCHORS or not any(notes(data.decode("utf-8", "replace"))):
+                continue  # what is not of witnesses is nobody's to copy
             with suppress(FileExistsError):
-                write_new(self.log(digest).with_name(sha256(data).hexdigest() + ANCHORS), data)
+                copy = self.log(digest).with_name(sha256(data).hexdigest() + ANCHORS)
+                write_new(copy, data, mode=mode, root=self.path)
                 new = True
         return new
 
 
-def _holds(place: Path, digest: str, size: int) -> bool:
+def _mode(file: BinaryIO, most: int) -> int:
+    """Who may read the copy of a file: nobody who may not read the file itself."""
+    return stat.S_IMODE(os.fstat(file.fileno()).st_mode) & most | stat.S_IRUSR
+
+
+def _holds(place: Path, digest: str, size: int, root: Path) -> bool:
     """Whether a log lies there with these octets, and not only with this name."""
     try:
-        with open_regular(place) as file:
+        with open_regular(place, root) as file:
             return os.fstat(file.fileno()).st_size == size and file_digest(file, "sha256").hexdigest() == digest
     except OSError:
         return False

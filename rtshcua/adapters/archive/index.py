@@ -22,6 +22,7 @@ from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.writing import publish, replacing
 from rtshcua.evidence.reading import LONGEST
+from rtshcua.wire.untrusted import Untrusted
 
 #: what is read of a line, by its SQL type
 _FIELDS: Final = {
@@ -34,6 +35,7 @@ _FIELDS: Final = {
     "BIGINT[]": ("clause_at",),
 }  # fmt: skip
 _KINDS: Final = {name: kind for kind, names in _FIELDS.items() for name in names}
+_DIGITS: Final = frozenset("0123456789abcdef")
 _LOG: Final = "string_split(filename, '/')[-2]"
 _LONGEST_DETAIL: Final = 1_000  # characters; the log has the rest
 
@@ -61,13 +63,27 @@ _ROWS: Final = {
 
 
 def read_catalogue(folder: Folder) -> dict[str, Entry]:
-    """The rows by log."""
+    """The rows by log. Raises `Untrusted` (`archive-index`) where one would lead to what is not in the archive."""
     if not folder.catalogue.exists():
         return {}
     names = ", ".join(Entry.__struct_fields__)
     with duckdb.connect() as engine:
         rows = engine.execute(f"SELECT {names} FROM read_parquet(?)", [str(folder.catalogue)]).fetchall()
-    return {row[0]: Entry(*row) for row in rows}
+    entries = {row[0]: Entry(*row) for row in rows}
+    for each in entries.values():
+        if not (is_digest(each.log, 64) and (each.part == "" or is_digest(each.part, 32))):
+            raise misleading(folder)
+    return entries
+
+
+def is_digest(found: object, characters: int) -> bool:
+    """Whether a name that files are found by is one of ours: hexadecimal digits, so many."""
+    return isinstance(found, str) and len(found) == characters and set(found) <= _DIGITS
+
+
+def misleading(folder: Folder) -> Untrusted:
+    """Why an index is not gone by."""
+    return Untrusted("archive-index", f"the index of `{folder.path}` names files that are not its own")
 
 
 def write_catalogue(folder: Folder, entries: Iterable[Entry]) -> None:
@@ -76,7 +92,7 @@ def write_catalogue(folder: Folder, entries: Iterable[Entry]) -> None:
     with duckdb.connect() as engine:
         _load(engine, "logs", Entry, entries, folder.scratch)
         engine.execute(f"COPY (SELECT * FROM logs ORDER BY begun_us, log) TO {quoted(fresh)} (FORMAT parquet)")
-    publish(fresh, folder.catalogue)
+    publish(fresh, folder.catalogue, folder.path)
 
 
 def forget_unfinished(folder: Folder, entries: dict[str, Entry]) -> None:
@@ -126,7 +142,7 @@ def lay_out(folder: Folder) -> None:
 def _write(engine: duckdb.DuckDBPyConnection, folder: Folder, table: str, part: str) -> None:
     fresh = folder.scratch / f"{table}.parquet"
     engine.execute(f"COPY ({_ROWS[table]}) TO {quoted(fresh)} (FORMAT parquet, COMPRESSION zstd)")
-    publish(fresh, folder.table(table) / f"{part}.parquet")
+    publish(fresh, folder.table(table) / f"{part}.parquet", folder.path)
 
 
 def _read(engine: duckdb.DuckDBPyConnection, files: list[str]) -> None:
@@ -186,7 +202,7 @@ def _files(folder: Folder, sound: Sequence[Examined]) -> Iterator[list[str]]:
         if each.entry.finding == "tail/torn":
             copy = folder.scratch / each.entry.log / path.name
             copy.parent.mkdir()
-            with open_regular(path) as whole:
+            with open_regular(path, folder.path) as whole:
                 _write_lines(copy, (line for line in lines(whole) if line.endswith(b"\n")))
             copies.append(copy)
             path = copy

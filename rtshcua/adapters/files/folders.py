@@ -12,10 +12,10 @@ def data_folder() -> Path:
     return Path(chosen) if chosen else platformdirs.user_data_path("rtshcua", appauthor=False)
 
 
-def lint_secret_folder() -> Path:
-    """Where the secret is kept that guards what `lint` remembers."""
+def cache_folder() -> Path:
+    """The user's cache folder (on Linux below XDG_CACHE_HOME), for what may be deleted at any time."""
     chosen = os.environ.get("RTSHCUA_DATA_DIR")
-    return Path(chosen) if chosen else platformdirs.user_state_path("rtshcua", appauthor=False)
+    return Path(chosen) / "cache" if chosen else platformdirs.user_cache_path("rtshcua", appauthor=False)
 
 
 def state_folder() -> Path:

@@ -12,7 +12,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from rtshcua.adapters.store.reading import UNAWAITED, expect_regular, open_regular, opened_folder, read_regular
+from rtshcua.adapters.store.reading import (
+    UNAWAITED,
+    NotRegular,
+    expect_regular,
+    open_regular,
+    opened_folder,
+    read_regular,
+)
 
 #: modes, from which the umask takes away
 PRIVATE_FILE: Final = 0o600
@@ -122,13 +129,15 @@ def write_out(path: Path, data: bytes, *, mode: int = COMMON_FILE) -> None:
             replace(Path(os.path.realpath(path)), data, mode=mode)
 
 
-def publish(fresh: Path, place: Path) -> None:
-    """Gives a finished file its name, synced, in place of whatever was there. Raises OSError."""
-    with naming(place):
-        with open_regular(fresh) as file:
+def publish(fresh: Path, place: Path, root: Path | None = None) -> None:
+    """Gives a finished file its name, synced, in place of whatever was there. Below `root`, where one is given, no link
+    is followed. Raises OSError.
+    """
+    with naming(place), opened_folder(fresh.parent, root) as here, opened_folder(place.parent, root) as there:
+        with open_regular(fresh, root) as file:
             os.fsync(file.fileno())
-        fresh.replace(place)
-        sync_folder(place.parent)
+        os.replace(fresh.name, place.name, src_dir_fd=here, dst_dir_fd=there)
+        os.fsync(there)
 
 
 def open_new(path: Path, *, mode: int = PUBLIC_FILE) -> int:
@@ -171,12 +180,14 @@ def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, root: Path | 
 
 def append(path: Path, data: bytes, root: Path | None = None) -> None:
     """Puts data behind that of a regular file, which is made where there is none, and on the disk; no link is followed
-    to it, nor below `root`. Raises OSError.
+    to it, nor below `root`, and a file of several names, any of which may be elsewhere, is left alone. Raises OSError.
     """
     with naming(path), opened_folder(path.parent, root) as folder:
         handle = os.open(path.name, _MORE, PUBLIC_FILE, dir_fd=folder)
         expect_regular(handle, path)
         try:
+            if os.fstat(handle).st_nlink > 1:
+                raise NotRegular(errno.ENXIO, "it is the same file as one of another name")
             write_all(handle, data)
             sync_data(handle)
         finally:

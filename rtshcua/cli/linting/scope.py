@@ -5,8 +5,8 @@ from os.path import lexists, normpath
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.adapters.files.folders import lint_secret_folder
-from rtshcua.adapters.files.lint_cache import FOLDER, LintCache, lint_secret
+from rtshcua.adapters.files.folders import cache_folder
+from rtshcua.adapters.files.lint_cache import LintCache
 from rtshcua.adapters.files.project import Project, Projects
 from rtshcua.cli.asked import SOURCE, unfolded
 from rtshcua.cli.linting.options import Options
@@ -91,15 +91,13 @@ def _no_further(project: Project) -> Refusal | None:
 
 
 def _caches(files: Sequence[tuple[Path, Project]], *, fresh: bool) -> dict[Path, LintCache]:
-    """The cache of each file, one for each folder, where its configuration does not say that there is none."""
+    """The cache of each file, one for each project, where its configuration does not say that there is none."""
     opened: dict[Path, LintCache] = {}
     found: dict[Path, LintCache] = {}
-    secret = lint_secret(lint_secret_folder())
+    user = cache_folder()
     for path, project in files:
-        folder = project.settings.lint.cache
-        if folder != "":
-            place = project.root / (FOLDER if folder is None else folder)
-            if place not in opened:
-                opened[place] = LintCache(project.root, folder or FOLDER, secret, fresh=fresh)
-            found[path] = opened[place]
+        if project.settings.lint.cache:
+            if project.root not in opened:
+                opened[project.root] = LintCache(user, project.root, fresh=fresh)
+            found[path] = opened[project.root]
     return found

@@ -6,8 +6,7 @@ that would be accepted. `docs/linting.md` has all keys.
 
 import tomllib
 from dataclasses import dataclass
-from posixpath import normpath
-from typing import Any, Literal
+from typing import Literal
 
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.refusal import Refusal
@@ -33,15 +32,15 @@ class Ignored:
 
 @dataclass(frozen=True, slots=True)
 class LintSettings:
-    """`[lint]`: what is ignored, which files are left out, from which level on a run fails, further sources, the folder
-    of the cache (None: the one that is usual; an empty text: none), and whether the format is looked at.
+    """`[lint]`: what is ignored, which files are left out, from which level on a run fails, further sources, whether
+    what was found is remembered, and whether the format is looked at.
     """
 
     ignored: tuple[Ignored, ...] = ()
     exclude: tuple[str, ...] = ()
     fail_on: FailOn = "warning"
     further: tuple[str, ...] = ()
-    cache: str | None = None
+    cache: bool = True
     format: bool = False
 
 
@@ -115,7 +114,7 @@ def _lint(table: Table) -> LintSettings:
         table.texts("exclude"),
         table.one_of("fail-on", LEVELS, "warning"),
         table.texts("with"),
-        _cache(table),
+        table.flag("cache", default=True),
         table.flag("format", default=False),
     )
     table.close()
@@ -124,16 +123,6 @@ def _lint(table: Table) -> LintSettings:
 
 def _ignored(table: Table, pattern: str | None) -> list[Ignored]:
     return [Ignored(table.code(name), table.reason(name), pattern) for name in table.names()]
-
-
-def _cache(table: Table) -> str | None:
-    found: Any = table.any_of("cache", (str, bool), 'a folder, as in `".rtshcua_cache"`, or `false`')
-    if isinstance(found, bool):
-        return None if found else ""
-    if found and ("\0" in found or not normpath(found).replace("\\", "/").strip("./")):
-        help = 'accepted: a folder of its own, as in `".rtshcua_cache"`, or `false`'
-        raise NotSo("cache", f"`cache` in `[{table.name}]` is no folder that a cache can have to itself", help)
-    return found or None
 
 
 def _format(table: Table) -> FormatSettings:

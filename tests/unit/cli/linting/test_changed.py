@@ -20,7 +20,6 @@ def repository(here: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in [name for name in os.environ if name.startswith("GIT_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
-    put({".gitignore": ".rtshcua_cache/\n"})
     git("init")
     git("add", ".")
     git("commit", "-m", "first")

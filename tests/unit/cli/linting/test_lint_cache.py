@@ -1,17 +1,23 @@
 """The cache of `lint`: whatever is in it, whatever changed, the answer is that of a run without it."""
 
+import os
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 from random import Random
 
 import pytest
 
 from reference.lint_project import HABITS, MISSION, POLICY, UNUSED, Lint, put
+from rtshcua.adapters.files.folders import cache_folder
 from rtshcua.cli.linting import fresh
 from rtshcua.diagnostics.exits import ExitCode
 
-FOLDER = Path(".rtshcua_cache")
+
+def folder() -> Path:
+    """The user's cache of this program."""
+    return Path(os.environ["RTSHCUA_DATA_DIR"], "cache")
 
 
 @pytest.fixture
@@ -29,7 +35,8 @@ def examined(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def entries() -> list[Path]:
-    return sorted(path for path in (FOLDER / "2").iterdir() if not path.name.startswith("."))
+    (checkout,) = (folder() / "lint/3").iterdir()
+    return sorted(path for path in checkout.iterdir() if not path.name.startswith("."))
 
 
 def test_only_what_changed_is_examined_again(here: Path, lint: Lint, examined: list[str]) -> None:
@@ -81,8 +88,6 @@ def test_a_damaged_cache_is_no_cache(here: Path, lint: Lint, harm: str) -> None:
     elif harm == "swapped":
         data[:] = second.read_bytes()
     elif harm == "no entry":
-        from hashlib import sha256
-
         data[:] = sha256(b'{"mark": []}').hexdigest().encode() + b'\n{"mark": []}'
     if harm == "a folder":
         first.unlink()
@@ -104,21 +109,47 @@ def test_another_set_of_files_and_another_program_version(
 
 
 def test_where_it_cannot_be_written(here: Path, lint: Lint) -> None:
-    FOLDER.write_text("I am a file")
+    folder().write_text("I am a file")
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
-    assert FOLDER.read_text() == "I am a file"
+    assert folder().read_text() == "I am a file"
 
 
 def test_where_it_stands_and_what_it_says_of_itself(here: Path, lint: Lint) -> None:
+    before = sorted(here.rglob("*"))
     lint(".")
-    assert (FOLDER / ".gitignore").read_text() == "*\n"
-    assert (FOLDER / "CACHEDIR.TAG").read_text().startswith("Signature: 8a477f597d28d172789f06886806bc55")
-    put({"rtshcua.toml": 'lint.cache = "elsewhere/cache"'})
-    lint(".")
-    assert (here / "elsewhere" / "cache" / "2").is_dir()
-    put({"sub/rtshcua.toml": "lint.cache = false", "sub/three.rts": MISSION.replace('"policy', '"../policy')})
+    assert sorted(here.rglob("*")) == before
+    assert (folder() / "lint/CACHEDIR.TAG").read_text().startswith("Signature: 8a477f597d28d172789f06886806bc55")
+    put({"sub/rtshcua.toml": "", "sub/three.rts": MISSION.replace('"policy', '"../policy')})
     lint("sub")
-    assert not (here / "sub" / ".rtshcua_cache").exists()
+    assert len(list((folder() / "lint/3").iterdir())) == 2
+    put({"sub/rtshcua.toml": "lint.cache = false"})
+    for entry in (folder() / "lint/3").rglob("*"):
+        if entry.is_file():
+            entry.unlink()
+    lint("sub")
+    assert not any(entry.is_file() for entry in (folder() / "lint/3").rglob("*"))
+
+
+def test_it_is_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RTSHCUA_DATA_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "rtshcua"
+
+
+def test_a_cache_folder_that_is_relative_counts_for_nothing(
+    here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", "data")
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert not (here / "data").exists()
+
+
+def test_an_entry_in_the_place_of_another_is_none(here: Path, lint: Lint, examined: list[str]) -> None:
+    lint(".")
+    first, second = entries()[:2]
+    first.replace(second)
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert len(examined) == 4
 
 
 def test_runs_at_the_same_time_agree(here: Path) -> None:

@@ -12,7 +12,7 @@ ignore = { E1304 = "the letter  says 30 m" }
 exclude = ["drafts", "old/**"]
 fail-on = "error"
 with = ["site.rts"]
-cache = ".cache"
+cache = false
 [lint.per-file-ignore]
 "tests/*.rts" = { naming = "names of the register" }
 [format]
@@ -36,7 +36,7 @@ def test_all_keys() -> None:
         "error",
         ("site.rts",),
     )
-    assert (found.lint.cache, found.format.width, found.format.exclude) == (".cache", 100, ("generated.rts",))
+    assert (found.lint.cache, found.format.width, found.format.exclude) == (False, 100, ("generated.rts",))
     assert (found.test.fail_under, found.test.exclude) == (80, ("slow",))
 
 
@@ -46,7 +46,7 @@ def test_nothing_said_is_the_defaults() -> None:
     assert parse_settings("[tool.rtshcua]", "pyproject.toml", shared=True) == Settings()
     found = parse_settings("[tool.rtshcua.lint]\ncache = false", "pyproject.toml", shared=True)
     assert isinstance(found, Settings)
-    assert found.lint.cache == ""
+    assert found.lint.cache is False
 
 
 @rows(
@@ -69,7 +69,7 @@ def test_nothing_said_is_the_defaults() -> None:
         ("lint.exclude = [1.5]", "r.toml:1: `exclude` in `[lint]` has a number with a point in its list",
          "accepted: a list of texts"),
         ("lint.cache = 3", "r.toml:1: `cache` in `[lint]` is a whole number",
-         'accepted: a folder, as in `".rtshcua_cache"`, or `false`'),
+         "accepted: `true` or `false`"),
         ("lint.ignore = ['E1304']", "r.toml:1: `lint.ignore` is a list, and must be a table", None),
         ("[lint.ignore]\nE1304 = ' '", "r.toml:2: `E1304` in `[lint.ignore]` is ignored without a reason",
          'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),

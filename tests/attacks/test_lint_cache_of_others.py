@@ -1,0 +1,154 @@
+"""Threat: somebody else writes what `lint` remembers, or has it written where it has no business.
+
+A checkout, which may be a stranger's, holds no cache and cannot say where one is. In the user's cache folder nothing is
+believed that another user could have written.
+"""
+
+import json
+import os
+import shutil
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from reference.lint_project import HABITS, MISSION, POLICY, UNUSED, Lint, put
+from rtshcua.cli.app import main
+from rtshcua.cli.linting.examined import decoded
+from rtshcua.diagnostics.exits import ExitCode
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    place = tmp_path / "checkout"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    put({"policy.rts": POLICY, "one.rts": MISSION, "two.rts": MISSION})
+    return place
+
+
+@pytest.fixture
+def lint(capsys: pytest.CaptureFixture[str]) -> Lint:
+    def run(*words: str) -> tuple[int, list[tuple[str, str]]]:
+        code = main(["lint", *words, "--json"])
+        answered = json.loads(capsys.readouterr().out)
+        if "error" in answered:
+            return code, [(answered["error"]["slug"], answered["error"]["message"])]
+        return code, [(each["code"], (each["at"] or {"file": ""})["file"]) for each in answered["diagnostics"]]
+
+    return run
+
+
+def cache() -> Path:
+    return Path(os.environ["RTSHCUA_DATA_DIR"], "cache/lint/3")
+
+
+def entries() -> list[Path]:
+    (checkout,) = cache().iterdir()
+    return sorted(path for path in checkout.iterdir() if not path.name.startswith("."))
+
+
+def forge(result: object) -> int:
+    """Write another result into all entries, as whoever could write there would."""
+    for file in entries():
+        data = json.dumps(json.loads(file.read_bytes().partition(b"\n")[2]) | {"result": result}).encode()
+        file.write_bytes(sha256(data).hexdigest().encode() + b"\n" + data)
+    return len(entries())
+
+
+@pytest.mark.parametrize("folder", ["/abs", "../sibling", "inside", ".", "true"])
+def test_no_configuration_says_where_it_lies(here: Path, lint: Lint, folder: str, tmp_path: Path) -> None:
+    put({"rtshcua.toml": f'lint.cache = "{folder.replace("/abs", str(tmp_path / "abs"))}"'})
+    before = sorted(tmp_path.rglob("*"))
+    code, found = lint(".")
+    assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
+    assert "`cache` in `[lint]` is a text" in found[0][1]
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_cache_in_a_checkout_is_not_looked_at(here: Path, lint: Lint) -> None:
+    lint(".")
+    assert forge([[], []]) == 3
+    assert lint(".") == (ExitCode.OK, [])  # so it would be, if it were
+    shutil.copytree(cache().parents[1], here / ".rtshcua_cache")
+    shutil.copytree(cache(), here / ".rtshcua_cache/2")
+    shutil.rmtree(cache())
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+
+
+@pytest.mark.parametrize("above", [0, 1, 2, 3])
+def test_what_others_could_have_written_is_not_believed(here: Path, lint: Lint, above: int) -> None:
+    lint(".")
+    forge([[], []])
+    place = entries()[0].parent
+    for _ in range(above):
+        place = place.parent
+    place.chmod(0o777)
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+
+
+@pytest.mark.parametrize("above", [0, 1, 2])
+def test_no_link_is_followed_below_it(here: Path, lint: Lint, above: int, tmp_path: Path) -> None:
+    lint(".")
+    forge([[], []])
+    place = entries()[0].parent
+    for _ in range(above):
+        place = place.parent
+    place.rename(tmp_path / "elsewhere")
+    place.symlink_to(tmp_path / "elsewhere")
+    before = sorted(tmp_path.rglob("*"))
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_link_or_a_pipe_in_the_place_of_an_entry_is_none(here: Path, lint: Lint, tmp_path: Path) -> None:
+    lint(".")
+    forge([[], []])
+    first, second, third = entries()
+    for each in (first, third):
+        each.rename(tmp_path / each.name)
+        each.symlink_to(tmp_path / each.name)
+    second.unlink()
+    os.mkfifo(second)
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+    assert all(each.is_file() and not each.is_symlink() for each in entries())
+
+
+def test_fixes_are_of_a_fresh_examination_alone(here: Path, lint: Lint) -> None:
+    lint(".")
+    start = POLICY.index("by role operator through agent when")
+    fix = [["policy.rts", start, start + 39], "by any when", "do it", "safe"]
+    forge([[], [["E1305", "x", ["policy.rts", start, start + 1], None, [], [fix], None]]])
+    assert lint(".", "--fix") == (ExitCode.DIAGNOSTICS, [HABITS[0], HABITS[2]])
+    assert Path("policy.rts").read_text() == POLICY.replace(f"{UNUSED}\n", "")
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        ["E1303", 1, ["policy.rts", "a", "b"], None, [], [], None],
+        ["E1303", "x", ["/etc/passwd", 0, 5], None, [], [], None],
+        ["E1303", "x", ["policy.rts", 0, 1 << 40], None, [], [], None],
+        ["E1303", "x", ["policy.rts", 0, 1], None, [[["/etc/passwd", 0, 5], "here"]], [], None],
+        ["E1303", "x", ["policy.rts", 0, 1], None, [], [[["/etc/passwd", 0, 5], "", "x", "safe"]], None],
+    ],
+)  # fmt: skip
+def test_what_is_remembered_is_about_what_was_read(here: Path, lint: Lint, found: list[object]) -> None:
+    """Even of what we wrote, as an earlier fault of ours would."""
+    lint(".")
+    forge([[found], []])
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
+
+
+@pytest.mark.parametrize(
+    "harm", [{"members": 1}, {"members": [1]}, {"reads": []}, {"reads": {"a": 1}}, {"packs": {"a": 1}}, {"result": 1}]
+)
+def test_a_tree_of_another_shape_is_none(harm: dict[str, object]) -> None:
+    tree: dict[str, object] = {"mark": "m", "members": ["a"], "reads": {"a": "d"}, "packs": {}, "asked": {"a": None}}
+    tree["result"] = [[], []]
+
+    def held(tree: dict[str, object]) -> object:
+        return decoded(json.dumps(tree).encode(), "m", {"a": None}, lambda _: "d", lambda _: None, lambda _: 5)
+
+    assert held(tree) is not None
+    assert held(tree | harm) is None

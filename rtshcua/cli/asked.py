@@ -4,6 +4,7 @@ import os
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
+from rtshcua.adapters.store.checkout import checkout_of, lies_in
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.paths import shown
 
@@ -15,6 +16,10 @@ def unfolded(paths: Sequence[Path]) -> tuple[Path, ...] | Refusal:
     files: dict[str, Path] = {}
     for path in paths:
         below = sorted(_below(path)) if path.is_dir() else [path]
+        outside = next((each for each in below if each != path and each.is_symlink() and not _inside(each, path)), None)
+        if outside is not None:
+            message = f"`{outside}` is a symbolic link that leads out of `{path}` and its checkout"
+            return Refusal("outside", message, "name what it leads to, if you know what that is")
         if not below:
             return Refusal("no-source", f"there is no source ({SOURCE}) in `{path}`, nor below it")
         for each in below:
@@ -24,6 +29,11 @@ def unfolded(paths: Sequence[Path]) -> tuple[Path, ...] | Refusal:
         help = "write it first; the sources after it are its policy's"
         return Refusal("usage", "one specification (.json) is checked at a time", help)
     return tuple(files.values())
+
+
+def _inside(link: Path, folder: Path) -> bool:
+    edges = (str(folder), checkout_of(link) or str(folder))
+    return any(lies_in(os.path.realpath(link), os.path.realpath(edge)) for edge in edges)
 
 
 def roots(names: Sequence[str], members: Sequence[Collection[str]]) -> tuple[int, ...]:

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua import library
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.files.reach import Reach
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.pins import PROPOSED, Pins, policies_of
 from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.ground.elaborate.settings import parse_settings
-from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.language.paths import shown
 from rtshcua.mavlink import dialect
@@ -30,22 +29,26 @@ def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
     what it claims beyond `pins` is a finding.
     """
     first, shipped = paths[0], str(library.root())
+    reach = Reach(paths)
     rest = [str(path) for path in paths[1:]]
     if first.suffix.lower() == ".json":
         from rtshcua.ground.agent.specification import load_specification  # brings pydantic
 
-        program, specification = load_specification(str(first), rest, _read, shipped, _listing, _pack, pins)
+        program, specification = load_specification(
+            str(first), rest, reach.read, shipped, reach.listing, reach.pack, pins
+        )
         return Reading(program, specification.pointed)
-    return Reading(load([str(first), *rest], _read, shipped, _listing, packs=_pack), tuple)
+    return Reading(load([str(first), *rest], reach.read, shipped, reach.listing, packs=reach.pack), tuple)
 
 
 def read_text(name: str, text: str) -> Reading:
     """A source that is not written yet, as if it were in the file `name`, and all that it imports."""
+    reach = Reach([name])
 
     def read(path: str) -> bytes:
-        return text.encode("utf-8") if path == shown(name) else _read(path)
+        return text.encode("utf-8") if path == shown(name) else reach.read(path)
 
-    return Reading(load([name], read, str(library.root()), _listing, packs=_pack), tuple)
+    return Reading(load([name], read, str(library.root()), reach.listing, packs=reach.pack), tuple)
 
 
 def compile_sources(
@@ -84,18 +87,3 @@ def examine(reading: Reading) -> Checked:
     """Everything that is wrong with a program, and what its missions take at most."""
     checked = examine_program(reading.program, dialect.load())
     return replace(checked, diagnostics=reading.pointed(checked.diagnostics))
-
-
-def _read(path: str) -> bytes:
-    """At most one byte more than the parser takes, so that it is the parser who says that a file is too large."""
-    return read_regular(path, MAX_SIZE)
-
-
-def _listing(path: str) -> Iterable[str]:
-    return [each.name for each in Path(path or ".").iterdir()]
-
-
-def _pack(name: str) -> str | None:
-    from rtshcua.adapters.packs import folder  # looks at every installed package: only where one is asked for
-
-    return folder(name)

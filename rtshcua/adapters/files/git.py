@@ -6,8 +6,46 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-#: what in the environment, as that of a hook, says which repository is meant, whatever the folder
+#: what of git's environment serves whoever runs the command, and starts nothing; the rest says which repository is
+#: meant, whatever the folder, or names programs
+_KEPT = frozenset(
+    {
+        "GIT_CEILING_DIRECTORIES",
+        "GIT_DISCOVERY_ACROSS_FILESYSTEM",
+        "GIT_CONFIG_NOSYSTEM",
+        "GIT_CONFIG_GLOBAL",
+        "GIT_CONFIG_SYSTEM",
+    }
+)
+#: and of a hook's repository, where no other is found
 _TOLD = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_PREFIX", "GIT_COMMON_DIR", "GIT_OBJECT_DIRECTORY")
+#: The settings of a checkout may name programs. Whatever of them git would start to say what has changed is off.
+#: Filters are found by their names, and turned off one by one: see `_filters`.
+_OFF = {
+    "core.fsmonitor": "false",
+    "core.hooksPath": os.devnull,
+    "core.pager": "cat",
+    "core.sshCommand": "false",
+    "core.gitProxy": "false",
+    "core.askPass": "false",
+    "core.untrackedCache": "false",
+    "credential.helper": "",
+    "diff.external": "",
+    "diff.submodule": "short",
+    "protocol.allow": "never",
+    "submodule.recurse": "false",
+    "fetch.recurseSubmodules": "false",
+    "gc.auto": "0",
+    "maintenance.auto": "false",
+    "log.showSignature": "false",
+}
+_QUIET = {
+    "GIT_OPTIONAL_LOCKS": "0", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1", "GIT_NO_REPLACE_OBJECTS": "1",
+    "GIT_PAGER": "cat", "GIT_ASKPASS": "false", "LC_ALL": "C",
+}  # fmt: skip
+
+#: the settings of a filter, and what they are where there is none
+_NO_FILTER = {"required": "false"}
 
 #: an environment to ask git in
 _Around = tuple[tuple[str, str], ...]
@@ -61,7 +99,18 @@ def _names(top: str, around: _Around, base: str | None) -> list[str]:
     """The names of what differs in one repository; of a submodule its own."""
     since = "HEAD" if base is None else _merge_base(base, top, around)
     if _known(since, top, around):
-        words = ("diff", "--name-only", "--no-renames", "--ignore-submodules=none", "--no-relative", "-z", since, "--")
+        words = (
+            "diff",
+            "--no-ext-diff",
+            "--no-textconv",
+            "--name-only",
+            "--no-renames",
+            "--ignore-submodules=none",
+            "--no-relative",
+            "-z",
+            since,
+            "--",
+        )
         names = _git(*words, folder=top, around=around)
     else:  # before the first commit all files are new
         names = _git("ls-files", "-z", folder=top, around=around)
@@ -95,9 +144,25 @@ def _top(folder: str) -> tuple[str, _Around]:
     """The top of the repository that a folder lies in, and the environment to ask about it in."""
     above = [Path(folder), *Path(folder).parents]
     here = any((each / ".git").exists() for each in above)
-    around = tuple((name, value) for name, value in os.environ.items() if not here or name not in _TOLD)
+    kept = _KEPT if here else _KEPT.union(_TOLD)
+    around = tuple((name, value) for name, value in os.environ.items() if not name.startswith("GIT_") or name in kept)
     said = _git("rev-parse", "--show-toplevel", folder=folder, around=around)
+    around = (*around, *_filters(folder, around))
     return os.path.realpath(os.fsdecode(said.removesuffix(b"\n"))), around
+
+
+def _filters(folder: str, around: _Around) -> _Around:
+    """Turns off what a repository's settings have contents pass through, as settings in the environment."""
+    try:
+        named = _git("config", "--null", "--name-only", "--get-regexp", r"^filter\..*", folder=folder, around=around)
+    except NoChanges:  # there are none
+        return ()
+    off = [(os.fsdecode(name), _NO_FILTER.get(os.fsdecode(name).rpartition(".")[2], "")) for name in named.split(b"\0")]
+    off = [(name, value) for name, value in off if name]
+    numbered = [(number, *each) for number, each in enumerate(off)]
+    keys = [(f"GIT_CONFIG_KEY_{number}", name) for number, name, _ in numbered]
+    values = [(f"GIT_CONFIG_VALUE_{number}", value) for number, _, value in numbered]
+    return (("GIT_CONFIG_COUNT", str(len(off))), *keys, *values)
 
 
 def _is_below(place: str, folders: tuple[str, ...]) -> bool:
@@ -125,9 +190,11 @@ def _known(name: str, top: str, around: _Around) -> bool:
 
 
 def _git(*words: str, folder: str, around: _Around) -> bytes:
-    command = ["git", "-C", folder, *words]
+    settings = [word for name, value in _OFF.items() for word in ("-c", f"{name}={value}")]
+    command = ["git", *settings, "-C", folder, *words]
+    env = {**dict(around), **_QUIET}
     try:
-        done = subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL, env=dict(around))
+        done = subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL, env=env)
     except FileNotFoundError:
         raise NoChanges("there is no `git` here to ask what has changed", "install it, or name the files") from None
     except OSError as error:
@@ -135,6 +202,11 @@ def _git(*words: str, folder: str, around: _Around) -> bytes:
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         words_ = said[-1].removeprefix("fatal: ") if said else "it gave no reason"
+        if "dubious ownership" in done.stderr.decode(errors="replace"):
+            raise NoChanges(
+                f"`{folder}` is in a git repository that belongs to somebody else, and git does not look into it",
+                "name the files instead; git's setting `safe.directory` is for repositories that you trust",
+            )
         if "not a git repository" in words_:
             raise NoChanges(
                 f"`{folder}` is in no git repository, so it cannot be said what has changed",

@@ -6,10 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
-from rtshcua.adapters.packs import folder
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.files.reach import Reach
 from rtshcua.ground.editor.desk import Desk
-from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.paths import shown
 
 SOURCE = ".rts"
@@ -18,19 +16,9 @@ MOST = 2_000
 _DRIVE = re.compile(r"/[A-Za-z]:(?=/|\Z)")
 
 
-def desk(library: str) -> Desk:
-    """An empty desk over the disk."""
-    return Desk(read, library, listing, folder)
-
-
-def read(path: str) -> bytes:
-    """At most one byte more than the parser takes, so that it is the parser who says that a file is too large."""
-    return read_regular(path, MAX_SIZE)
-
-
-def listing(path: str) -> Iterable[str]:
-    """The names in a folder."""
-    return [each.name for each in Path(path or ".").iterdir()]
+def desk(library: str, reach: Reach) -> Desk:
+    """An empty desk over what may be read of the disk."""
+    return Desk(reach.read, library, reach.listing, reach.pack)
 
 
 def sources(folders: Iterable[str]) -> Iterator[str]:

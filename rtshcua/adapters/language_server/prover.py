@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rtshcua.adapters.files.project import Project, Projects
+from rtshcua.adapters.files.reach import Reach
 from rtshcua.adapters.language_server.disk import desk
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.compiler.program import examine_program
@@ -40,8 +41,9 @@ TRIES = 2
 
 log = logging.getLogger("rtshcua.lsp")
 
-Job = tuple[str, dict[str, str]]
-"""The name of a source, and the texts that are open in the editor. Plain, so that it is the same on both ends."""
+Job = tuple[str, dict[str, str], tuple[str, ...]]
+"""The name of a source, the texts that are open in the editor, and the folders that imports may lead to. Plain, so
+that it is the same on both ends."""
 Found = tuple[Diagnostic, ...] | None
 
 
@@ -51,8 +53,10 @@ def main(library: str) -> None:
     os.dup2(2, 1)  # whatever prints must not reach the messages
     os.nice(5)  # a keystroke that is answered meanwhile goes first
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    known = desk(library)
+    reach = Reach()
+    known = desk(library, reach)
     while (job := _take(incoming)) is not None:
+        reach.folders = list(job[2])
         try:
             found: Found = examined(known, job)
         except Exception:
@@ -64,7 +68,7 @@ def main(library: str) -> None:
 
 def examined(known: Desk, job: Job) -> tuple[Diagnostic, ...]:
     """Everything that `rtshcua lint` finds in a program, for its first file the habits too."""
-    asked, texts = job
+    asked, texts, _ = job
     for name in [each for each in known.open if each not in texts]:
         known.close(name)
     for name, text in texts.items():
@@ -139,11 +143,13 @@ class Proving:
         self._process: asyncio.subprocess.Process | None = None
         self._killed: list[asyncio.subprocess.Process] = []
 
-    def ask(self, name: str, texts: Mapping[str, str], done: Callable[[Found], None]) -> None:
-        """Has the program of `name` checked; `done` gets what was found, None where the check failed. A later question
-        about the same takes the place of this one, if it still waits.
+    def ask(
+        self, name: str, texts: Mapping[str, str], done: Callable[[Found], None], folders: tuple[str, ...] = ()
+    ) -> None:
+        """Has the program of `name` checked, with what lies in `folders`; `done` gets what was found, None where the
+        check failed. A later question about the same takes the place of this one, if it still waits.
         """
-        self._waiting[name] = ((name, dict(texts)), done)
+        self._waiting[name] = ((name, dict(texts), folders), done)
         self._newer.set()
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._work())

@@ -209,7 +209,7 @@ def _lifecycle(server: LanguageServer, session: Session) -> None:
     def initialize(params: lsp.InitializeParams) -> None:
         session.encoding = Encoding(server.workspace.position_encoding or "utf-16")
         folders = [each.uri for each in params.workspace_folders or ()] or [params.root_uri or ""]
-        session.folders = [path for uri in folders if (path := path_of(uri)) is not None]
+        session.look_in([path for uri in folders if (path := path_of(uri)) is not None])
         edit = params.capabilities.workspace and params.capabilities.workspace.workspace_edit
         session.versioned = bool(edit and edit.document_changes)
 
@@ -224,7 +224,7 @@ def _lifecycle(server: LanguageServer, session: Session) -> None:
     def folders(params: lsp.DidChangeWorkspaceFoldersParams) -> None:
         gone = {path_of(each.uri) for each in params.event.removed}
         added = [path for each in params.event.added if (path := path_of(each.uri)) is not None]
-        session.folders = [*(each for each in session.folders if each not in gone), *added]
+        session.look_in([*(each for each in session.folders if each not in gone), *added])
 
     server.feature(lsp.INITIALIZE)(initialize)
     server.feature(lsp.INITIALIZED)(initialized)

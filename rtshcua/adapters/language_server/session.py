@@ -8,11 +8,13 @@ over a newer one, but for one case: where only comments and blanks changed, all 
 import asyncio
 import gc
 import logging
+import os
 from collections.abc import Callable
 
 from lsprotocol import types as lsp
 
-from rtshcua.adapters.language_server.disk import desk, name_of
+from rtshcua.adapters.files.reach import Reach
+from rtshcua.adapters.language_server.disk import desk, name_of, path_of
 from rtshcua.adapters.language_server.prover import Found, Proving
 from rtshcua.adapters.language_server.searching import Searching
 from rtshcua.adapters.language_server.texts import Opened, Texts, diagnostic
@@ -41,7 +43,8 @@ class Session(Texts):
         tell: Callable[[lsp.PublishDiagnosticsParams], None],
         say: Callable[[str], None] = log.warning,
     ) -> None:
-        super().__init__(desk(library), library, dialect.load())
+        self._reach = Reach()
+        super().__init__(desk(library, self._reach), library, dialect.load())
         self._tell = tell
         self._proving = Proving(library, say)
         self.searching = Searching()
@@ -60,9 +63,16 @@ class Session(Texts):
 
     # ------------------------------------------------------------------------------------------ what is open
 
+    def look_in(self, folders: list[str]) -> None:
+        """The workspace is these folders: imports lead to no others."""
+        self.folders = folders
+        self._reach.folders = [os.path.realpath(each) for each in folders]
+
     def open(self, uri: str, version: int, text: str) -> None:
-        """A text was opened."""
+        """A text was opened. Where there is no workspace, its project is one."""
         name = name_of(uri)
+        if not self.folders and path_of(uri) is not None:
+            self._reach.ask(name)
         self.opened[name] = Opened(uri, version, Lines(text, self.encoding))
         self.desk.put(name, text)
         self.desk.forget()
@@ -143,7 +153,7 @@ class Session(Texts):
         texts = {name: opened.lines.text for name, opened in self.opened.items()}
         for name, opened in self.opened.items():
             if opened.whole_stamp != opened.stamp:
-                self._proving.ask(name, texts, self._taker(name, opened.stamp))
+                self._proving.ask(name, texts, self._taker(name, opened.stamp), self._reach.edges)
 
     def _taker(self, name: str, stamp: int) -> Callable[[Found], None]:
         def take(found: Found) -> None:

@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
+from rtshcua.adapters.store.checkout import expect_inside
 from rtshcua.adapters.store.reading import (
     UNAWAITED,
     NotRegular,
@@ -101,11 +102,11 @@ def rewrite(path: Path, before: bytes, data: bytes) -> None:
     """Puts `data` where `before` was. A symbolic link stays one, a hard link is parted from the others. Permissions
     stay, and owner and group where we may.
 
-    Raises NotWritten where nobody may write to the file or its folder, Changed where it no longer says `before`, and
-    OSError for what else the system refuses.
+    Raises NotWritten where nobody may write to the file or its folder, or links lead out of its checkout, Changed where
+    it no longer says `before`, and OSError for what else the system refuses.
     """
-    real = Path(os.path.realpath(path))
     with naming(path):
+        real = expect_inside(path)
         known = real.stat()
         if not known.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH) or not os.access(real, os.W_OK):
             raise PermissionError(errno.EACCES, "the file is read-only")
@@ -119,14 +120,15 @@ def rewrite(path: Path, before: bytes, data: bytes) -> None:
 
 
 def write_out(path: Path, data: bytes, *, mode: int = COMMON_FILE) -> None:
-    """Puts what somebody asked for into the file that they named, in one step, where a link leads too; but for what is
-    no file to be replaced, it is written to: `/dev/stdout`, even where that leads to a file.
+    """Puts what somebody asked for into the file that they named, in one step, where a link leads too, unless it leads
+    out of their checkout; but for what is no file to be replaced, it is written to: `/dev/stdout`, even where that
+    leads to a file. Raises NotWritten, and OSError.
     """
     with naming(path):
         if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
             path.write_bytes(data)
         else:
-            replace(Path(os.path.realpath(path)), data, mode=mode)
+            replace(expect_inside(path), data, mode=mode)
 
 
 def publish(fresh: Path, place: Path, root: Path | None = None) -> None:

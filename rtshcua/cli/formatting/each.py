@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.files.reach import Reach
 from rtshcua.adapters.store.writing import rewrite
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
@@ -39,7 +39,7 @@ class Laid:
 def of_file(path: Path, width: int, *, write: bool) -> Laid:
     """Lays a file out, and replaces it if that is asked for and it changes."""
     try:
-        data = read_regular(path, MAX_SIZE)
+        data = Reach([path]).read(str(path))
     except OSError as error:
         from rtshcua.ground.language.faults import unreadable  # with the model, for which the usual case has no need
 

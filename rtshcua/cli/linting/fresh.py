@@ -39,7 +39,7 @@ class Fresh:
         if found is None:
             reads = _Reads(self._session)
             names = [str(path), *map(str, further)]
-            program = load(names, reads.read, str(library.root()), listing, packs=reads.folder)
+            program = load(names, reads.read, str(library.root()), self._session.listing, packs=reads.folder)
             found = self._programs[path] = program, reads
         return found
 
@@ -74,7 +74,9 @@ def examine_specification(
 
     reads = _Reads(session)
     rest = [str(path) for path in (*files[1:], *further)]
-    program, read = load_specification(str(files[0]), rest, reads.read, str(library.root()), listing, reads.folder)
+    program, read = load_specification(
+        str(files[0]), rest, reads.read, str(library.root()), session.listing, reads.folder
+    )
     return reads.examined(program, asked, _result(program, asked, read.pointed))
 
 
@@ -103,8 +105,3 @@ def _layouts(program: Program, asked: Mapping[str, int | None]) -> Iterator[Diag
             found = None if text is None else not_formatted(source, text)
             if found is not None:
                 yield found
-
-
-def listing(path: str) -> Iterable[str]:
-    """The names in a folder, for suggestions."""
-    return [each.name for each in Path(path or ".").iterdir()]

@@ -38,7 +38,7 @@ def run(options: Options) -> ExitCode:
     about = scope(options)
     if isinstance(about, Refusal):
         return findings.end(about)
-    session = Session()
+    session = Session([*about.files, *(each for further in about.further.values() for each in further)])
     changed: Changes | None = None
     if options.changed or options.base is not None:
         try:

@@ -1,5 +1,6 @@
 """Which files a run is about, and the configuration of each."""
 
+import os
 from collections.abc import Mapping, Sequence
 from os.path import lexists, normpath
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import NamedTuple
 from rtshcua.adapters.files.folders import cache_folder
 from rtshcua.adapters.files.lint_cache import LintCache
 from rtshcua.adapters.files.project import Project, Projects
+from rtshcua.adapters.store.checkout import checkout_of, lies_in
 from rtshcua.cli.asked import SOURCE, unfolded
 from rtshcua.cli.linting.options import Options
 from rtshcua.diagnostics.refusal import Refusal
@@ -83,6 +85,10 @@ def _further(project: Project) -> tuple[Path, ...]:
 def _no_further(project: Project) -> Refusal | None:
     """The first further source of a configuration that is no file, as a fault of the configuration."""
     for name, place in zip(project.settings.lint.further, _further(project), strict=True):
+        edge = os.path.realpath(checkout_of(project.file or project.root) or project.root)
+        if not lies_in(os.path.realpath(place), edge):
+            help = "`--with` on the command line takes any source"
+            return misconfigured(shown(str(project.file)), f"`{name}` in `with` lies outside of the project", help)
         if not place.is_file():
             what = "is a folder" if place.is_dir() else "is no file" if lexists(place) else "is not there"
             help = "accepted: a list of sources (.rts)"

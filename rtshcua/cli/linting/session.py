@@ -4,29 +4,27 @@ Nothing here imports a parser: `fresh` does, and is imported where something mus
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from rtshcua import library
 from rtshcua.adapters.files.lint_cache import LintCache
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.files.reach import Reach
 from rtshcua.cli.asked import SPECIFICATION, roots
 from rtshcua.cli.linting.examined import Examined, decoded, encoded
 from rtshcua.cli.linting.mark import mark
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.paths import shown
 
 
 class Session:
     """Files as they were first read, or as they are to be (`put`), and what was found in their programs."""
 
-    def __init__(self) -> None:
+    def __init__(self, asked: Iterable[Path] = ()) -> None:
+        self._reach = Reach(asked)
         self._data: dict[str, bytes | OSError | ValueError] = {}
         self._digests: dict[str, str | None] = {}
         self._sources: dict[str, Source] = {}
-        self._folders: dict[str, str | None] = {}
         self._mark: str | None = None
 
     @property
@@ -39,7 +37,7 @@ class Session:
         found = self._data.get(name)
         if found is None:
             try:
-                found = read_regular(name, MAX_SIZE)
+                found = self._reach.read(name)
             except (OSError, ValueError) as error:
                 found = error
             self._data[name] = found
@@ -64,11 +62,11 @@ class Session:
 
     def folder(self, pack: str) -> str | None:
         """The folder of an installed pack."""
-        if pack not in self._folders:
-            from rtshcua.adapters.packs import folder  # looks at every installed package
+        return self._reach.pack(pack)
 
-            self._folders[pack] = str(library.root()) if pack == "lib" else folder(pack)
-        return self._folders[pack]
+    def listing(self, name: str) -> list[str]:
+        """The names in a folder, for suggestions. Raises OSError."""
+        return self._reach.listing(name)
 
     def sources(self, names: Sequence[str]) -> dict[str, Source]:
         """The texts of files; what cannot be had, or is no text, is left out or made as legible as it can be."""

@@ -34,11 +34,19 @@ def not_portable(by: Wanted) -> Diagnostic:
     )
 
 
+def no_source(by: Wanted) -> Diagnostic:
+    """A path to what is no source, or no GeoJSON, by its name: it is not read, and so nothing of it is shown."""
+    if isinstance(by, Import):
+        return Diagnostic(IMPORT_PATH, f"`{by.path}` is not a source, by its name", by.span, "sources end in `.rts`")
+    help = "accepted: names that end in `.geojson` or `.json`"
+    return Diagnostic(IMPORT_PATH, f"`{by.path}` is not GeoJSON, by its name", by.span, help)
+
+
 def unreadable(name: str, by: Wanted | None, error: OSError | ValueError, near: str | None) -> Diagnostic:
     """A file that cannot be read; `near` is the name beside it that was probably meant."""
     written = name if by is None else by.path
     strerror = error.strerror if isinstance(error, OSError) else str(error)
-    why = "there is no such file" if is_missing(error) else (strerror or "it is unreadable").lower()
+    why = "there is no such file" if is_missing(error) else _lowered(strerror or "it is unreadable")
     looked = None if written == name else f"looked for it at `{name}`"
     fixes: tuple[Fix, ...] = ()
     help = looked
@@ -48,6 +56,10 @@ def unreadable(name: str, by: Wanted | None, error: OSError | ValueError, near: 
         fixes = () if by is None else (_fix(by, meant),)
     span = None if by is None else by.span
     return Diagnostic(NO_SUCH_FILE, f"cannot read `{written}`: {why}", span, help, fixes=fixes)
+
+
+def _lowered(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def is_missing(error: OSError | ValueError) -> bool:

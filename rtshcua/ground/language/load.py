@@ -19,6 +19,7 @@ from rtshcua.ground.language.faults import (
     Wanted,
     data_not_text,
     is_missing,
+    no_source,
     not_portable,
     not_text,
     too_large,
@@ -28,6 +29,9 @@ from rtshcua.ground.language.parse import Parsed, parse
 from rtshcua.ground.language.paths import LIBRARY, Packs, imported, shown, stable
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import, Unit
+
+#: how the names of sources end, and of files that zones are read from: nothing else is read for an import
+_SOURCES, _DATA = (".rts",), (".geojson", ".json")
 
 Read = Callable[[str], bytes]
 Listing = Callable[[str], Iterable[str]]
@@ -193,6 +197,9 @@ class _Loader:
         path = imported(by.path, source, self._folder)
         if path is None:
             self.diagnostics.append(not_portable(by))
+        elif not path.lower().endswith(_SOURCES if isinstance(by, Import) else _DATA):
+            self.diagnostics.append(no_source(by))
+            return None
         return path
 
     def _folder(self, pack: str) -> str | None:

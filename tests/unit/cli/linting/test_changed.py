@@ -120,6 +120,8 @@ def test_outside_of_any_repository(
     Path("one.rts").symlink_to(outside / "policy.rts")  # what nobody can tell of is linted
     git("add", ".")
     git("commit", "-m", "second")
+    assert lint("one.rts", "--changed")[1] == [("E0108", "")]
+    monkeypatch.setenv("RTSHCUA_IMPORTS", str(outside))
     assert lint("one.rts", "--changed")[1] == [("E1305", "one.rts")]
 
 

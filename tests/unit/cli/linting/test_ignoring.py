@@ -72,7 +72,7 @@ def test_by_configuration(here: Path, lint: Lint) -> None:
 def test_by_a_configuration_that_others_share(here: Path, lint: Lint) -> None:
     put({"pyproject.toml": '[tool.rtshcua.lint.ignore]\nE1302 = "the register gives the names"'})
     assert lint(".") == (ExitCode.DIAGNOSTICS, [("E1305", "policy.rts")])
-    put({"sub/rtshcua.toml": "", "sub/three.rts": MISSION.replace("policy.rts", "../policy.rts")})
+    put({".git/HEAD": "", "sub/rtshcua.toml": "", "sub/three.rts": MISSION.replace("policy.rts", "../policy.rts")})
     assert lint("sub") == (ExitCode.DIAGNOSTICS, [("E1302", "sub/three.rts")])
 
 

@@ -1,6 +1,7 @@
 """`rtshcua lint`: what it finds, in which form it says so, and how it ends."""
 
 import json
+import os
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -131,11 +132,15 @@ def test_a_report_goes_where_a_link_leads(here: Path) -> None:
         assert Path("reports/real.txt").read_text().startswith("warning[E1302]")
 
 
-@pytest.mark.parametrize(("further", "said"), [(".", "is a folder"), ("/dev/zero", "is no file"), ("x.rts", "is not")])
+@pytest.mark.parametrize(
+    ("further", "said"),
+    [(".", "is a folder"), ("/dev/zero", "lies outside"), ("pipe", "is no file"), ("x.rts", "is not")],
+)
 def test_a_further_source_that_is_none_is_the_fault_of_the_configuration(
     here: Path, lint: Lint, further: str, said: str
 ) -> None:
     put({"rtshcua.toml": f'[lint]\nwith = ["{further}"]'})
+    os.mkfifo("pipe")
     code, found = lint(".")
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
     assert found[0][1].startswith(f"rtshcua.toml: `{further}` in `with`")

@@ -1,0 +1,84 @@
+"""Which files sources may be read from: what was asked for, its project, the library, packs, and what the user allows.
+
+An import may be a stranger's. What it names outside of these is not opened, nor is said whether it is there.
+"""
+
+import os
+from collections.abc import Iterable
+from errno import EACCES
+from pathlib import Path
+from typing import Final
+
+from rtshcua import library
+from rtshcua.adapters.store.checkout import Outside, checkout_of, lies_in
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.ground.language.size import MAX_SIZE
+
+#: folders that imports may lead to besides, parted as in PATH: the user's to say, and no checkout's
+ALLOWED: Final = "RTSHCUA_IMPORTS"
+_WHY: Final = f"it lies outside of the project (`{ALLOWED}` names further folders)"
+
+
+class Reach:
+    """Folders, and files that were asked for themselves. `folders` may be changed at any time."""
+
+    def __init__(self, asked: Iterable[str | Path] = (), folders: Iterable[str | Path] = ()) -> None:
+        allowed = [each for each in os.environ.get(ALLOWED, "").split(os.pathsep) if os.path.isabs(each)]  # noqa: PTH117
+        self._always = {os.path.realpath(each): None for each in (str(library.root()), *allowed)}
+        self.folders = [os.path.realpath(each) for each in folders]
+        self._edges: dict[str, str | None] = {}
+        self._asked: set[str] = set()
+        self._packs: dict[str, str | None] = {"lib": str(library.root())}
+        for path in asked:
+            self.ask(path)
+
+    def ask(self, path: str | Path) -> None:
+        """A file that somebody names on the command line, or opens: what is in its project may be read too; where it is
+        in none, what is in the working folder, or else in its own.
+        """
+        folder = os.path.dirname(os.path.abspath(path))  # noqa: PTH100, PTH120  without following links
+        if folder not in self._edges:
+            self._edges[folder] = checkout_of(path)
+        edge = self._edges[folder]
+        if edge is None:
+            self._asked.add(os.path.realpath(path))
+            here = os.getcwd()  # noqa: PTH109
+            edge = here if lies_in(folder, here) else folder
+        self._always.setdefault(os.path.realpath(edge))
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """All folders that may be read from."""
+        return (*self._always, *self.folders)
+
+    def read(self, name: str) -> bytes:
+        """At most one octet more than the parser takes, so that it is the parser who says that a file is too large.
+
+        Raises `Outside`, and OSError as `read_regular`.
+        """
+        real, edge = self._placed(name)
+        return read_regular(real, MAX_SIZE, edge)
+
+    def listing(self, name: str) -> list[str]:
+        """The names in a folder, for suggestions. Raises OSError."""
+        return os.listdir(self._placed(name or ".")[0])  # noqa: PTH208
+
+    def pack(self, name: str) -> str | None:
+        """The folder of an installed pack, from which may be read from then on; None where there is none."""
+        if name not in self._packs:
+            from rtshcua.adapters.packs import folder  # noqa: PLC0415  slow, and few sources ask for a pack
+
+            found = self._packs[name] = folder(name)
+            if found is not None:
+                self._always.setdefault(os.path.realpath(found))
+        return self._packs[name]
+
+    def _placed(self, name: str) -> tuple[Path, Path | None]:
+        """Where a name leads, free of links, and the folder below which it stays."""
+        real = os.path.realpath(name)
+        if real in self._asked:
+            return Path(real), None
+        for edge in self.edges:
+            if lies_in(real, edge):
+                return Path(real), Path(edge)
+        raise Outside(EACCES, _WHY, name)

@@ -1,0 +1,161 @@
+"""Threat: a checkout of a stranger has our tools read or write files outside of it, by imports, settings and links.
+
+What they read they would quote in their findings, which a stranger may read in the log of CI.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+from lsprotocol import types as lsp
+
+from rtshcua import library
+from rtshcua.adapters.language_server.session import Session
+from rtshcua.adapters.store.checkout import checkout_of
+from rtshcua.cli import app
+from rtshcua.diagnostics.exits import ExitCode
+
+SECRET = "TOKEN=hunter2 {"
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The checkout, in which somebody works; beside it are files of theirs."""
+    place = tmp_path / "checkout"
+    (place / ".git").mkdir(parents=True)
+    for name in ("mine.rts", "mine.geojson", ".env"):
+        (tmp_path / name).write_text(SECRET)
+        (place / name).write_text(SECRET)
+    monkeypatch.chdir(place)
+    return place
+
+
+def said(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+    code = app.main(words)
+    captured = capsys.readouterr()
+    return code, captured.out + captured.err
+
+
+@pytest.mark.parametrize("command", [["check"], ["lint", "--no-cache"], ["test"], ["docs", "--json"]], ids=" ".join)
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ('import "../mine.rts"\n', "E0108"),
+        ('import "../absent.rts"\n', "E0108"),
+        ('import ".env"\n', "E0109"),
+        ('import "mine.geojson"\n', "E0109"),
+        ('import "../../../../../../../proc/self/environ"\n', "E0109"),
+        ('import "link.rts"\n', "E0108"),
+        ('import "folder/mine.rts"\n', "E0108"),
+        ('zone yard from "../mine.geojson"\n', "E0108"),
+        ('zone yard from ".env"\n', "E0109"),
+        ('zone yard from "link.geojson"\n', "E0108"),
+    ],
+)
+def test_an_import_leads_to_no_file_of_others(
+    here: Path, command: list[str], text: str, code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "a.rts").write_text(text)
+    (here / "link.rts").symlink_to("../mine.rts")
+    (here / "link.geojson").symlink_to("/proc/self/environ")
+    (here / "folder").symlink_to("..")
+    ended, text = said([*command, "a.rts"], capsys)
+    assert ended != ExitCode.OK
+    assert code in text
+    assert "hunter2" not in text
+    assert "did you mean" not in text
+    if "../mine" in text or "../absent" in text:
+        assert "it lies outside of the project" in text
+
+
+def test_what_the_user_allows_is_imported(
+    here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "a.rts").write_text('import "../mine.rts"\n')
+    monkeypatch.setenv("RTSHCUA_IMPORTS", f"relative{os.pathsep}{tmp_path}")
+    assert "error[E0101]" in said(["check", "a.rts"], capsys)[1]
+    monkeypatch.delenv("RTSHCUA_IMPORTS")
+    assert "error[E0101]" in said(["check", "a.rts", "../mine.rts"], capsys)[1]  # its folder was named
+    assert "error[E0108]" in said(["check", "a.rts"], capsys)[1]
+
+
+@pytest.mark.parametrize("command", [["check"], ["lint"], ["test"], ["fmt"], ["docs"]], ids=" ".join)
+def test_a_link_in_a_folder_is_not_followed_out_of_it(
+    here: Path, command: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "mine.rts").write_text("zone  hunter2 {}\n")
+    for name in (".env", "mine.rts", "mine.geojson"):
+        (here / name).unlink()
+    (here / "link.rts").symlink_to("../mine.rts")
+    for folder in (".", str(here)):
+        code, text = said([*command, folder], capsys)
+        assert (code, "hunter2" in text) == (ExitCode.INPUT, False), text
+    assert (tmp_path / "mine.rts").read_text() == "zone  hunter2 {}\n"
+
+
+@pytest.mark.parametrize("words", [["fmt"], ["lint", "--fix"], ["check"]], ids=" ".join)
+def test_a_link_that_is_named_is_not_followed_out_of_the_checkout(
+    here: Path, words: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "mine.rts").write_text("zone  hunter2 {}\n")
+    (here / "link.rts").symlink_to("../mine.rts")
+    code, text = said([*words, "link.rts"], capsys)
+    assert code != ExitCode.OK
+    assert "hunter2" not in text
+    assert (tmp_path / "mine.rts").read_text() == "zone  hunter2 {}\n"
+
+
+@pytest.mark.parametrize("linked", ["out.xml", "reports"])
+@pytest.mark.parametrize("marked", [True, False])
+def test_a_report_is_not_written_out_of_the_checkout(
+    here: Path, tmp_path: Path, linked: str, marked: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if not marked:
+        (here / ".git").rmdir()
+    (tmp_path / "reports").mkdir()
+    (tmp_path / "reports/out.xml").write_text("mine")
+    (here / "good.rts").write_text('import "lib:policies/site.rts"\n')
+    (here / linked).symlink_to(tmp_path / "reports" / ("out.xml" if linked == "out.xml" else ""))
+    target = linked if linked == "out.xml" else "reports/out.xml"
+    for words in (["lint", "--format", "junit", "-o"], ["test", "--junit"]):
+        code, text = said([*words, target, "good.rts"], capsys)
+        assert "symbolic links lead out of" in text
+        assert code == ExitCode.FULL
+    assert (tmp_path / "reports/out.xml").read_text() == "mine"
+    assert app.main(["lint", "--format", "junit", "-o", str(tmp_path / "typed.xml"), "good.rts"]) == ExitCode.OK
+    assert (tmp_path / "typed.xml").exists()
+
+
+@pytest.mark.parametrize("name", ["../mine.rts", "/etc/passwd", "link.rts"])
+def test_settings_bring_no_source_from_outside(here: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "rtshcua.toml").write_text(f'lint.with = ["{name}"]\n')
+    (here / "a.rts").write_text("\n")
+    (here / "link.rts").symlink_to("../mine.rts")
+    code, text = said(["lint", "a.rts"], capsys)
+    assert (code, f"`{name}` in `with` lies outside of the project" in text) == (ExitCode.INPUT, True), text
+
+
+@pytest.mark.parametrize("workspace", [True, False])
+def test_the_language_server_stays_in_the_workspace(here: Path, workspace: bool) -> None:
+    told: list[lsp.PublishDiagnosticsParams] = []
+    session = Session(str(library.root()), told.append)
+    if workspace:
+        session.look_in([str(here)])
+    (here / "good.rts").write_text("\n")
+    (here / "a.rts").write_text('import "../mine.rts"\nimport "good.rts"\n')
+    session._reach.ask(here / "a.rts") if not workspace else None
+    program = session.desk.view("a.rts").program
+    assert [unit.file for unit in program.units] == ["a.rts", "good.rts"]
+    assert [each.code.id for each in program.diagnostics] == ["E0108"]
+    session.end()
+
+
+def test_which_folder_is_a_checkout(here: Path, tmp_path: Path) -> None:
+    (here / "sub/below").mkdir(parents=True)
+    (here / "sub/rtshcua.toml").write_text("")
+    assert checkout_of(here / "sub/below/a.rts") == str(here)
+    (here / ".git").rmdir()
+    assert checkout_of(here / "sub/below/a.rts") == str(here / "sub")
+    assert checkout_of(here / "sub") == str(here / "sub")
+    assert checkout_of(here / "a.rts") is None
+    assert checkout_of("/") is None

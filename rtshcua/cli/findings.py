@@ -11,7 +11,7 @@ from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.diagnostics.render import render
+from rtshcua.diagnostics.render import MOST_SHOWN, most_severe, render
 from rtshcua.diagnostics.serialise import as_json
 from rtshcua.diagnostics.span import Source
 
@@ -35,9 +35,11 @@ class Findings:
         if self._json:
             self._object = as_json(found, sources)
         elif found:
-            text = render(found, sources)
+            text = render(most_severe(found), sources)
             say((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say(_count(found))
+            if len(found) > MOST_SHOWN:
+                say(f"{len(found) - MOST_SHOWN:,} of them are not shown, the least severe: `--json` has all")
         forbidding = {Severity.ERROR, Severity.WARNING} if self._deny_warnings else {Severity.ERROR}
         return any(each.severity in forbidding for each in found)
 

@@ -4,13 +4,27 @@ Nothing here is coloured; a caller may colour the lines by how they begin. A sou
 and those that change the direction of writing are shown by their number and never reach the terminal.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
+from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import Mark, excerpt, together, visible
 from rtshcua.diagnostics.span import Source
 
 PRIMARY, SECONDARY = "^", "-"
+#: so many findings are shown to a person, and of one finding so many places
+MOST_SHOWN, MOST_PLACES = 200, 20
+
+
+def most_severe(diagnostics: Sequence[Diagnostic], most: int = MOST_SHOWN) -> tuple[Diagnostic, ...]:
+    """At most so many findings, in their order: errors rather than warnings, warnings rather than notes, what is first
+    rather than what comes later.
+    """
+    if len(diagnostics) <= most:
+        return tuple(diagnostics)
+    rank = {severity: number for number, severity in enumerate(Severity)}
+    order = sorted(range(len(diagnostics)), key=lambda number: rank[diagnostics[number].severity])
+    return tuple(diagnostics[number] for number in sorted(order[:most]))
 
 
 def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> str:
@@ -23,6 +37,8 @@ def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
     code = diagnostic.code
     lines = [f"{diagnostic.severity.value}[{code.id}]: {visible(diagnostic.message)}"]
     places = _places(diagnostic, sources)
+    further = sum(len(marks) for _, _, marks in places[MOST_PLACES:])
+    places = places[:MOST_PLACES]
     gutter = max((len(str(line)) for _, line, _ in places), default=1)
     margin = " " * gutter
     shown: str | None = None
@@ -42,6 +58,7 @@ def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
             lines += [f"{margin} | {underline}" for underline in underlines]
     if diagnostic.span is not None and not places:
         lines.append(f" --> {visible(diagnostic.span.file)}")
+    lines += [f"{margin} = and {further} more places"] if further else []
     lines += [f"{margin} = at: {visible(diagnostic.pointer)}"] if diagnostic.pointer else []
     lines += [f"{margin} = help: {visible(diagnostic.help)}"] if diagnostic.help is not None else []
     return "\n".join(lines) + "\n"

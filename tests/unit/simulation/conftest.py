@@ -15,6 +15,8 @@ from rtshcua.simulation.world import Simulation
 from virtual.copying import copied
 
 SECOND = 1_000_000
+#: a pilot that has only waited until the vehicle is ready is at the beginning yet
+BEGINNING_US = 1_500_000
 
 
 class Pilot:
@@ -27,6 +29,7 @@ class Pilot:
         self.codec = Codec(255, 190)
         self.seen: list[Received] = []
         self.sent: list[bytes] = []
+        self._sent_us: list[int] = []
         if station:
             self.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
 
@@ -34,6 +37,7 @@ class Pilot:
 
     def send(self, message: Any) -> list[Received]:
         self.sent.append(self.codec.pack(message))
+        self._sent_us.append(self.simulation.now_us)
         return self.take(self.simulation.receive(self.sent[-1], self.simulation.now_us))
 
     def take(self, datagrams: list[bytes]) -> list[Received]:
@@ -79,10 +83,11 @@ class Pilot:
 
     def take_off(self, up_m: float = 20) -> None:
         """Climb. What was told the same at the beginning has climbed the same: that is flown once."""
-        if self.simulation.now_us or self.simulation._events:
+        now_us = self.simulation.now_us
+        if now_us > BEGINNING_US or self.simulation._events:
             self._take_off(up_m)
             return
-        begun = (repr(self.config), tuple(self.sent), up_m)
+        begun = (repr(self.config), tuple(zip(self._sent_us, self.sent, strict=True)), now_us, up_m)
         if begun not in CLIMBED:
             self._take_off(up_m)
             CLIMBED[begun] = self._copied()
@@ -91,7 +96,7 @@ class Pilot:
     def _copied(self) -> "Pilot":
         made = copy(self)
         made.simulation, made.codec = copied(self.simulation), copied(self.codec)
-        made.seen, made.sent = list(self.seen), list(self.sent)
+        made.seen, made.sent, made._sent_us = list(self.seen), list(self.sent), list(self._sent_us)
         return made
 
     def _take_off(self, up_m: float) -> None:
@@ -132,8 +137,8 @@ class Pilot:
         return [frame.message.text for frame in self.seen if frame.name == "STATUSTEXT"]
 
 
-#: by configuration, what was sent before, and the height
-CLIMBED: dict[tuple[str, tuple[bytes, ...], float], Pilot] = {}
+#: by configuration, what was sent before and when, the time, and the height
+CLIMBED: dict[tuple[str, tuple[tuple[int, bytes], ...], int, float], Pilot] = {}
 
 
 def acks(received: list[Received], command: int) -> list[int]:

@@ -361,7 +361,7 @@ SECOND_LONG: dict[type[Fault], Fault] = {
     for fault in (
         faults.RuntimeKilled(0, 4 * S), faults.HostStall(0, 5 * S), faults.DiskFull(0, 5 * S),
         faults.ClockStep(0, 9 * S), faults.Approval(0, "supervisor"), faults.Disapproval(0, "supervisor"),
-        faults.Recall(0), faults.Replacement(0), faults.Babble(0),
+        faults.Recall(0), faults.Replacement(0), faults.Babble(0), faults.DiskStall(0, 5 * S),
     )
 }  # fmt: skip
 

@@ -50,11 +50,11 @@ def recall(
     try:
         flying = subject(bundle, [], root, now_us)
         vehicle = flying.policy.vehicle.identity
-        name = b"" if policy else flight_id(flight, to)
-        if name is None:
+        flight_named = b"" if policy else flight_id(flight, to)
+        if flight_named is None:
             return fail(ExitCode.USAGE, "the recall of a mission is for one flight", f"{WHOSE}, or `--policy`")
         digests = (b"", flying.policy_digest) if policy else (flying.mission_digest, b"")
-        said = RecallDocument(vehicle, name, *digests, now_us, now_us + seconds * 1_000_000)
+        said = RecallDocument(vehicle, flight_named, *digests, now_us, now_us + seconds * 1_000_000)
         store = KeyStore(data_folder())
         key = unlock_person(store, person, None, path=approval_key, passphrase_file=passphrase_file)
         document = sign_recall(said, key)

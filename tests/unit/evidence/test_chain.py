@@ -39,7 +39,7 @@ def test_a_decision_holds_every_input(log: list[bytes]) -> None:
     record = json.loads(log[3])
     assert record["state"] == {"ages": [1200, 0, 50], "values": [35000, None, -3]}
     assert record["context"] == {
-        "approvals": [[2, 0, 1, 4999999]],
+        "approvals": [[2, 0, 1, 4999999, 0]],
         "consumed": 0,
         "phase": 1,
         "policy_version": 7,

@@ -172,7 +172,7 @@ def test_a_format_must_be_known(fields: dict[str, object], found: str, log: list
     assert report.failure is not None
     assert report.failure.slug == "genesis/format"
     assert report.failure.found == found
-    assert report.failure.expected == "rtshcua/log version 2"
+    assert report.failure.expected == "rtshcua/log version 3"
 
 
 def test_an_unknown_field_in_a_known_version(log: list[bytes]) -> None:

@@ -33,7 +33,7 @@ from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import RunLoop
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.live.telling import Teller
@@ -172,7 +172,7 @@ def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
     if feed is not None:
         frames._file = Slowly(frames._file)
     sink = EvidenceWriter((SlowFile if feed else EvidenceFile)(folder / "log.jsonl"))
-    vehicle = UdpVehicle(("127.0.0.1", 0), flight.vehicle.driver, clock, frames.write)
+    vehicle = ConnectedVehicle(("127.0.0.1", 0), flight.vehicle.driver, clock, frames.write)
     watch: Callable[..., None] = unwatched
     if feed is not None:
         policy, mission = flight.loaded.bundle.policy, flight.loaded.bundle.mission

@@ -19,10 +19,12 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
-from rtshcua.adapters.vehicle.udp import UdpVehicle
-from rtshcua.cli.faults import code_of, distrust, fail, refuse
-from rtshcua.cli.meeting import PORT_HELP, unmet
+from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
+from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.diagnostics.exits import ExitCode
@@ -43,7 +45,10 @@ _EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
 
 @app.command()
 def doctor(
-    connect: Annotated[str, typer.Option(metavar="udpin:HOST:PORT", help="the address that the vehicle sends to")],
+    connect: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="`serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, "
+                                                   "`udpout:HOST:PORT`")
+    ],
     bundle: Annotated[Path | None, typer.Argument(help="a mission that it is to fly; else the signals that ship")]
     = None,
     seconds: Annotated[float, typer.Option(min=3, max=600, help="how long to listen")] = 10.0,
@@ -62,10 +67,8 @@ def doctor(
     """
     try:
         link = address.parse(connect)
-    except ValueError as error:
-        return fail(ExitCode.USAGE, str(error))
-    if link.way != "udpin":
-        return fail(ExitCode.USAGE, f"`{link}`: the doctor listens to the vehicle", "`udpin:HOST:PORT`")
+    except AddressError as error:
+        return misaddressed("--connect", error)
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
     clock = SystemClock()
@@ -81,19 +84,19 @@ def doctor(
             return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
         stack.callback(signing.close)
         try:
-            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system)
+            steps = () if mission is None else mission.invocations
+            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system, steps)
         except UnknownSource as error:
             return fail(ExitCode.REFUSED, str(error))
         try:
-            socket = UdpVehicle((link.host, link.port), vehicle, clock, lambda _utc_us, _frame: None)
+            socket = ConnectedVehicle(open_transport(link), vehicle, clock, lambda _utc_us, _frame: None)
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            return fail(
-                ExitCode.LINK, f"cannot listen at udp {link.host}:{link.port}: {reason}", PORT_HELP, slug="port"
-            )
+            return refuse(unopened(link, error), ExitCode.LINK)
         stack.callback(socket.close)
         if not _listen(socket, vehicle, clock, seconds):
-            return refuse(unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected), ExitCode.LINK)
+            return refuse(
+                unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
+            )
         findings = list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=clock.now().utc_error_us,
@@ -121,7 +124,7 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None]:
     return opened.policy, opened.mission
 
 
-def _listen(socket: UdpVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:
+def _listen(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:
     """Wait for a heartbeat, then listen for so long; whether there was one."""
     begun = time.monotonic()
     until = begun + _HEARTBEAT_S

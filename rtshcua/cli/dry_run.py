@@ -7,7 +7,7 @@ import msgspec
 from msgspec import structs
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.faults import say
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.showing.page import Page, for_terminal
@@ -30,7 +30,7 @@ _POLL_S = 0.05
 
 
 def dry_run(
-    loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts, events: Sequence[Event],
+    loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, events: Sequence[Event],
     *, as_json: bool, notes: Sequence[str] = (), refusal: str | None = None, unheard: frozenset[int] = frozenset(),
     say: Callable[[str], None] = say,
 ) -> ExitCode:  # fmt: skip

@@ -8,14 +8,18 @@ RTSHCUA_DEBUG=1 shows the traceback of an internal fault.
 import errno
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire.untrusted import Untrusted
+
+if TYPE_CHECKING:
+    from rtshcua.adapters.vehicle.address import AddressError
 
 _json = ContextVar("json", default=False)  # whether this command was asked for JSON
 
@@ -55,6 +59,22 @@ def fail(code: ExitCode, message: str, help: str | None = None, *, slug: str | N
     return tell(code, message, help)
 
 
+def misaddressed(option: str, error: "AddressError") -> ExitCode:
+    """Fails for an option's address: what is wrong, the address with that part marked below, and what is accepted."""
+    from rtshcua.diagnostics.excerpt import visible  # the door opens without it
+
+    span: dict[str, str | int] = {"option": option, "value": error.address, "start": error.start, "end": error.end}
+    if _json.get():
+        _print_object(ExitCode.USAGE, ExitCode.USAGE.slug, error.text, error.help, at=span)
+    say(f"error: {visible(error.text)}")
+    say(f"   --> {option}")
+    say(f"    | {visible(error.address)}")
+    width = len(visible(error.address[: error.start]))
+    say(f"    | {' ' * width}{'^' * max(1, len(visible(error.address[error.start : error.end])))}")
+    say(f" help: {visible(error.help)}")
+    return ExitCode.USAGE
+
+
 def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
     """Fails for something that is not to be trusted; `where` says what it was, before the text."""
     return refuse(Refusal(error.slug, f"{where}{error}", help))
@@ -83,11 +103,14 @@ def tell(code: ExitCode, message: str, help: str | None = None) -> ExitCode:
     return code
 
 
-def _print_object(code: ExitCode, slug: str, text: str, help: str | None) -> None:
+def _print_object(
+    code: ExitCode, slug: str, text: str, help: str | None, at: Mapping[str, str | int] | None = None
+) -> None:
     import json
 
+    error = {"slug": slug, "text": text, "help": help} | ({} if at is None else {"at": at})
     try:
-        print(json.dumps({"error": {"slug": slug, "text": text, "help": help}, "exit_code": int(code)}), flush=True)
+        print(json.dumps({"error": error, "exit_code": int(code)}), flush=True)
     except OSError:
         _discard("stdout")
 

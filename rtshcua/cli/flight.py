@@ -13,7 +13,7 @@ from rtshcua.adapters.files.logs import disclosure_of
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.closing import close_log, keep_summary
 from rtshcua.cli.interrupts import Interrupts, Wish
@@ -76,7 +76,8 @@ class Flight:
     """
 
     def __init__(
-        self, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts, tape: Tape,
+        self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts,
+        tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, witnesses: Witnessing, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,

@@ -16,10 +16,11 @@ from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.reading import open_regular, read_regular
-from rtshcua.adapters.vehicle.address import Address
+from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.faults import code_of, untrusted
@@ -27,7 +28,7 @@ from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
-from rtshcua.cli.meeting import PORT_HELP, meet
+from rtshcua.cli.meeting import meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, mark_opened
 from rtshcua.cli.past import Past
 from rtshcua.cli.refused import Refused as Refused
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
 _UNHURRIED = 5
 
 _LOOPBACK = "127.0.0.1"
+_TOO_SLOW = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
 
 
@@ -107,10 +109,13 @@ def launch(order: Launch) -> ExitCode:
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
-            vehicle = _listen(order, _driver(order, loaded, slack, signing), clock, tape)
+            driver, transport = _driver(order, loaded, slack, signing), _open(order.link)
+            vehicle = ConnectedVehicle(transport, driver, clock, tape.keep)
             stack.callback(vehicle.close)
-            if order.link is None:
-                simulator = stack.enter_context(_simulate(order, loaded, vehicle.port))
+            if driver.shortfall is not None:
+                raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
+            if isinstance(transport, UdpTransport) and order.link is None:
+                simulator = stack.enter_context(_simulate(order, loaded, transport.port))
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = None if order.agent_socket is None else stack.enter_context(Agents(order.agent_socket, loaded))
@@ -250,20 +255,20 @@ def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driv
             manoeuvres=own,
             verifier=signing.verifier,
             system=order.system,
+            steps=loaded.bundle.mission.invocations,
         )
     except UnknownSource as error:
         raise Refused(ExitCode.REFUSED, "unknown-source", str(error)) from None
 
 
-def _listen(order: Launch, driver: Driver, clock: LinkClock, tape: Tape) -> UdpVehicle:
-    host, port = (_LOOPBACK, 0) if order.link is None else (order.link.host, order.link.port)
+def _open(link: Address | None) -> Transport:
+    """The way to the vehicle; to our own simulated one, a port that the system chooses. Raises `Refused`."""
+    if link is None:
+        link = Address(Way.UDP_IN, _LOOPBACK, 0)
     try:
-        return UdpVehicle((host, port), driver, clock, tape.keep)
+        return open_transport(link)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise Refused(
-            ExitCode.LINK, "port", f"cannot listen at udp {host}:{port}: {reason}", PORT_HELP
-        ) from None  # fmt: skip
+        raise Refused(ExitCode.LINK, *unopened(link, error)) from None
 
 
 def _simulate(order: Launch, loaded: Loaded, port: int) -> Simulator:

@@ -4,8 +4,8 @@ import time
 from typing import Final
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.vehicle.address import Address
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.signing import Signing
@@ -18,25 +18,45 @@ HEARTBEAT_S = 10.0
 #: and another vehicle's, which comes each second; from then on it only keeps this one from being ready
 ANOTHER_S = 1.5
 
-PORT_HELP: Final = "another program may listen there; a vehicle can be told to send to another port"
+#: what to do where a link cannot be opened, by what carries it
+PORT_HELP: Final = {
+    Way.UDP_IN: "another program may listen there; a vehicle can be told to send to another port",
+    Way.UDP_OUT: "is it the address of a machine that this one reaches?",
+    Way.TCP: "is it the address of a machine that this one reaches?",
+    Way.TCP_IN: "another program may listen there; a vehicle can be told to connect to another port",
+    Way.SERIAL: "end the program that has it open (ModemManager, a ground station, a shell on the console); the group "
+    "`dialout` may open serial devices; `ls /dev/serial/by-id` shows which there are",
+}
+
+
+def unopened(link: Address, error: OSError) -> Refusal:
+    """That a link cannot be opened, and what to do."""
+    verb = "listen at" if link.way in (Way.UDP_IN, Way.TCP_IN) else "open"
+    return Refusal("port", f"cannot {verb} `{link}`: {(error.strerror or str(error)).lower()}", PORT_HELP[link.way])
+
 
 _POLL_S = 0.05
 _HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"
 _KEY_HELP: Final = "has the vehicle the key of `--signing-key`, and are both clocks right?"
+_SILENCE_HELP: Final = "look at the address, the cable and the vehicle's own port settings"
 _SYSTEM_HELP: Final = "`--system` names another id, or leave it out"
 
 
-def unmet(where: str, seconds: float, system: int | None, rejected: str | None) -> Refusal:
-    """That no heartbeat came within so many seconds, and what to do. `rejected` is what came and was not believed."""
+def unmet(where: str, seconds: float, system: int | None, rejected: str | None, silence: str | None) -> Refusal:
+    """That no heartbeat came within so many seconds, and what to do. `rejected` is what came and was not believed,
+    `silence` what else is known of why nothing is heard.
+    """
     of = where if system is None else f"system {system} of {where}"
     text = f"no heartbeat of {of} within {seconds:.0f} s"
     if rejected is not None:
         return Refusal("no-vehicle", f"{text}: {rejected}", _KEY_HELP)
+    if silence is not None:
+        return Refusal("no-vehicle", f"{text}: {silence}", _SILENCE_HELP)
     return Refusal("no-vehicle", text, _HELP if system is None else _SYSTEM_HELP)
 
 
 def meet(
-    link: Address | None, system: int | None, vehicle: UdpVehicle, clock: LinkClock, interrupts: Interrupts,
+    link: Address | None, system: int | None, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts,
     signing: Signing,
 ) -> list[Event]:  # fmt: skip
     """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
@@ -49,7 +69,7 @@ def meet(
             raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
         if time.monotonic() > until_s:
             where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
-            raise Refused(ExitCode.LINK, *unmet(where, HEARTBEAT_S, system, signing.rejected))
+            raise Refused(ExitCode.LINK, *unmet(where, HEARTBEAT_S, system, signing.rejected, vehicle.silence))
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     until_s = time.monotonic() + (0 if link is None else ANOTHER_S)
     while time.monotonic() < until_s and vehicle.driver.link.crowd is None:

@@ -6,7 +6,7 @@ from typing import Final
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.files.replay import FileReplayStore, looked_up
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
@@ -40,7 +40,7 @@ def _not_opened(loaded: Loaded, opening: Opening) -> Refusal:
     return Refusal(opening, text, "compile the mission again, which issues it anew")
 
 
-def broke_off(state: Path, loaded: Loaded, vehicle: UdpVehicle, clock: LinkClock, events: list[Event]) -> bool:
+def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
     """True for a bundle that was opened before while the vehicle is in the air, or armed; one that can be opened is not
     yet.
 

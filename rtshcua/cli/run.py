@@ -13,8 +13,9 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.cli import simulated, witnessed
-from rtshcua.cli.faults import fail, tell
+from rtshcua.cli.faults import fail, misaddressed, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import Mode
@@ -30,7 +31,11 @@ app = typer.Typer(add_completion=False)
 def run(
     bundle: Annotated[Path, typer.Argument(help="what `rtshcua compile` made")],
     connect: Annotated[
-        str | None, typer.Option(metavar="udpin:HOST:PORT", help="another vehicle: the address that it sends to")
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="another vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
+        ),
     ] = None,
     mode: Annotated[Mode, typer.Option(help="how decisions are enforced; `none` flies the simulated vehicle only")]
     = Mode.SOFTWARE,
@@ -100,11 +105,12 @@ def run(
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
     try:
         link = None if connect is None else address.parse(connect)
+    except AddressError as error:
+        return misaddressed("--connect", error)
+    try:
         witnesses = witnessed.addresses(witness or ())
-    except ValueError as error:
-        return fail(ExitCode.USAGE, str(error))
-    if link is not None and link.way != "udpin":
-        return fail(ExitCode.USAGE, f"`{link}`: a flight listens to its vehicle", "`udpin:HOST:PORT`")
+    except AddressError as error:
+        return misaddressed("--witness", error)
     if link is not None and speed != 1 and not link.is_loopback:
         return fail(ExitCode.USAGE, "`--speed` is for a simulated vehicle; a real one lives as fast as we do")
     with ExitStack() as stack:

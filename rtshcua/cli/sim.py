@@ -10,8 +10,9 @@ import typer
 from rtshcua.adapters.files.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.cli import simulated
-from rtshcua.cli.faults import code_of, fail
+from rtshcua.cli.faults import code_of, fail, misaddressed
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.simulation.config import Answers, Boot, Estimate, Kind
 
@@ -60,10 +61,10 @@ def sim(
         return fail(ExitCode.USAGE, "`--port` and `--connect` say the same thing: give one")
     if connect is not None:
         try:
-            link = address.parse(connect)
-        except ValueError as error:
-            return fail(ExitCode.USAGE, str(error))
-        if link.way != "udpout" or not link.is_loopback:
+            link = address.parse(connect, (Way.UDP_OUT,))
+        except AddressError as error:
+            return misaddressed("--connect", error)
+        if not link.is_loopback:
             return fail(
                 ExitCode.USAGE,
                 f"`{connect}` is not for the simulated vehicle",

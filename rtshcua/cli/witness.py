@@ -13,9 +13,10 @@ from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.files.witness import Cosigned, FileWitness, NotCosigned, WitnessError, WitnessStore, drop, logs_in
 from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.adapters.witness_link import WitnessLink
 from rtshcua.cli.faults import as_json as saying_json
-from rtshcua.cli.faults import distrust, exit_code_of, fail, refuse, untrusted
+from rtshcua.cli.faults import distrust, exit_code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.interrupts import terminated_as_interrupted
 from rtshcua.cli.shown import many
 from rtshcua.cli.unlock import unlock
@@ -59,11 +60,9 @@ def witness(
     if watch is not None and not paths:
         return fail(ExitCode.USAGE, "`--watch` goes with a folder")
     try:
-        link = None if connect is None else address.parse(connect)
-    except ValueError as error:
-        return fail(ExitCode.USAGE, str(error))
-    if link is not None and link.way != "udpin":
-        return fail(ExitCode.USAGE, f"`{link}`: a witness listens", "`udpin:HOST:PORT`")
+        link = None if connect is None else address.parse(connect, (Way.UDP_IN,))
+    except AddressError as error:
+        return misaddressed("--connect", error)
     for path in paths or ():
         path.stat()  # so that what is missing is told as such
     store = KeyStore(data_folder())

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import Address
+from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.witness_link import Anchor, WitnessClient
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
@@ -13,12 +13,8 @@ from rtshcua.onboard.ports import Anchored, Event, Noted
 
 
 def addresses(texts: Sequence[str]) -> tuple[Address, ...]:
-    """Where witnesses are. Raises ValueError with what is wrong, for a person."""
-    found = tuple(address.parse(text) for text in texts)
-    for each in found:
-        if each.way != "udpout":
-            raise ValueError(f"`{each}`: a witness is sent to: `udpout:HOST:PORT`")
-    return found
+    """Where witnesses are. Raises AddressError."""
+    return tuple(address.parse(text, (Way.UDP_OUT,)) for text in texts)
 
 
 class Witnessing:

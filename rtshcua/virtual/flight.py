@@ -166,7 +166,8 @@ class VirtualFlight:
             config = simulated if isinstance(simulated, SimulationConfig) else simulated(policy)
             ways = manoeuvres(packs_of(policy.sources))
             vehicle = VirtualVehicle(
-                policy, config, self.clock, loaded.executor.frames, fence=fence, manoeuvres=ways, tick_us=tick_us
+                policy, config, self.clock, loaded.executor.frames, fence=fence, manoeuvres=ways, tick_us=tick_us,
+                steps=mission.invocations,
             )  # fmt: skip
         self.vehicle = vehicle
         loaded.executor.frames = vehicle.frames

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import Stages
 from rtshcua.mavlink.signing import Verifier
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -44,19 +45,20 @@ class VirtualVehicle:
 
     `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives
     the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
-    permitted. `verifier`, `fence` and `manoeuvres` are the driver's. Every `tick_us` it hears what was said since.
+    permitted. `verifier`, `fence`, `manoeuvres` and `steps` are the driver's. Every `tick_us` it hears what was
+    said since.
     """
 
     def __init__(
         self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None,
         frames: FrameSession | None = None, verifier: Verifier | None = None, *, fence: bool = True,
-        manoeuvres: Mapping[str, Stages] | None = None, tick_us: int = TICK_US,
+        manoeuvres: Mapping[str, Stages] | None = None, tick_us: int = TICK_US, steps: Sequence[Invocation] = (),
     ) -> None:  # fmt: skip
         self.simulation = Simulation(config)
         self.frames = FrameSession() if frames is None else frames
         self._free = frames is None
         self._tick_us = tick_us
-        self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier, manoeuvres=manoeuvres)
+        self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier, manoeuvres=manoeuvres, steps=steps)
         self.clock = clock or VirtualClock()
         self.received = self.sent = 0
         self.lose: Callable[[bytes], bool] = lambda frame: False

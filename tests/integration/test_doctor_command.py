@@ -39,8 +39,8 @@ def test_a_vehicle_over_real_udp() -> None:
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [
-        (["--connect", "tcp:1.2.3.4:5"], 2, "is no address"),
-        (["--connect", "udpout:127.0.0.1:14550"], 2, "the doctor listens"),
+        (["--connect", "serial:/dev/ttyAMA0:57601"], 2, "    |                     ^^^^^"),
+        (["--connect", "serial:/dev/no-such-device:57600"], 8, "no such file"),
         (["--connect", "udpin:127.0.0.1:14550", "missing.bundle"], 3, "no such file"),
         ([], 2, "--connect"),
     ],

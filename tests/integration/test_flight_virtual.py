@@ -1,5 +1,6 @@
 """Whole flights in virtual time: the shipped missions, and what goes wrong on them; `verify-log` accepts every log."""
 
+import re
 from functools import cache
 from itertools import product
 from typing import Any, NamedTuple
@@ -110,8 +111,9 @@ def test_the_longer_missions_complete(name: str, flavour: str) -> None:
 def test_ground_stations_hear_each_decision_and_the_log_what_the_vehicle_said(flavour: str) -> None:
     flown, heard = short(flavour)
     assert heard == ("allow takeoff(altitude = 10 m)", "allow hover(5 s)", "allow return_home()")
-    assert [record["detail"].partition(" (")[0] for record in flown.effects("noted")] == [
-        "its fence was set to the policy's airspace"
+    assert [re.split(r" \(|: ", record["detail"])[0] for record in flown.effects("noted")] == [
+        "its fence was set to the policy's airspace",
+        "streams",
     ]
     said = [record["detail"] for record in flown.effects("said")]
     assert ("6: Arming motors" in said) == (flavour == "ardupilot"), "PX4 says nothing to an onboard controller"

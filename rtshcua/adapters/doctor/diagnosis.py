@@ -63,6 +63,7 @@ def diagnose(
     yield _answers(vehicle)
     yield from _others(vehicle, named=named)
     yield _round_trip(vehicle.source.clock)
+    yield _streams(vehicle, flavour)
     yield from _version(vehicle, flavour)
     yield from _readiness(vehicle)
     yield from _signals(vehicle, policy, flown, unheard)
@@ -152,6 +153,34 @@ def _round_trip(clock: VehicleClock) -> VehicleFinding:
         return VehicleFinding(slug, STOP, found, "answers", "a router on the way may drop TIMESYNC (111)")
     found = f"{median // 1_000} ms there and back; its clock is known to {-(-error // 1_000)} ms"
     return _graded(slug, found, "at most 200 ms", warns=median > _SLOW_US, stops=median > _TOO_SLOW_US)
+
+
+_FASTER: Final = {
+    "px4": "raise the port's `MAV_n_RATE` (octets a second; 1200 as it comes) to what the link carries, or set its "
+    "`MAV_n_MODE` to Onboard",
+    "ardupilot": "another program may ask for other rates (REQUEST_DATA_STREAM), or the port carries no more",
+}
+
+
+def _streams(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
+    """What the program needs, what the link carries, and what is really delivered."""
+    slug, requests = "link/streams", vehicle.stream_requests
+    plan = requests.plan
+    of = "" if plan.capacity is None else f" of {plan.capacity} that the link carries"
+    if plan.shortfall is not None:
+        advice = "a faster link, or longer deadlines and times to stale in the policy"
+        return VehicleFinding(slug, STOP, plan.shortfall, "room for what is needed", advice)
+    asked = f"{plan.octets} octets a second asked for{of}"
+    if requests.measured is None:
+        return VehicleFinding(slug, UNKNOWN, f"{asked}; not measured in this time", "", "listen longer (`--seconds`)")
+    octets, came = requests.measured
+    slow = [
+        f"{name} every {came[name] // 1_000} ms instead of {plan.intervals[name] // 1_000}"
+        for name in requests.slow
+        if name in came
+    ]
+    found = f"{asked}, {octets} came in all" + (f"; {', '.join(slow)}" if slow else "")
+    return _graded(slug, found, "what is asked for", _FASTER[flavour], warns=bool(slow))
 
 
 # ---------------------------------------------------------------- the autopilot

@@ -4,7 +4,7 @@ It sends what any driver sends before a flight, the fence apart, and questions: 
 frame session like all else. Nothing is armed, moved, set or uploaded.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.signing import Verifier
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Clock, Event, Readings, Said
@@ -70,9 +71,9 @@ class ExaminingDriver(Driver):
 
     def __init__(
         self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None,
-        system: int | None = None,
+        system: int | None = None, steps: Sequence[Invocation] = (),
     ) -> None:  # fmt: skip
-        super().__init__(policy, frames, fence=False, verifier=verifier, system=system)
+        super().__init__(policy, frames, fence=False, verifier=verifier, system=system, steps=steps)
         self.talkers: dict[tuple[int, int], Talker] = {}
         self.streams: dict[str, Stream] = {}
         self.texts: list[str] = []  # what it said, the first few texts once each

@@ -12,13 +12,15 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.source_time import SourceTime
-from rtshcua.adapters.vehicle.streams import ALWAYS, AT_TIMES, PATIENCE_US, StreamRequests
+from rtshcua.adapters.vehicle.streams import AT_TIMES, PATIENCE_US, StreamPlan, StreamRequests, plan_streams
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
 from rtshcua.codec.frames import Received
+from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.signing import Verifier
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.frames import OURS, Gate
@@ -40,17 +42,20 @@ class Driver:
     left as it is. Whatever is sent goes out through `frames`; with a `verifier` only what it accepts comes in.
     `manoeuvres` are ways to fly by flavour (`px4`) and by flavour and skill (`px4.spray_area`): see `adapters.packs`.
     With a `system` only the autopilot of this MAVLink system id is chosen; without, it is not ready beside another one.
+    `steps` are the mission's: how soon each has to be decided says how often reports are needed.
     """
 
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
         verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
-        system: int | None = None,
+        system: int | None = None, steps: Sequence[Invocation] = (),
     ) -> None:  # fmt: skip
         self._policy = policy
+        self._signed = verifier is not None
+        self._capacity: int | None = None
         self._fence = fence
         self._manoeuvres = manoeuvres or {}
-        self._telemetry = Telemetry(policy)
+        self._telemetry = Telemetry(policy, [each.contract for each in steps])
         self._texts = StatusTexts()
         self._announcer = Announcer()
         self.link = VehicleLink(frames, verifier, system)
@@ -60,7 +65,7 @@ class Driver:
         #: which autopilot it is; None before its first heartbeat, at which the next four are set
         self.flavour: AutopilotFlavour | None = None
         self._aids: Aids
-        self._streams: StreamRequests
+        self.stream_requests: StreamRequests  # what is asked for, and what comes of it
         self.preflight: Preflight  # what is compared with the policy
         self._heeded: set[str]  # what more is made of than readings
         self.system = 0
@@ -81,6 +86,23 @@ class Driver:
         self._was_ready = False
         self._released = False
         self._was_air: tuple[bool, bool] | None = None
+
+    def carried_by(self, capacity: int | None) -> None:
+        """The link carries so many octets a second each way; said before the first heartbeat."""
+        self._capacity = capacity
+
+    def plan(self, flavour: AutopilotFlavour) -> StreamPlan:
+        """The streams that an autopilot of this flavour is asked for, on this link."""
+        always = {name: Rate(AT_LEAST[name], SUFFICES[name]) for name in AT_LEAST}
+        estimator = {flavour.estimator: Rate(STALE_US // _WITHIN_STALE, STALE_US // 4)}
+        wanted = {**always, **self._telemetry.rates, **estimator, **AT_TIMES}
+        return plan_streams(wanted, self._capacity, signed=self._signed)
+
+    @property
+    def shortfall(self) -> str | None:
+        """That the link carries too little for any flavour, in words."""
+        plans = [self.plan(flavour) for flavour in _FLAVOURS.values()]
+        return None if any(each.fits for each in plans) else plans[0].shortfall
 
     @property
     def unready(self) -> str | None:
@@ -131,7 +153,7 @@ class Driver:
         ts1_ns = self.source.clock.due(now_us)
         if ts1_ns is not None:
             send.append(messages.time_sync(ts1_ns))
-        send += self._streams.due(self.system, now_us)
+        send += self.stream_requests.due(self.system, now_us)
         if not self._was_ready and self.seen.down:
             send += self.preflight.due(self.system, now_us)
         if self._texts.parts:
@@ -143,8 +165,8 @@ class Driver:
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
-        if self.seen.notes or self._streams.notes or self.preflight.notes:
-            for notes in (self.seen.notes, self._streams.notes, self.preflight.notes):
+        if self.seen.notes or self.stream_requests.notes or self.preflight.notes:
+            for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes):
                 events += [ports.Noted(now_us, text) for text in notes]
                 notes.clear()
         if self._announcer.waiting:
@@ -193,8 +215,7 @@ class Driver:
             self.system = frame.system
             self.link.settle(frame.system)
             self.seen.estimator = Estimator(flavour.estimator)
-            wanted = {**self._telemetry.intervals, **ALWAYS, flavour.estimator: STALE_US // _WITHIN_STALE}
-            self._streams = StreamRequests(wanted, self._telemetry.sources, AT_TIMES)
+            self.stream_requests = StreamRequests(self.plan(flavour), self._telemetry.sources)
             slack = self._commander.slack
             self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
             self.preflight = Preflight(self._policy, flavour, self.seen, fence=self._fence, slack=slack)
@@ -212,8 +233,8 @@ class Driver:
             return False  # what the autopilot itself tells is not taken from anybody else
         if name == "COMMAND_ACK":
             return self._acknowledge(frame, now_us) or self._asks
-        self._streams.heard(name, now_us)
-        if name in self._telemetry.intervals:
+        self.stream_requests.heard(name, now_us, len(frame.frame))
+        if name in self._telemetry.rates:
             values = self._telemetry.read(name, message, component, self.seen.estimator.doubtful(name, now_us))
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
@@ -260,7 +281,7 @@ class Driver:
             return False
         self._watch.answered()
         if message.command == messages.SET_INTERVAL:
-            self._streams.answered(message.result == 0, now_us)
+            self.stream_requests.answered(message.result == 0, now_us)
             return False
         return self._commander.acknowledge(message.command, message.result, self.seen.up_us)
 
@@ -295,7 +316,7 @@ class Driver:
         if not changed:
             return
         if SILENT in (was, down):
-            self._streams.interrupted()
+            self.stream_requests.interrupted()
             events.append(
                 ports.LinkBack(now_us) if was == SILENT else ports.LinkLost(now_us, SILENT, self._watch.heard_us or 0)
             )
@@ -356,15 +377,15 @@ class Driver:
         answer, for a while the times of what it says are awaited, and then one report of each kind.
         """
         if not self._flies:
-            return self.unready is None and self._streams.settled(now_us)
+            return self.unready is None and self.stream_requests.settled(now_us)
         if self.link.crowd is not None or not self._watch.answers:
             return False
         if self._answers_us is None:
             self._answers_us = now_us
         if not self._timed and (self.source.unready is None or now_us - self._answers_us > PATIENCE_US):
             self._timed = True
-            self._streams.renew(now_us)
-        return self._timed and self._streams.settled(now_us)
+            self.stream_requests.renew(now_us)
+        return self._timed and self.stream_requests.settled(now_us)
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""

@@ -5,6 +5,7 @@ whether it is up.
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
+from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.diagnostics.refusal import Refusal
@@ -18,6 +19,8 @@ from rtshcua.onboard.ports import Event
 
 #: what we call ourselves before we know whose system we belong to; nothing is sent under it
 _NOBODY: Final = 255
+#: the system id that both autopilots are delivered with (`MAV_SYS_ID`, `SYSID_THISMAV`)
+_DELIVERED: Final = 1
 #: what the boundary learns of the vehicle from
 _OBSERVED: Final = ("HEARTBEAT", "GLOBAL_POSITION_INT")
 
@@ -42,6 +45,7 @@ class VehicleLink:
         self._frames = frames
         self._verifier = verifier
         self._named = system is not None
+        self._greets_as = system or _DELIVERED
         self._codec = Codec(_NOBODY, OURS, only=None if system is None else {system}, verifier=verifier)
         self._system = 0
         #: until the flight begins: what is not the chosen vehicle's, of its own sender and of another one
@@ -56,6 +60,14 @@ class VehicleLink:
         others = Codec(0, 0, only=frozenset(range(256)) - {system}, verifier=self._verifier)
         # with a key, a second sender of the vehicle's own frames is nobody: at most it repeats them
         self._others = others, Codec(0, 0) if self._verifier is None else others
+
+    def greet(self, now_us: int) -> list[bytes]:
+        """Our heartbeat to a vehicle that waits to be spoken to, before it is known which one it is. It is of the
+        system that was named, or of the one that autopilots are delivered as.
+        """
+        codec = Codec(self._system or self._greets_as, OURS)
+        sealed = self._frames.seal(codec.pack(messages.heartbeat()), now_us)
+        return [] if isinstance(sealed, Refusal) else [sealed]
 
     def begin(self) -> None:
         """The flight begins: from now on nothing is made of other vehicles."""

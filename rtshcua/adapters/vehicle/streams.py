@@ -1,12 +1,17 @@
-"""Telemetry streams: asked for one by one, measured, asked again when they stop or come too seldom, left alone when the
-vehicle has none such.
+"""Telemetry streams: planned against what the link carries, asked for one by one, measured, asked again when they stop
+or come too seldom, left alone when the vehicle has none such.
 """
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.address import BAUDS, BITS_OF_AN_OCTET
 from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.codec.frames import kind_of
+from rtshcua.decision.rates import AT_LEAST, Rate
+from rtshcua.mavlink.framing import CHECKSUM, HEADER, SIGNATURE
 
 #: How long one request waits for its acknowledgement; twice as long after each that came to nothing, up to the latter.
 ANSWER_US = 500_000
@@ -20,33 +25,94 @@ PATIENCE_REFUSED_US = 2_000_000
 MEASURE_US = 5_000_000
 SLOW = 2
 
-#: What effects are seen by, and how often, in us; mode and landed state too, for a takeover must not be seen late.
-ALWAYS: Mapping[str, int] = {
-    "HEARTBEAT": 100_000,
-    "GLOBAL_POSITION_INT": 100_000,
-    "EXTENDED_SYS_STATE": 100_000,
-    "ATTITUDE": 100_000,
-    "GPS_RAW_INT": 500_000,
-    "SYS_STATUS": 500_000,
-}
 #: What is sent at times only, whatever is asked for: PX4 has no target before it flies, ArduCopter in GUIDED alone.
-AT_TIMES: Mapping[str, int] = {"POSITION_TARGET_GLOBAL_INT": 100_000}
+AT_TIMES: Mapping[str, Rate] = {"POSITION_TARGET_GLOBAL_INT": Rate(100_000, 500_000)}
+
+#: How much of a link streams may fill, in 1/100: the rest is for answers, texts, and for what comes late.
+SHARE: Final = 80
+_SECOND: Final = 1_000_000
+_NEVER_US: Final = -1
+#: What is no stream, but an answer or an event: it is not turned off.
+_ANSWERS: Final = frozenset({
+    "AUTOPILOT_VERSION", "COMMAND_ACK", "HEARTBEAT", "HOME_POSITION", "MISSION_ACK", "MISSION_COUNT",
+    "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT", "PARAM_VALUE", "STATUSTEXT", "SYSTEM_TIME",
+    "TIMESYNC",
+})  # fmt: skip
+
+
+def frame_octets(message: str, *, signed: bool) -> int:
+    """How many octets a message takes on the wire at most: header, the whole payload, checksum, and signature."""
+    number = messages.number_of(message)
+    kind = None if number is None else kind_of(number)
+    payload = 0 if kind is None else kind.fields.size
+    return HEADER + payload + CHECKSUM + (SIGNATURE if signed else 0)
+
+
+class StreamPlan(NamedTuple):
+    """What is asked for on a link: the interval of each message in us, and octets a second.
+
+    `octets`: what this takes; `least`: what it would take if each came as seldom as will do; `capacity`: what the link
+    carries, None where nobody knows.
+    """
+
+    intervals: Mapping[str, int]
+    octets: int
+    least: int
+    capacity: int | None
+
+    @property
+    def fits(self) -> bool:
+        """Whether the link carries what is needed, and leaves room for the rest."""
+        return self.capacity is None or self.least <= self.capacity * SHARE // 100
+
+    @property
+    def shortfall(self) -> str | None:
+        """That the link does not carry what is needed, and what would, in words."""
+        if self.fits:
+            return None
+        would = next((baud for baud in BAUDS if baud // BITS_OF_AN_OCTET * SHARE // 100 >= self.least), None)
+        better = f"; {would} baud would" if would is not None else ""
+        return (
+            f"the link carries {self.capacity} octets a second, of which {SHARE} % may be streams, and the program "
+            f"needs {self.least} at the least{better}"
+        )
+
+
+def plan_streams(rates: Mapping[str, Rate], capacity: int | None, *, signed: bool) -> StreamPlan:
+    """The fastest rates that the link carries: all are slowed by the same factor, none below what suffices."""
+    sizes = {name: frame_octets(name, signed=signed) for name in rates}
+
+    def load(intervals: Mapping[str, int]) -> int:
+        return sum(-(-sizes[name] * _SECOND // interval) for name, interval in intervals.items())
+
+    def slowed(percent: int) -> dict[str, int]:
+        return {name: min(rate.asked * percent // 100, max(rate.asked, rate.suffices)) for name, rate in rates.items()}
+
+    least = load({name: max(rate.asked, rate.suffices) for name, rate in rates.items()})
+    percent, most = 100, max((100 * rate.suffices // rate.asked + 1 for rate in rates.values()), default=100)
+    budget = None if capacity is None else capacity * SHARE // 100
+    while budget is not None and percent < most and load(slowed(percent)) > budget:
+        percent += 5
+    intervals = slowed(percent)
+    return StreamPlan(intervals, load(intervals), least, capacity)
 
 
 class StreamRequests:
-    """SET_MESSAGE_INTERVAL for each message of `wanted` (its interval in us), one request outstanding at a time.
+    """SET_MESSAGE_INTERVAL for each message of the plan, one request outstanding at a time.
 
-    Those `at_times` are asked for like the others, and not missed when they do not come. `needed` holds groups of
+    Those of `AT_TIMES` are asked for like the others, and not missed when they do not come. `needed` holds groups of
     messages of which one is enough: the sources of one signal. `notes` collects what an operator should know: which
-    streams come too seldom, and when they are right again.
+    streams come too seldom, when they are right again, and once how much is delivered of what was asked for.
+
+    On a link whose capacity is known, what nobody here asked for is turned off where there is no room for it.
     """
 
-    def __init__(
-        self, wanted: Mapping[str, int], needed: Iterable[frozenset[str]], at_times: Mapping[str, int] | None = None
-    ) -> None:
-        self._at_times = at_times or {}
-        self._needed = [*needed, *[frozenset({name}) for name in ALWAYS]]
-        self._wanted = {name: us for name, us in wanted.items() if messages.number_of(name) is not None}
+    def __init__(self, plan: StreamPlan, needed: Iterable[frozenset[str]]) -> None:
+        self.plan = plan
+        self._needed = [*needed, *[frozenset({name}) for name in AT_LEAST]]
+        known = {name: us for name, us in plan.intervals.items() if messages.number_of(name) is not None}
+        self._at_times = {name: us for name, us in known.items() if name in AT_TIMES}
+        self._wanted = {name: us for name, us in known.items() if name not in AT_TIMES}
         self._queue = [*self._wanted, *self._at_times]
         self._refused: set[str] = set()
         self._heard_us: dict[str, int] = {}
@@ -58,13 +124,21 @@ class StreamRequests:
         self._counts = dict.fromkeys(self._wanted, 0)
         self._measured_us: int | None = None
         self._slow: set[str] = set()
+        self._octets = 0  # of all that came since the last measurement
+        self._others: dict[str, int] = {}  # of what was not asked for
+        self._off: set[str] = set()  # what was turned off
+        #: octets a second that came, and the interval in us of each message that was asked for; None before measured
+        self.measured: tuple[int, Mapping[str, int]] | None = None
         self.notes: list[str] = []
 
-    def heard(self, name: str, now_us: int) -> None:
-        """A message came."""
+    def heard(self, name: str, now_us: int, octets: int = 0) -> None:
+        """A message came, in a frame of so many octets."""
         self._heard_us[name] = now_us
+        self._octets += octets
         if name in self._counts:
             self._counts[name] += 1
+        elif octets and name not in self._at_times and name not in _ANSWERS:
+            self._others[name] = self._others.get(name, 0) + octets
 
     def answered(self, accepted: bool, now_us: int) -> None:
         """A request was acknowledged. An acknowledgement does not say of which message it is."""
@@ -98,8 +172,16 @@ class StreamRequests:
         if not self._queue:
             return []
         self._asking, self._asked_us = self._queue.pop(0), now_us
-        interval_us = self._wanted.get(self._asking) or self._at_times[self._asking]
+        if self._asking in self._off:
+            interval_us = _NEVER_US
+        else:
+            interval_us = self._wanted.get(self._asking) or self._at_times[self._asking]
         return [messages.message_interval(system, self._asking, interval_us)]
+
+    @property
+    def slow(self) -> Sequence[str]:
+        """Which of those that it has come at less than half the rate asked for."""
+        return sorted(self._slow)
 
     def interrupted(self) -> None:
         """The link was silent: rates are measured anew."""
@@ -123,8 +205,37 @@ class StreamRequests:
         if self._measured_us is not None:
             self._compare(now_us - self._measured_us)
         self._measured_us, self._counts = now_us, dict.fromkeys(self._wanted, 0)
+        self._octets, self._others = 0, {}
 
     def _compare(self, passed_us: int) -> None:
+        came = {name: passed_us // count for name, count in self._counts.items() if count}
+        first, octets = self.measured is None, self._octets * _SECOND // passed_us
+        self.measured = octets, came
+        self._compare_each(passed_us)
+        if first:
+            self.notes.append(self._delivery(octets))
+        self._make_room(octets)
+
+    def _delivery(self, octets: int) -> str:
+        """How much was asked for and how much came, in words."""
+        capacity = self.plan.capacity
+        of = "" if capacity is None else f" of {capacity} that the link carries"
+        slow = f"; too seldom: {', '.join(self.slow)}" if self._slow else ""
+        return f"streams: {self.plan.octets} octets a second asked for{of}, {octets} came in all{slow}"
+
+    def _make_room(self, octets: int) -> None:
+        """Turn off what was not asked for, if it takes the room of what was."""
+        capacity = self.plan.capacity
+        if capacity is None or not self._others or not (self._slow or octets > capacity * SHARE // 100):
+            return
+        names = sorted(set(self._others) - self._off, key=lambda name: -self._others[name])
+        names = [name for name in names if messages.number_of(name) is not None]
+        if names:
+            self._off.update(names)
+            self._queue += names
+            self.notes.append(f"turned off on this link, for lack of room: {', '.join(names)}")
+
+    def _compare_each(self, passed_us: int) -> None:
         for name, asked_us in self._wanted.items():
             count = self._counts[name]
             if name in self._refused or not count:

@@ -4,19 +4,16 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Final, NamedTuple, TypeAlias
 
+from rtshcua.decision.rates import Rate, rates
 from rtshcua.decision.tree import where
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.quantise import hypot_mm, quantise
+from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION, Signal, SignalSource
 from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, project
-
-#: Each message is asked for several times within the shortest time to stale of what it carries, within these, in us.
-MOST_OFTEN_US, LEAST_OFTEN_US = 100_000, 1_000_000
-_WITHIN_STALE = 4
-
 
 _Read: TypeAlias = Callable[[Any], int | None]  # a field of a message
 _NONE: Final = frozenset[str]()
@@ -42,21 +39,19 @@ class Telemetry:
     Raises UnknownSource.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy, contracts: Sequence[Contract] = ()) -> None:
         vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
         self._told: set[str] = set()  # what came of the autopilot: of each name, always the same slots
         self._first: dict[tuple[int, str], Any] = {}
         self._by_message: dict[str, list[_Carried]] = {}
-        stale_us: dict[str, int] = {}
         for signal in policy.signals:
             for source in signal.sources:
                 _check(signal, source)
                 name = source.message
                 self._by_message.setdefault(name, []).append(_carried(signal, source, policy.projection))
-                stale_us[name] = min(signal.stale_us, stale_us.get(name, signal.stale_us))
-        #: the messages that carry some signal, and how often each is needed, in us
-        self.intervals: Mapping[str, int] = {name: _often(each_us) for name, each_us in stale_us.items()}
+        #: the messages that carry some signal, and how often each is needed; by the contracts of a mission's steps too
+        self.rates: Mapping[str, Rate] = rates(policy, contracts)
         #: for each signal, the messages that may carry it
         self.sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
 
@@ -103,10 +98,6 @@ def _check(signal: Signal, source: SignalSource) -> None:
                 f"the policy reads `{signal.name}` from `{source.message}.{name}`, which is no number that a vehicle "
                 "reports"
             )
-
-
-def _often(stale_us: int) -> int:
-    return min(max(stale_us // _WITHIN_STALE, MOST_OFTEN_US), LEAST_OFTEN_US)
 
 
 class _Carried(NamedTuple):

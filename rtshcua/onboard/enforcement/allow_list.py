@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.framing import CHECKSUM, HEAD, HEADER, MARKER
-from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
+from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, HEARTBEAT, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import meridian
@@ -77,6 +77,15 @@ def is_housekeeping(frame: Frame) -> bool:
     """Whether the frame moves nothing, and may leave at any time."""
     rule = _AT_ANY_TIME.get(frame.message)
     return rule is not None and rule(frame.fields)
+
+
+#: the system id of a ground station, by custom and by `SYSID_MYGCS` as ArduPilot comes
+_GROUND_STATION: Final = 255
+
+
+def is_greeting(frame: Frame) -> bool:
+    """Whether the frame is our heartbeat, under an id that no ground station has: it may leave before any came."""
+    return frame.message == HEARTBEAT and _is_own(frame.fields) and frame.system != _GROUND_STATION
 
 
 def is_of_fence(frame: Frame) -> bool:

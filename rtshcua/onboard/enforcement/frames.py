@@ -133,8 +133,8 @@ class FrameSession:
         frame = read_frame(octets)
         if frame is None:
             return NOT_ONE_FRAME
-        if not self._system:
-            return NO_VEHICLE
+        if not self._system:  # a vehicle may wait to be spoken to; what we are is all that it is told then
+            return None if allow_list.is_greeting(frame) and frame.component == OURS else NO_VEHICLE
         if (frame.system, frame.component) != (self._system, OURS):
             return NOT_OURS
         target = frame.target

@@ -1,5 +1,6 @@
 """The doctor, beside the simulated vehicle in explicit time: what is well, and each thing that would stop a mission."""
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -59,6 +60,8 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     assert stops(found) == set()
     assert found["autopilot/version"].verdict is MissionVerdict.OK
     assert found["link/answers"].verdict is found["link/round-trip"].verdict is MissionVerdict.OK
+    assert found["link/streams"].verdict is MissionVerdict.OK
+    assert "octets a second asked for" in found["link/streams"].found
     assert found["link/round-trip"].found == "0 ms there and back; its clock is known to 3 ms"
     assert found["signal/battery"].found.startswith("`battery`: BATTERY_STATUS every ")
     assert {slug for slug in found if slug.startswith("settings/")} >= {
@@ -71,6 +74,26 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     asked = {each.command for each in names if each.get_type() == "COMMAND_LONG"}
     own_checks = {mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # it looks again, and says why not
     assert asked - own_checks == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
+
+
+def test_a_link_that_is_too_slow_stops_a_mission_and_one_that_delivers_less_is_told() -> None:
+    def narrow(vehicle: VirtualVehicle) -> None:
+        vehicle.driver.carried_by(960)
+
+    finding = examine(case.simulated("px4"), prepare=narrow)["link/streams"]
+    assert finding.verdict is MissionVerdict.STOP
+    assert "carries 960 octets a second" in finding.found
+
+    def sparse(vehicle: VirtualVehicle) -> None:
+        every = itertools.count()
+        vehicle.hurt = lambda datagram: [] if datagram[7] == 33 and next(every) % 4 else [datagram]
+
+    finding = examine(case.simulated("px4"), prepare=sparse)["link/streams"]
+    assert finding.verdict is MissionVerdict.WARN
+    assert "GLOBAL_POSITION_INT every" in finding.found
+    assert "MAV_n_RATE" in finding.advice
+    finding = examine(case.simulated("px4"), seconds=4)["link/streams"]
+    assert finding.verdict is MissionVerdict.UNKNOWN
 
 
 @FLAVOURS

@@ -37,9 +37,15 @@ def test_every_error_is_one_object(words: str, code: ExitCode, slug: str, capsys
     said = capsys.readouterr()
     found: dict[str, Any] = json.loads(said.out)
     assert set(found) == {"error", "exit_code"}
-    assert set(found["error"]) == {"slug", "text", "help"}
+    assert set(found["error"]) - {"at"} == {"slug", "text", "help"}
     assert (found["exit_code"], found["error"]["slug"]) == (code, slug)
     assert said.err.splitlines()[0] == f"error: {found['error']['text']}", "a person still reads it"
+
+
+def test_an_address_that_is_none_says_where_it_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["doctor", "--connect", "serial:/dev/ttyAMA0:57601", "--json"]) == ExitCode.USAGE
+    at = json.loads(capsys.readouterr().out)["error"]["at"]
+    assert at == {"option": "--connect", "value": "serial:/dev/ttyAMA0:57601", "start": 20, "end": 25}
 
 
 def test_without_json_the_output_stays_empty(capsys: pytest.CaptureFixture[str]) -> None:

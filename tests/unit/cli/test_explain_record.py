@@ -43,7 +43,7 @@ def test_a_decision(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "gps.fix = fix_3d" in told
     assert "durability 3 (synced first): on the disk before what it permits went out" in told
     assert (
-        f"signed by record 5, which seals epoch 0, with epoch key {RECORDS[0]['next_key']}, which record 0 names"
+        f"signed by record 6, which seals epoch 0, with epoch key {RECORDS[0]['next_key']}, which record 0 names"
         in told
     )
     assert "verified yes" in told

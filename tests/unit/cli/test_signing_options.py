@@ -144,7 +144,7 @@ def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Pa
     assert signing.rejected == "frames come, and none is believed: 1 not signed"
     link.accept(other.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)
     assert "1 signed with another key, 1 not signed" in (signing.rejected or "")
-    _, text, help = unmet("a vehicle", 10, None, signing.rejected)
+    _, text, help = unmet("a vehicle", 10, None, signing.rejected, "nothing else matters then")
     assert text.startswith("no heartbeat of a vehicle within 10 s: frames come")
     assert "--signing-key" in help
     right = SignedLink(KEY, State(0, {}), now.utc_us, now.monotonic_us, link=1)

@@ -323,7 +323,7 @@ def test_without_homes_height_nothing_goes_above_sea() -> None:
 
 def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
     gate = FrameSession()
-    assert gate.seal(pack(ALWAYS[0]), NOW) is NO_VEHICLE
+    assert gate.seal(pack(ALWAYS[1]), NOW) is NO_VEHICLE
     for nobody in (
         pack(heartbeat(8), component=1),
         pack(heartbeat(PX4), component=2),
@@ -333,13 +333,26 @@ def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
         pack(heartbeat(PX4), component=1)[:-1],
     ):
         gate.observe(nobody)
-        assert gate.seal(pack(ALWAYS[0]), NOW) is NO_VEHICLE
+        assert gate.seal(pack(ALWAYS[1]), NOW) is NO_VEHICLE
     gate.observe(pack(heartbeat(ARDUPILOT), component=1))
     gate.observe(pack(heartbeat(PX4), component=1))
     gate.observe(pack(heartbeat(PX4), system=SYSTEM + 1, component=1))
     gate.open(command(K.LAND), LATEST)
     assert covers(gate, long(176, 1, 9))
     assert gate.seal(pack(ALWAYS[0], system=SYSTEM + 1), NOW) is NOT_OURS
+
+
+def test_before_a_vehicle_is_known_only_a_greeting_leaves() -> None:
+    """Over some links a vehicle waits to be spoken to."""
+    gate = FrameSession()
+    assert gate.seal(pack(ALWAYS[0]), NOW) == pack(ALWAYS[0])
+    for other in (
+        pack(ALWAYS[0], system=255),
+        pack(ALWAYS[0], component=1),
+        pack(heartbeat(PX4)),
+        pack(long(176, 1, 9)),
+    ):
+        assert gate.seal(other, NOW) is NO_VEHICLE
 
 
 def test_we_speak_as_ourselves_and_to_the_autopilot_alone() -> None:

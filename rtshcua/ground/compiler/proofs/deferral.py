@@ -12,11 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.rates import awaited, signal_of
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.proofs.rates import RATES, arrives, interval, signal_of
+from rtshcua.ground.compiler.proofs.rates import arrives, best, interval, report_intervals
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US, approval
 from rtshcua.model.flat.code import Clause
@@ -35,7 +36,7 @@ NEVER = 1 << 62
 def prove(ground: Ground) -> None:
     """Report the deferrals of each skill that no report can end, and approvals that come too late by their nature."""
     policy = ground.prepared.policy
-    intervals = RATES.intervals(policy)
+    often = report_intervals(policy)
     reported: set[str] = set()
     for number, contract in enumerate(policy.contracts):
         if contract.timing_class == TimingClass.REFLEX:
@@ -47,9 +48,9 @@ def prove(ground: Ground) -> None:
                 if signal.name not in watched | reported:  # else it is E1201
                     reported.add(signal.name)
                     _never(ground, signal, clause)
-            elif interval(signal, intervals) > contract.deadline_us and contract.name not in reported:
+            elif interval(signal, often) > contract.deadline_us and contract.name not in reported:
                 reported.add(contract.name)
-                _late(ground, contract, signal, clause, intervals)
+                _late(ground, contract, signal, clause, often)
     _hasty(ground)
 
 
@@ -58,25 +59,20 @@ def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> No
     flat = invocation.invocation
     if step.overrides is None or flat.contract.timing_class == TimingClass.REFLEX:
         return
-    intervals = RATES.intervals(ground.prepared.policy)
-    skills = ground.prepared.policy.contracts[flat.skill]
-    if any(interval(signal, intervals) > skills.deadline_us for _, signal in _awaited(ground, flat.skill, skills)):
+    policy = ground.prepared.policy
+    skills, often = policy.contracts[flat.skill], report_intervals(policy, (flat.contract,))
+    if any(interval(signal, often) > skills.deadline_us for _, signal in _awaited(ground, flat.skill, skills)):
         return  # said of the skill
     for clause, signal in _awaited(ground, flat.skill, flat.contract):
-        if arrives(signal) and interval(signal, intervals) > flat.contract.deadline_us:
+        if arrives(signal) and interval(signal, often) > flat.contract.deadline_us:
             own = step.overrides.deadline
-            _late(ground, flat.contract, signal, clause, intervals, step.span if own is None else own.span)
+            _late(ground, flat.contract, signal, clause, often, step.span if own is None else own.span)
             return
 
 
 def _awaited(ground: Ground, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
     """The signals that a decision on a contract may wait for, and what reads them."""
-    forbids = tuple(
-        rule.when
-        for rule in ground.prepared.policy.rules
-        if rule.kind == RuleKind.FORBID and rule.when is not None and number in (rule.skills or (number,))
-    )
-    for clause in (*contract.require, *contract.assume, *contract.maintain, *forbids):
+    for clause in awaited(ground.prepared.policy, number, contract):
         for signal in _signals(ground, (clause,)):
             yield clause, signal
 
@@ -179,19 +175,18 @@ def _late(
     contract: Contract,
     signal: Signal,
     clause: Clause,
-    intervals: Mapping[str, int],
+    often: Mapping[str, int],
     span: Span | None = None,
 ) -> None:
     deadline = ground.context.symbols.skills[contract.name].deadline
     assert deadline is not None
-    often = interval(signal, intervals)
+    every = _time(interval(signal, often))
     ground.context.report.add(
         codes.NO_RESOLVER,
         span or deadline.span,
         f"`{contract.name}` waits {_time(contract.deadline_us)} at most, and while `{signal.name}` is unknown its next "
-        f"report may take {_time(often)}",
-        help=f"let the deadline be {_time(often)} or more, or let `{signal.name}` go stale sooner, so that it is "
-        "asked for more often",
+        f"report may take {every}: `{best(signal, often).message}` comes every {every} at best",
+        help=f"let the deadline be {every} or more, or read `{signal.name}` from a message that comes more often",
         labels=[(ground.span(clause), "this waits for it")],
     )
 

@@ -12,14 +12,15 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.rates import signal_of
 from rtshcua.decision.tree import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.proofs.rates import RATES, arrives, interval, signal_of
+from rtshcua.ground.compiler.proofs.rates import arrives, best, interval, older_by, report_intervals
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import Contract
-from rtshcua.model.flat.policy import MonitorKind, RuleKind
+from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
 from rtshcua.model.flat.signal import Signal
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
@@ -46,13 +47,18 @@ class Watched(NamedTuple):
 def prove(ground: Ground) -> None:
     """Report every signal, window and clause of a policy that nothing comes of, and contracts that react too late."""
     policy = ground.prepared.policy
-    intervals = RATES.intervals(policy)
+    intervals = report_intervals(policy)
     found: dict[str, Watched] = {}
     for clause in _watched(ground):
         for signal in _signals(ground, clause):
             found.setdefault(signal.name, Watched(signal, ground.span(clause)))
     for watched in found.values():
         _observable(ground, watched, intervals)
+    for clause in _asked(policy):
+        for signal in _signals(ground, clause):
+            if signal.name not in found and arrives(signal):
+                found[signal.name] = Watched(signal, ground.span(clause))
+                _stays_known(ground, found[signal.name], intervals, "this asks for it")
     _windows(ground, intervals)
     for contract in policy.contracts:
         for clause in (*contract.assume, *contract.maintain):
@@ -68,8 +74,8 @@ def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> No
     own = step.overrides
     if own is None:
         return
-    intervals = RATES.intervals(ground.prepared.policy)
     flat = invocation.invocation
+    intervals = report_intervals(ground.prepared.policy, (flat.contract,))
     contract, skills = flat.contract, ground.prepared.policy.contracts[flat.skill]
     watched = (*contract.assume[len(skills.assume) :], *contract.maintain[len(skills.maintain) :])
     before = {signal.name for clause in _watched(ground) for signal in _signals(ground, clause)}
@@ -97,6 +103,15 @@ def _watched(ground: Ground) -> Iterator[Clause]:
         yield monitor.when
 
 
+def _asked(policy: Policy) -> Iterator[Clause]:
+    """What is evaluated before a step begins, and not again."""
+    for contract in policy.contracts:
+        yield from contract.require
+    for rule in policy.rules:
+        if rule.when is not None:
+            yield rule.when
+
+
 def _signals(ground: Ground, *clauses: Clause) -> Iterator[Signal]:
     policy = ground.prepared.policy
     slots = slots_read(clauses, policy.vehicle, policy.monitors)
@@ -115,16 +130,25 @@ def _observable(ground: Ground, watched: Watched, intervals: Mapping[str, int]) 
             labels=[(span, "this watches it in flight")],
         )
         return
-    often = interval(signal, intervals)
-    if signal.stale_us < often:
-        ground.context.report.add(
-            codes.UNOBSERVABLE,
-            declared.stale_after.span,
-            f"`{signal.name}` is stale after {_time(signal.stale_us)}, and `{signal.sources[0].message}` comes every "
-            f"{_time(often)} at best, so it is unknown most of the time",
-            help=f"let it be stale after {_time(2 * often)} or more",
-            labels=[(span, "this watches it in flight")],
-        )
+    _stays_known(ground, watched, intervals, "this watches it in flight")
+
+
+def _stays_known(ground: Ground, watched: Watched, intervals: Mapping[str, int], reads: str) -> None:
+    """A signal that is stale before its next report can come is unknown again and again, whatever is asked for."""
+    signal, span = watched
+    often, message = interval(signal, intervals), best(signal, intervals).message
+    older = older_by(message, ground.context.dialect)
+    if signal.stale_us >= often + older:
+        return
+    why = f", and what it says may be {_time(older)} old then" if older else ""
+    ground.context.report.add(
+        codes.UNOBSERVABLE,
+        ground.context.symbols.signals[signal.name].stale_after.span,
+        f"`{signal.name}` is stale after {_time(signal.stale_us)}, and `{message}` comes every {_time(often)} at best"
+        f"{why}: it is unknown again and again",
+        help=f"let it be stale after {_time(2 * often + older)} or more",
+        labels=[(span, reads)],
+    )
 
 
 def _windows(ground: Ground, intervals: Mapping[str, int]) -> None:

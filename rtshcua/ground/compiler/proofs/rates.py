@@ -1,15 +1,15 @@
-"""How often the vehicle is asked to report what a signal is read from.
+"""How often reports of a signal come, for the proofs that something comes of them in time.
 
-The adapters ask for each message several times within the time after which its signals are stale; some they ask for at
-a fixed rate, because effects are seen by them. These are their figures (a test compares them): the ground does not
-import what flies.
+The figures are those that the adapters ask by: `decision.rates`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 
+from rtshcua.decision import rates
+from rtshcua.mavlink.dialect import Dialect
+from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import POSITION, Signal
+from rtshcua.model.flat.signal import Signal, SignalSource
 
 #: messages that a vehicle is sent and never sends itself as telemetry
 COMMANDS = frozenset({
@@ -22,49 +22,23 @@ COMMANDS = frozenset({
 })  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Rates:
-    """Times in us. A message is asked for `within_stale` times within the shortest time to stale of what it carries,
-    between `most_often` and `least_often`; those of `fixed` at that interval whatever they carry.
+#: what tells when the vehicle measured, among a message's fields
+STAMPS = frozenset({"time_boot_ms", "time_usec"})
+
+
+def report_intervals(policy: Policy, contracts: Sequence[Contract] = ()) -> dict[str, int]:
+    """How long it is between two reports of each message that a policy's signals are read from, in us: as asked for,
+    where any autopilot reports so often.
     """
-
-    most_often: int = 100_000
-    least_often: int = 1_000_000
-    within_stale: int = 4
-    fixed: Mapping[str, int] = field(
-        default_factory=lambda: {
-            "HEARTBEAT": 100_000,
-            "GLOBAL_POSITION_INT": 100_000,
-            "EXTENDED_SYS_STATE": 100_000,
-            "ATTITUDE": 100_000,
-            "GPS_RAW_INT": 500_000,
-            "SYS_STATUS": 500_000,
-        }
-    )
-
-    def intervals(self, policy: Policy) -> dict[str, int]:
-        """How long it is between two reports of each message that a policy's signals are read from."""
-        stale: dict[str, int] = {}
-        for signal in policy.signals:
-            for source in signal.sources:
-                stale[source.message] = min(signal.stale_us, stale.get(source.message, signal.stale_us))
-        asked = {
-            name: min(max(least // self.within_stale, self.most_often), self.least_often)
-            for name, least in stale.items()
-        }
-        return {name: self.fixed.get(name, interval) for name, interval in asked.items()}
+    return rates.delivered(rates.rates(policy, contracts))
 
 
-RATES = Rates()
-
-
-def signal_of(policy: Policy, slot: int) -> Signal:
-    """The signal that owns a slot."""
-    return next(
-        signal
-        for signal in policy.signals
-        if slot == signal.slot or (signal.kind == POSITION and slot == signal.slot + 1)
-    )
+def older_by(message: str, dialect: Dialect) -> int:
+    """How much older than its report what a message carries may be, in us, on a link without delay."""
+    if message == "GPS_RAW_INT":
+        return rates.FIX
+    known = dialect.messages.get(message)
+    return rates.UNSTAMPED if known is None or STAMPS.isdisjoint(known.fields) else 0
 
 
 def arrives(signal: Signal) -> bool:
@@ -72,6 +46,11 @@ def arrives(signal: Signal) -> bool:
     return any(source.message not in COMMANDS for source in signal.sources)
 
 
+def best(signal: Signal, intervals: Mapping[str, int]) -> SignalSource:
+    """The source of a signal that reports most often."""
+    return min(signal.sources, key=lambda source: intervals[source.message])
+
+
 def interval(signal: Signal, intervals: Mapping[str, int]) -> int:
     """How long it is at most between two reports of a signal, from the most frequent of its messages."""
-    return min(intervals[source.message] for source in signal.sources)
+    return intervals[best(signal, intervals).message]

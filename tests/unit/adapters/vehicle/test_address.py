@@ -1,29 +1,60 @@
-"""Link addresses."""
+"""Link addresses: what is accepted, and what is said of each that is not."""
 
 import pytest
 
-from rtshcua.adapters.vehicle.address import Address, parse
-from virtual.rows import rows
+from rtshcua.adapters.vehicle.address import Address, AddressError, Way, parse
 
 
-@pytest.mark.parametrize(("text", "loopback"), [
-    ("udpin:127.0.0.1:14550", True), ("udpin:0.0.0.0:14550", False), ("udpout:localhost:1", True),
-    ("udpin:drone.example:65535", False),
+@pytest.mark.parametrize(("text", "loopback", "capacity"), [
+    ("udpin:127.0.0.1:14550", True, None), ("udpin:0.0.0.0:14550", False, None), ("udpout:localhost:1", True, None),
+    ("udpin:drone.example:65535", False, None), ("tcp:10.0.0.7:5760", False, None),
+    ("tcpin:127.0.0.1:5760", True, None),
+    ("serial:/dev/ttyAMA0:921600", False, 92_160), ("serial:/dev/serial/by-id/usb-a:b-if00:57600", False, 5_760),
 ])  # fmt: skip
-def test_good_ones(text: str, loopback: bool) -> None:
+def test_good_ones(text: str, loopback: bool, capacity: int | None) -> None:
     made = parse(text)
     assert str(made) == text
     assert made.is_loopback is loopback
+    assert made.capacity == capacity, "ten bits an octet"
 
 
 def test_parts() -> None:
-    assert parse("udpin:10.0.0.7:14551") == Address("udpin", "10.0.0.7", 14551)
+    assert parse("udpin:10.0.0.7:14551") == Address(Way.UDP_IN, "10.0.0.7", 14551)
+    assert parse("serial:/dev/ttyUSB0:57600") == Address(Way.SERIAL, "/dev/ttyUSB0", 57_600)
 
 
-@rows("text", [
-    "", "udpin", "udpin:", "udpin:14550", "udpin::14550", "udpin:h:0", "udpin:h:65536", "udpin:h:-1", "udpin:h:1x",
-    "tcp:h:1", "udpin:h h:1", "udpin:h:١", "udpin:[::1]:14550",
+@pytest.mark.parametrize(("text", "marked", "says", "accepted"), [
+    ("", "", "is empty", "udpin:0.0.0.0:14550"),
+    ("udpin", "", "host and port of the link is missing", "udpin:0.0.0.0:14550"),
+    ("udpin:", "", "host and port", "udpin:0.0.0.0:14550"),
+    ("udpin:14550", "", "port of the link is missing", "udpin:0.0.0.0:14550"),
+    ("udpin::14550", "", "host of the link is missing", "udpin:0.0.0.0:14550"),
+    ("udpin:h:0", "0", "is no port", "from 1 to 65535"),
+    ("udpin:h:65536", "65536", "is no port", "from 1 to 65535"),
+    ("udpin:h:-1", "-1", "is no port", "is a number"),
+    ("udpin:h:1x", "1x", "is no port", "udpin:0.0.0.0:14550"),
+    ("udpin:h:", "", "port of the link is missing", "udpin:0.0.0.0:14550"),
+    ("tcp:h h:1", "h h", "no host name", "tcp:192.168.1.10:5760"),
+    ("udpin:h:\u0661", "\u0661", "is no port", "is a number"),
+    ("udpin:[::1]:14550", "[::1]", "no host name", "IPv6 is not supported"),
+    ("serail:/dev/ttyAMA0:57600", "serail", "no kind of link", "did you mean `serial`"),
+    ("http:h:1", "http", "no kind of link", "serial:/dev/ttyAMA0:921600"),
+    ("/dev/ttyAMA0", "/dev/ttyAMA0", "no kind of link", "serial:/dev/ttyAMA0:921600"),
+    ("serial:/dev/ttyAMA0", "", "baud rate of the link is missing", "serial:/dev/ttyAMA0:921600"),
+    ("serial:ttyAMA0:57600", "ttyAMA0", "no path of a device", "absolute path"),
+    ("serial:/dev/ttyAMA0:fast", "fast", "is no baud rate", "is a number"),
+    ("serial:/dev/ttyAMA0:57601", "57601", "no baud rate of this system", "the nearest is 57600"),
 ])  # fmt: skip
-def test_bad_ones(text: str) -> None:
-    with pytest.raises(ValueError, match="is no "):
+def test_each_bad_one_says_what_is_wrong_where_and_what_is_accepted(
+    text: str, marked: str, says: str, accepted: str
+) -> None:
+    with pytest.raises(AddressError, match=says) as error:
         parse(text)
+    assert text[error.value.start : error.value.end] == marked
+    assert accepted in error.value.help
+
+
+def test_a_way_that_is_not_for_this_option_is_told_from_one_that_is_none() -> None:
+    with pytest.raises(AddressError, match="is no way to connect here") as error:
+        parse("tcp:127.0.0.1:5760", (Way.UDP_OUT,))
+    assert error.value.help == "write `udpout:127.0.0.1:14550`"

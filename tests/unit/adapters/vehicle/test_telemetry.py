@@ -76,9 +76,9 @@ def test_a_vehicle_that_crosses_longitude_180_goes_on_where_it_was() -> None:
 
 
 def test_asks_often_enough_for_what_grows_stale_and_no_oftener_than_useful() -> None:
-    intervals = Telemetry(POLICY).intervals
-    assert intervals["GLOBAL_POSITION_INT"] == 125_000  # stale after 500 ms
-    assert intervals["BATTERY_STATUS"] == 1_000_000  # stale after 5 s
+    rates = Telemetry(POLICY).rates
+    assert rates["GLOBAL_POSITION_INT"].asked == 100_000  # stale after 500 ms, and effects are seen by it
+    assert rates["BATTERY_STATUS"].asked == 1_000_000  # stale after 5 s
     assert frozenset({"WIND_COV", "WIND"}) in Telemetry(POLICY).sources
 
 

@@ -3,9 +3,9 @@
 import pytest
 
 from reference.sources import findings, found, mission, policy, program, skill
-from rtshcua.adapters.vehicle import manoeuvre, streams, telemetry
+from rtshcua.adapters.vehicle import manoeuvre
 from rtshcua.ground.compiler.proofs import observation
-from rtshcua.ground.compiler.proofs.rates import COMMANDS, RATES
+from rtshcua.ground.compiler.proofs.rates import COMMANDS
 from rtshcua.mavlink import dialect
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from virtual.rows import rows
@@ -18,10 +18,6 @@ def codes(*parts: str) -> list[str]:
 
 
 def test_the_figures_are_those_of_what_flies() -> None:
-    assert dict(RATES.fixed) == dict(streams.ALWAYS)
-    assert RATES.most_often == telemetry.MOST_OFTEN_US
-    assert RATES.least_often == telemetry.LEAST_OFTEN_US
-    assert RATES.within_stale == telemetry._WITHIN_STALE
     assert observation.DECIDE_US == CONSERVATIVE_US
     assert observation.ACTUATE_US == manoeuvre.RETRY_US
     assert dialect.load().messages.keys() >= COMMANDS
@@ -142,27 +138,33 @@ def test_what_is_only_required_is_not_watched() -> None:
 @rows(
     ("parts", "expected"),
     [
-        ({"deadline": "1 s", "require": "wind.speed < 9 m/s"}, []),
-        ({"deadline": "999 ms", "require": "wind.speed < 9 m/s"}, ["E0717"]),
-        ({"deadline": "999 ms", "assume": "wind.speed < 9 m/s"}, ["E0717"]),
-        ({"deadline": "100 ms", "require": "height < 90 m"}, []),  # the position comes every 100 ms
-        ({"deadline": "99 ms", "require": "height < 90 m"}, ["E0717"]),
-        ({"deadline": "99 ms", "require": "wind.speed < 9 m/s", "class": "reflex"}, []),  # does not wait
+        ({"deadline": "50 ms", "require": "wind.speed < 9 m/s"}, []),  # asked for as often as it needs it
+        ({"deadline": "49 ms", "require": "wind.speed < 9 m/s"}, ["E0717"]),  # nothing comes more often
+        ({"deadline": "49 ms", "assume": "wind.speed < 9 m/s"}, ["E0717"]),
+        ({"deadline": "50 ms", "require": "gps.fix >= fix_3d and landed == on_ground and battery > 20 %"}, []),
+        ({"deadline": "1 s", "require": "heard > 20 %"}, []),  # a radio reports once a second
+        ({"deadline": "999 ms", "require": "heard > 20 %"}, ["E0717"]),
+        ({"deadline": "999 ms", "require": "mode == 4"}, ["E0717"]),  # PX4's heartbeat comes once a second
+        ({"deadline": "49 ms", "require": "wind.speed < 9 m/s", "class": "reflex"}, []),  # does not wait
         ({"require": "told < 9 m/s"}, ["E0717"]),
         ({"assume": "told < 9 m/s"}, ["E1201"]),
         ({"require": "told < 9 m/s", "maintain": "told < 9 m/s"}, ["E1201"]),
     ],
 )
 def test_what_a_step_waits_for_can_come(parts: dict[str, str], expected: list[str]) -> None:
-    told = "signal told : count = COMMAND_LONG.command stale after 2 s\n"
+    told = (
+        "signal told : count = COMMAND_LONG.command stale after 2 s\n"
+        "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n"
+        "signal mode : count = HEARTBEAT.custom_mode stale after 5 s\n"
+    )
     clauses = {key: value.replace("told < 9 m/s", "told < 9") for key, value in parts.items()}
     assert codes(told, skill("probe()", **clauses), policy()) == expected
 
 
 def test_what_a_forbid_waits_for_counts_for_its_skills() -> None:
-    quick = skill("quick()", deadline="900 ms")
-    assert codes(quick, policy("forbid quick by any when wind.speed > 9 m/s")) == ["E0717"]
-    assert codes(quick, policy("forbid takeoff by any when wind.speed > 9 m/s")) == []
+    heard, quick = "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n", skill("quick()", deadline="900 ms")
+    assert codes(heard, quick, policy("forbid quick by any when heard < 9 %")) == ["E0717"]
+    assert codes(heard, quick, policy("forbid takeoff by any when heard < 9 %")) == []
 
 
 def test_nobody_approves_a_reflex() -> None:
@@ -231,19 +233,26 @@ def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected:
 @pytest.mark.parametrize(
     ("source", "stale", "expected"),
     [
-        ("WIND.speed", "100 ms", []),
-        ("WIND.speed", "99 ms", ["E1201"]),
-        ("VFR_HUD.airspeed", "100 ms", []),
-        ("GPS_RAW_INT.vel", "500 ms", []),
-        ("GPS_RAW_INT.vel", "499 ms", ["E1201"]),  # asked for at a fixed rate
+        ("WIND.speed", "150 ms", []),  # every 50 ms, and without a stamp as old as the position before it
+        ("WIND.speed", "149 ms", ["E1201"]),
+        ("LOCAL_POSITION_NED.vx", "50 ms", []),  # it says when it was measured
+        ("LOCAL_POSITION_NED.vx", "49 ms", ["E1201"]),
+        ("GPS_RAW_INT.vel", "267 ms", []),  # its stamp is that of the fix, of which there are five a second
+        ("GPS_RAW_INT.vel", "266 ms", ["E1201"]),
+        ("COMMAND_LONG.param1", "1 ms", None),  # never comes, which is said in its own words
     ],
 )
-def test_a_signal_comes_before_it_is_stale(source: str, stale: str, expected: list[str]) -> None:
-    signal = f"signal here : speed = {source} stale after {stale}\n"
+def test_a_signal_comes_before_it_is_stale(source: str, stale: str, expected: list[str] | None) -> None:
+    kind, limit = ("count", "9") if expected is None else ("speed", "9 m/s")
+    signal = f"signal here : {kind} = {source} stale after {stale}\n"
+    if expected is None:
+        assert codes(signal, skill("probe()", require=f"here < {limit}"), policy()) == ["E0717"]
+        return
     for clause in ("assume", "maintain"):
         assert codes(signal, skill("probe()", **{clause: "here < 9 m/s"}), policy()) == expected
     assert codes(signal, skill("probe()"), policy("degrade any when here > 9 m/s to return_home")) == expected
-    assert codes(signal, skill("probe()", require="here < 9 m/s"), policy()) == []
+    assert codes(signal, skill("probe()", require="here < 9 m/s"), policy()) == expected
+    assert codes(signal, skill("probe()"), policy("forbid probe by any when here > 9 m/s")) == expected
 
 
 @pytest.mark.parametrize(("window", "expected"), [("1 s", []), ("999 ms", ["E1201"])])

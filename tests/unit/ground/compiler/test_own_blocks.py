@@ -75,7 +75,7 @@ def quoted(found: Diagnostic, **parts: str) -> str:
     [
         ("", None, ""),
         ("{ deadline 2 s }", None, ""),
-        ("{ deadline 300 ms }", "E0717", "300 ms"),
+        ("{ deadline 49 ms }", "E0717", "49 ms"),
         ("{ lasts at most 1100 ms }", "E0808", "1100 ms"),
         ("{ maintain time <= 20 s }", "E1203", "time <= 20 s"),
         ("{ assume time >= 1 s }", "E1203", "time >= 1 s"),

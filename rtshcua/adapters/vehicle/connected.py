@@ -1,56 +1,65 @@
-"""The `Vehicle` port over UDP: one socket, one peer, every good frame kept for the raw log."""
+"""The `Vehicle` port over a transport: one peer, every good frame kept for the raw log."""
 
 import select
-import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.driver import HEARTBEAT_US, Driver
+from rtshcua.adapters.vehicle.transport import Transport
+from rtshcua.codec.stream import FrameStream, StreamCounts
 from rtshcua.mavlink.framing import unsigned
-from rtshcua.onboard.ports import Command, Event
+from rtshcua.onboard.ports import Command, Event, Noted
 
-_LARGEST = 65_535
-_BUFFER = 4 << 20  # asked for; what the system allows is enough for a moment of being held up
 #: One poll takes no more datagrams, and no more time, by its clock or the machine's, than this: a flood must not starve
 #: the runtime, and a backlog is worked off in order.
 _BATCH = 256
 _SLICE_US, _SLICE_S = 50_000, 0.002
 
 
-class UdpVehicle:
-    """Listens where the vehicle sends to (`udpin`), and answers the first sender that proves to be a vehicle.
+class ConnectedVehicle:
+    """Hears the vehicle at the other end of a transport, and answers the first sender that proves to be one.
 
-    Datagrams of other senders are read from then on only to learn whether there is a second vehicle. `keep` gets every
-    good frame that came from the vehicle, and every one that was sent, with its UTC time in us: when the next poll
-    begins, or at the end, for nothing that is sent is to wait for it.
-    Raises OSError where the address cannot be bound.
+    What other senders say is read from then on only to learn whether there is a second vehicle. Where the line or
+    connection of the vehicle is gone, the next one that it speaks over takes its place. `keep` gets every good frame
+    that came from the vehicle, and every one that was sent to it, with its UTC time in us: when the next poll begins,
+    or at the end, for nothing that is sent is to wait for it.
     """
 
     def __init__(
-        self, address: tuple[str, int], driver: Driver, clock: LinkClock, keep: Callable[[int, bytes], None]
+        self, transport: Transport, driver: Driver, clock: LinkClock, keep: Callable[[int, bytes], None]
     ) -> None:
         #: what is known of the vehicle
         self.driver = driver
+        self._transport = transport
         self._clock = clock
         self._keep = keep
-        self._peer: tuple[str, int] | None = None
+        self._peer: Hashable | None = None
         self._pending: list[Event] = []
-        self._buffer = memoryview(bytearray(_LARGEST))
         self._unkept: list[tuple[int, bytes]] = []
         self._slice_us = max(_SLICE_US, clock.us_in(_SLICE_S))
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind(address)
-        except OSError:
-            self._socket.close()
-            raise
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-        self._socket.setblocking(False)
+        self._greeted_us: int | None = None
+        self._seen = StreamCounts()  # of datagrams, while no vehicle is known
+        driver.carried_by(transport.capacity)
 
     @property
-    def port(self) -> int:
-        """The port listened at (the system's choice when 0 was asked for)."""
-        return int(self._socket.getsockname()[1])
+    def silence(self) -> str | None:
+        """Why no vehicle is heard, as far as what came tells; None where nothing came and nothing is wrong."""
+        counts = self._seen if self._seen.octets else self._transport.counts
+        if counts.frames:
+            return None
+        if not counts.octets:
+            return self._transport.trouble
+        if counts.old:
+            return (
+                f"{counts.old} frames of MAVLink 1 came, and this program speaks MAVLink 2: set `MAV_PROTO_VER` to 2 "
+                "(PX4) or the port's `SERIALn_PROTOCOL` to 2 (ArduPilot)"
+            )
+        if self._transport.capacity is None:
+            return f"{counts.octets} octets came, and no MAVLink frame is among them: something else sends there"
+        return (
+            f"{counts.octets} octets came, and no MAVLink frame is among them: the baud rate is probably wrong, or "
+            "something else is on this port"
+        )
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
         """Wait at most `timeout_us` of the clock for frames; gives what happened.
@@ -59,7 +68,13 @@ class UdpVehicle:
         """
         self._keep_all()
         events, self._pending = self._pending, []
-        links = [self._socket]
+        transport = self._transport
+        events += [Noted(now_us, text) for text in transport.tend(now_us)]
+        if self._peer is not None and not transport.is_open(self._peer):
+            self._peer = None
+        if transport.begins and self._peer is None:
+            self._greet(now_us)
+        links = transport.readable()
         came = bool(select.select(links, [], [], 0)[0])
         if came:  # before the driver is told the time: it must not take for silence that nobody looked
             self._drain(now_us + self._slice_us, events)
@@ -89,7 +104,7 @@ class UdpVehicle:
     def close(self) -> None:
         """Give the port back."""
         self._keep_all()
-        self._socket.close()
+        self._transport.close()
 
     def _drain(self, until_us: int, events: list[Event]) -> None:
         for _ in range(_BATCH):
@@ -98,14 +113,13 @@ class UdpVehicle:
                 return
 
     def _take(self, events: list[Event]) -> int | None:
-        """Take in a datagram that waits, and give the time; None if there is none."""
-        try:
-            octets, sender = self._socket.recvfrom_into(self._buffer)
-        except BlockingIOError:
+        """Take in what waits of one sender, and give the time; None if there is nothing."""
+        received = self._transport.receive()
+        if received is None:
             return None
-        except ConnectionError:  # an ICMP answer to something we sent: the peer is not there (yet)
+        datagram, sender = received
+        if not datagram:
             return 0
-        datagram = bytes(self._buffer[:octets])
         now = self._clock.now()
         now_us = now.monotonic_us
         if self._peer is not None and sender != self._peer:
@@ -114,6 +128,9 @@ class UdpVehicle:
         heard = self.driver.receive(datagram, now_us)
         if self._peer is None:
             if self.driver.flavour is None:
+                self._look(datagram)
+                return now_us
+            if not any(frame.system == self.driver.system for frame in heard.frames):
                 return now_us
             self._peer = sender
         for frame in heard.frames:
@@ -129,12 +146,23 @@ class UdpVehicle:
         if self._peer is None or not frames:
             return
         for frame in frames:
-            try:
-                self._socket.sendto(frame, self._peer)
-            except OSError:
-                continue  # lost, as any datagram may be: what matters is sent again, and only effects count
+            self._transport.send(frame, self._peer)
         utc_us = self._clock.now().utc_us
         self._unkept += [(utc_us, frame) for frame in frames]
+
+    def _greet(self, now_us: int) -> None:
+        """Speak first: over this transport a vehicle may wait for it. Not kept: it is to nobody yet."""
+        if self._greeted_us is not None and now_us - self._greeted_us < HEARTBEAT_US:
+            return
+        self._greeted_us = now_us
+        for frame in self.driver.link.greet(now_us):
+            self._transport.send(frame, None)
+
+    def _look(self, datagram: bytes) -> None:
+        """What there is in a datagram that tells of no vehicle."""
+        stream, seen = FrameStream(), self._seen
+        stream.feed(datagram)
+        self._seen = StreamCounts(*map(sum, zip(seen, stream.counts, strict=True)))
 
     def _keep_all(self) -> None:
         """Hand over what came and left since the last call, in its order."""

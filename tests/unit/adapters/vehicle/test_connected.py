@@ -9,8 +9,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.adapters.vehicle.udp import UdpVehicle
+from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
@@ -40,7 +41,7 @@ class Peer:
         (frame,) = self.codec.parse(self.socket.recv(65_535))
         return frame.name
 
-    def answers_time(self, link: UdpVehicle) -> None:
+    def answers_time(self, link: ConnectedVehicle) -> None:
         """Answer the first TIMESYNC that comes."""
         while True:
             (frame,) = self.codec.parse(self.socket.recv(65_535))
@@ -51,11 +52,12 @@ class Peer:
 
 
 @pytest.fixture
-def link() -> Iterator[UdpVehicle]:
+def link() -> Iterator[ConnectedVehicle]:
     kept: list[tuple[int, bytes]] = []
     frames = FrameSession()
-    made = UdpVehicle(
-        (HERE, 0), Driver(POLICY, frames), SystemClock(), lambda utc_us, frame: kept.append((utc_us, frame))
+    transport = UdpTransport(HERE, 0, begins=False)
+    made = ConnectedVehicle(
+        transport, Driver(POLICY, frames), SystemClock(), lambda utc_us, frame: kept.append((utc_us, frame))
     )
     made.kept = kept  # type: ignore[attr-defined]
     made.frames = frames  # type: ignore[attr-defined]
@@ -64,25 +66,29 @@ def link() -> Iterator[UdpVehicle]:
 
 
 @pytest.fixture
-def vehicle(link: UdpVehicle) -> Iterator[Peer]:
-    peer = Peer(link.port)
+def vehicle(link: ConnectedVehicle) -> Iterator[Peer]:
+    peer = Peer(port(link))
     yield peer
     peer.socket.close()
 
 
 @pytest.fixture
-def stranger(link: UdpVehicle) -> Iterator[Peer]:
-    peer = Peer(link.port, system=1)
+def stranger(link: ConnectedVehicle) -> Iterator[Peer]:
+    peer = Peer(port(link), system=1)
     yield peer
     peer.socket.close()
 
 
-def poll(link: UdpVehicle) -> list[Event]:
+def port(link: ConnectedVehicle) -> int:
+    return link._transport.port  # type: ignore[attr-defined, no-any-return]
+
+
+def poll(link: ConnectedVehicle) -> list[Event]:
     now_us = SystemClock().now().monotonic_us
     return list(link.poll(now_us, 1_000_000))
 
 
-def test_nothing_is_sent_before_a_vehicle_was_heard(link: UdpVehicle, stranger: Peer) -> None:
+def test_nothing_is_sent_before_a_vehicle_was_heard(link: ConnectedVehicle, stranger: Peer) -> None:
     stranger.socket.send(b"\xfd garbage")
     assert poll(link) == []
     stranger.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))  # a ground station
@@ -96,7 +102,7 @@ def test_nothing_is_sent_before_a_vehicle_was_heard(link: UdpVehicle, stranger: 
 
 
 def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
-    link: UdpVehicle, vehicle: Peer, stranger: Peer
+    link: ConnectedVehicle, vehicle: Peer, stranger: Peer
 ) -> None:
     vehicle.beat()
     poll(link)
@@ -111,7 +117,7 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
     assert readings.values == ((BATTERY, 5_700),)
 
 
-def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
+def test_what_is_sent_is_kept_and_told(link: ConnectedVehicle, vehicle: Peer) -> None:
     vehicle.beat()
     poll(link)
     hold, now_us = Command(9, "hover", MotionKind.HOLD, (), (), 0, 0), SystemClock().now().monotonic_us
@@ -124,12 +130,12 @@ def test_what_is_sent_is_kept_and_told(link: UdpVehicle, vehicle: Peer) -> None:
     assert "COMMAND_INT" in kept, "PX4 is stopped by a DO_REPOSITION"
 
 
-def test_a_busy_port_is_an_os_error(link: UdpVehicle) -> None:
+def test_a_busy_port_is_an_os_error(link: ConnectedVehicle) -> None:
     with pytest.raises(OSError, match="in use"):
-        UdpVehicle((HERE, link.port), Driver(POLICY, FrameSession()), SystemClock(), lambda *_: None)
+        UdpTransport(HERE, port(link), begins=False)
 
 
-def crowd(link: UdpVehicle) -> str | None:
+def crowd(link: ConnectedVehicle) -> str | None:
     """Another vehicle, after what was sent could come."""
     for _ in range(3):
         link.poll(SystemClock().now().monotonic_us, 20_000)
@@ -138,11 +144,11 @@ def crowd(link: UdpVehicle) -> str | None:
 
 @pytest.mark.parametrize(("system", "autopilot", "says"), [(2, 3, "systems 1 and 2"), (1, 12, "two vehicles speak")])
 def test_a_second_vehicle_keeps_the_first_from_being_ready(
-    link: UdpVehicle, vehicle: Peer, system: int, autopilot: int, says: str
+    link: ConnectedVehicle, vehicle: Peer, system: int, autopilot: int, says: str
 ) -> None:
     vehicle.beat()
     assert crowd(link) is None
-    other = Peer(link.port)
+    other = Peer(port(link))
     other.codec = Codec(system, 1)
     other.send(mavlink.MAVLink_heartbeat_message(2, autopilot, 0, 0, 4, 3))
     assert says in (crowd(link) or "")
@@ -150,10 +156,10 @@ def test_a_second_vehicle_keeps_the_first_from_being_ready(
     other.socket.close()
 
 
-def test_a_ground_station_is_no_vehicle(link: UdpVehicle, vehicle: Peer) -> None:
+def test_a_ground_station_is_no_vehicle(link: ConnectedVehicle, vehicle: Peer) -> None:
     vehicle.beat()
     crowd(link)
-    other = Peer(link.port)
+    other = Peer(port(link))
     for codec, kind, autopilot in ((Codec(255, 190), 6, 8), (Codec(2, 1), 26, 8), (Codec(2, 51), 2, 3)):
         other.codec = codec
         other.send(mavlink.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 4, 3))
@@ -163,8 +169,10 @@ def test_a_ground_station_is_no_vehicle(link: UdpVehicle, vehicle: Peer) -> None
 
 def test_the_system_that_was_named_is_flown_and_others_may_speak() -> None:
     frames = FrameSession()
-    link = UdpVehicle((HERE, 0), Driver(POLICY, frames, system=2), SystemClock(), lambda *_: None)
-    peers = [Peer(link.port), Peer(link.port)]
+    link = ConnectedVehicle(
+        UdpTransport(HERE, 0, begins=False), Driver(POLICY, frames, system=2), SystemClock(), lambda *_: None
+    )
+    peers = [Peer(port(link)), Peer(port(link))]
     peers[1].codec = Codec(2, 1)
     for peer in (peers[0], peers[1], peers[0]):
         peer.beat()
@@ -180,7 +188,7 @@ def test_the_system_that_was_named_is_flown_and_others_may_speak() -> None:
     link.close()
 
 
-def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: UdpVehicle, vehicle: Peer) -> None:
+def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: ConnectedVehicle, vehicle: Peer) -> None:
     kept: list[tuple[int, bytes]] = link.kept  # type: ignore[attr-defined]
     vehicle.beat()
     poll(link)
@@ -197,7 +205,7 @@ def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: UdpVeh
 
 
 def test_what_is_waited_for_is_acted_on_as_it_comes(
-    link: UdpVehicle, vehicle: Peer, monkeypatch: pytest.MonkeyPatch
+    link: ConnectedVehicle, vehicle: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     vehicle.beat()
     poll(link)
@@ -242,8 +250,10 @@ class Moment:
 def test_what_was_not_looked_at_for_a_while_is_no_silence(waits: bool) -> None:
     """This process was held up: what the vehicle said meanwhile lies in the socket."""
     clock = Moment()
-    link = UdpVehicle((HERE, 0), Driver(POLICY, FrameSession()), clock, lambda utc_us, frame: None)
-    peer = Peer(link.port)
+    link = ConnectedVehicle(
+        UdpTransport(HERE, 0, begins=False), Driver(POLICY, FrameSession()), clock, lambda utc_us, frame: None
+    )
+    peer = Peer(port(link))
     peer.beat()
     link.poll(clock.us, 0)
     clock.us += 3_000_000

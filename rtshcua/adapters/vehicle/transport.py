@@ -1,0 +1,427 @@
+"""How octets come from a vehicle and go to it: UDP datagrams, a TCP connection, a serial line.
+
+A transport never raises once it is made: what is lost is sent again by those who need it, and a line or connection that
+is gone is opened again until it is back. UDP keeps the borders of datagrams; of a stream whole frames are given.
+"""
+
+import errno
+import fcntl
+import os
+import socket
+import termios
+from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
+from typing import Final, Protocol
+
+from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.codec.stream import FrameStream, StreamCounts
+
+#: what is read at once
+_LARGEST: Final = 65_535
+_CHUNK: Final = 4_096
+_BUFFER: Final = 4 << 20  # asked for; what the system allows is enough for a moment of being held up
+#: a stream that takes nothing more keeps so many octets; what does not fit is lost, as any datagram may be
+_UNSENT: Final = 4_096
+#: a connection or line that is gone is opened again this often
+_AGAIN_US: Final = 500_000
+#: a connection that nobody answers any more is given up after so many seconds
+_DEAD_S: Final = 3
+#: connections at once: the vehicle's, and some that are told apart from it
+_MOST: Final = 4
+
+
+class Transport(Protocol):
+    """One way to a vehicle. `capacity`: octets a second each way, None where nobody knows.
+
+    `begins`: something may be sent before anything came, for otherwise nobody would speak. `trouble`: why nothing can
+    come now, for a person. `counts`: what came of it so far.
+    """
+
+    begins: bool
+    capacity: int | None
+    trouble: str | None
+
+    @property
+    def counts(self) -> StreamCounts:
+        """What came so far; of UDP octets alone."""
+        ...
+
+    def readable(self) -> Sequence[int]:
+        """The file descriptors to wait for."""
+        ...
+
+    def receive(self) -> tuple[bytes, Hashable] | None:
+        """What waits, and who sent it; None if nothing does. The octets may be none."""
+        ...
+
+    def is_open(self, sender: Hashable) -> bool:
+        """Whether something can still be sent to this sender."""
+        ...
+
+    def send(self, frame: bytes, to: Hashable) -> None:
+        """Send a frame to a sender that was heard; to None before anybody was, where this transport begins."""
+        ...
+
+    def tend(self, now_us: int) -> list[str]:
+        """Send on what waits, open again what is gone; what an operator should know of it."""
+        ...
+
+    def close(self) -> None:
+        """Give it back."""
+        ...
+
+
+def open_transport(address: Address) -> Transport:
+    """The transport of an address. Raises OSError where it cannot be had, for a reason that waiting does not mend."""
+    match address.way:
+        case Way.UDP_IN:
+            return UdpTransport(address.host, address.port, begins=False)
+        case Way.UDP_OUT:
+            return UdpTransport(address.host, address.port, begins=True)
+        case Way.TCP:
+            return TcpTransport(address)
+        case Way.TCP_IN:
+            return TcpListener(address)
+        case Way.SERIAL:
+            return SerialTransport(address)
+
+
+# ---------------------------------------------------------------- datagrams
+
+
+class UdpTransport:
+    """One UDP socket: bound to an address that others send to, or, if it `begins`, sending to one."""
+
+    capacity: int | None = None
+
+    def __init__(self, host: str, port: int, *, begins: bool) -> None:
+        self.begins = begins
+        self.trouble: str | None = None
+        self._octets = 0
+        self._buffer = memoryview(bytearray(_LARGEST))
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            (self._socket.connect if begins else self._socket.bind)((host, port))
+        except OSError:
+            self._socket.close()
+            raise
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._socket.setblocking(False)
+
+    @property
+    def port(self) -> int:
+        """The port listened at (the system's choice when 0 was asked for)."""
+        return int(self._socket.getsockname()[1])
+
+    @property
+    def counts(self) -> StreamCounts:
+        return StreamCounts(octets=self._octets)
+
+    def readable(self) -> Sequence[int]:
+        return (self._socket.fileno(),)
+
+    def receive(self) -> tuple[bytes, Hashable] | None:
+        try:
+            octets, sender = self._socket.recvfrom_into(self._buffer)
+        except BlockingIOError:
+            return None
+        except OSError as error:  # an ICMP answer to something we sent: the peer is not there (yet)
+            self.trouble = _reason(error)
+            return b"", None
+        self.trouble = None
+        self._octets += octets
+        return bytes(self._buffer[:octets]), sender
+
+    def is_open(self, sender: Hashable) -> bool:
+        return True
+
+    def send(self, frame: bytes, to: Hashable) -> None:
+        with suppress(OSError):  # lost, as any datagram may be: what matters is sent again, and only effects count
+            if self.begins:
+                self._socket.send(frame)
+            else:
+                self._socket.sendto(frame, to)  # type: ignore[call-overload]
+
+    def tend(self, now_us: int) -> list[str]:
+        return []
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+# ---------------------------------------------------------------- streams
+
+
+class _Line:
+    """One open stream: its frames, and what it did not take yet. `write` and `read` raise OSError where it is gone."""
+
+    def __init__(self, number: int, read: Callable[[], bytes], write: Callable[[bytes], int]) -> None:
+        self.number = number
+        self.frames = FrameStream()
+        self.gone: str | None = None
+        self._read, self._write = read, write
+        self._unsent = b""
+
+    def receive(self) -> bytes | None:
+        """The whole frames among what waits; None if nothing does."""
+        try:
+            octets = self._read()
+        except (BlockingIOError, InterruptedError):
+            return None
+        except OSError as error:
+            self.gone = _reason(error)
+            return None
+        if not octets:
+            self.gone = "closed by the other end"
+            return None
+        return b"".join(self.frames.feed(octets))
+
+    def send(self, frame: bytes) -> None:
+        """Send a frame, or keep it until there is room; one that does not fit is lost, whole."""
+        self.flush()
+        if self.gone is None and len(self._unsent) + len(frame) <= _UNSENT:
+            self._unsent += frame
+            self.flush()
+
+    def flush(self) -> None:
+        """Send on what waits."""
+        while self._unsent and self.gone is None:
+            try:
+                self._unsent = self._unsent[self._write(self._unsent) :]
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError as error:
+                self.gone = _reason(error)
+
+
+class _Streams:
+    """What all streams have in common: lines that come and go."""
+
+    begins = True
+    capacity: int | None = None
+
+    def __init__(self, address: Address) -> None:
+        self.address = address
+        self.trouble: str | None = None
+        self.lines: dict[int, tuple[_Line, Callable[[], None], int]] = {}  # with what closes it, and its descriptor
+        self._past = StreamCounts()  # of lines that are gone
+        self._made = 0
+        self._had = False  # there was a line before
+        self._notes: list[str] = []
+
+    @property
+    def counts(self) -> StreamCounts:
+        every = [self._past, *[line.frames.counts for line, _, _ in self.lines.values()]]
+        return StreamCounts(*map(sum, zip(*every, strict=True)))
+
+    def readable(self) -> Sequence[int]:
+        return [descriptor for _, _, descriptor in self.lines.values()]
+
+    def receive(self) -> tuple[bytes, Hashable] | None:
+        for line, _, _ in list(self.lines.values()):
+            octets = line.receive()
+            if line.gone is not None:
+                self._drop(line)
+            elif octets is not None:
+                self.lines[line.number] = self.lines.pop(line.number)  # each has its turn
+                return octets, line.number
+        return None
+
+    def is_open(self, sender: Hashable) -> bool:
+        return sender in self.lines
+
+    def send(self, frame: bytes, to: Hashable) -> None:
+        for line, _, _ in list(self.lines.values()):
+            if to in (None, line.number):
+                line.send(frame)
+                if line.gone is not None:
+                    self._drop(line)
+
+    def close(self) -> None:
+        for line, _, _ in list(self.lines.values()):
+            self._drop(line)
+
+    def add(
+        self, descriptor: int, read: Callable[[], bytes], write: Callable[[bytes], int], close: Callable[[], None]
+    ) -> None:
+        """Another line is open."""
+        self._made += 1
+        self.lines[self._made] = _Line(self._made, read, write), close, descriptor
+        self.trouble = None
+        if self._had:
+            self._notes.append(f"`{self.address}` is open again")
+        self._had = True
+
+    def _drop(self, line: _Line) -> None:
+        _, close, _ = self.lines.pop(line.number)
+        close()
+        self._past = StreamCounts(*map(sum, zip(self._past, line.frames.counts, strict=True)))
+        self.trouble = line.gone
+        self._notes.append(f"`{self.address}` is gone ({line.gone}): it is opened again as soon as it is back")
+
+    def _told(self) -> list[str]:
+        for line, _, _ in list(self.lines.values()):
+            line.flush()
+            if line.gone is not None:
+                self._drop(line)
+        notes, self._notes = self._notes, []
+        return notes
+
+
+class TcpTransport(_Streams):
+    """Connects to an address, and connects again whenever the connection is gone."""
+
+    def __init__(self, address: Address) -> None:
+        super().__init__(address)
+        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_STREAM)
+        self._peer = found[0][4]
+        self._pending: socket.socket | None = None
+        self._tried_us: int | None = None
+
+    def tend(self, now_us: int) -> list[str]:
+        if not self.lines:
+            if self._pending is None and (self._tried_us is None or now_us - self._tried_us >= _AGAIN_US):
+                self._tried_us = now_us
+                self._pending = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+                self._pending.setblocking(False)
+                self._settle(self._pending, self._pending.connect_ex(self._peer))
+            elif self._pending is not None:
+                # asked again, a socket says whether it is connected by now
+                self._settle(self._pending, self._pending.connect_ex(self._peer))
+        return self._told()
+
+    def _settle(self, made: socket.socket, result: int) -> None:
+        if result in (0, errno.EISCONN):
+            self._pending = None
+            _add_connection(self, made)
+        elif result not in (errno.EINPROGRESS, errno.EALREADY):
+            made.close()
+            self._pending = None
+            self.trouble = os.strerror(result).lower()
+
+    def close(self) -> None:
+        super().close()
+        if self._pending is not None:
+            self._pending.close()
+
+
+class TcpListener(_Streams):
+    """Waits for connections. The vehicle's is the one over which it is heard first; others are told apart from it."""
+
+    begins = False
+
+    def __init__(self, address: Address) -> None:
+        super().__init__(address)
+        self.trouble = "nobody has connected"
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._listener.bind((address.host, address.port))
+            self._listener.listen(_MOST)
+        except OSError:
+            self._listener.close()
+            raise
+        self._listener.setblocking(False)
+
+    @property
+    def port(self) -> int:
+        """The port listened at (the system's choice when 0 was asked for)."""
+        return int(self._listener.getsockname()[1])
+
+    def readable(self) -> Sequence[int]:
+        return [self._listener.fileno(), *super().readable()]
+
+    def receive(self) -> tuple[bytes, Hashable] | None:
+        self._accept()
+        return super().receive()
+
+    def tend(self, now_us: int) -> list[str]:
+        self._accept()
+        return self._told()
+
+    def close(self) -> None:
+        super().close()
+        self._listener.close()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            made, _ = self._listener.accept()
+            if len(self.lines) >= _MOST:
+                made.close()
+                return
+            made.setblocking(False)
+            _add_connection(self, made)
+
+
+def _add_connection(streams: _Streams, made: socket.socket) -> None:
+    made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    # a cable that is pulled sends no end of the connection; options that a system lacks are left out
+    for name, value in (
+        ("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", _DEAD_S), ("TCP_USER_TIMEOUT", 1_000 * _DEAD_S),
+    ):  # fmt: skip
+        if hasattr(socket, name):
+            made.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+    streams.add(made.fileno(), lambda: made.recv(_CHUNK), made.send, made.close)
+
+
+class SerialTransport(_Streams):
+    """A serial device, for us alone. Opened again when it was gone: a cable that is put back is found again.
+
+    Raises OSError where it is busy, is no serial device, cannot be opened, or does not take the baud rate.
+    """
+
+    def __init__(self, address: Address) -> None:
+        super().__init__(address)
+        self.capacity = address.capacity
+        self._tried_us: int | None = None
+        self._open()
+
+    def tend(self, now_us: int) -> list[str]:
+        if not self.lines and (self._tried_us is None or now_us - self._tried_us >= _AGAIN_US):
+            self._tried_us = now_us
+            try:
+                self._open()
+            except OSError as error:
+                self.trouble = _reason(error)
+        return self._told()
+
+    def _open(self) -> None:
+        device = os.open(self.address.host, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if not os.isatty(device):
+                raise OSError(errno.ENOTTY, "not a serial device")
+            try:
+                fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise OSError(errno.EBUSY, "another program has it open") from None
+            fcntl.ioctl(device, termios.TIOCEXCL)
+            _make_raw(device, self.address.port)
+        except BaseException:
+            os.close(device)
+            raise
+        self.add(
+            device, lambda: os.read(device, _CHUNK), lambda octets: os.write(device, octets), lambda: os.close(device)
+        )
+
+
+def _make_raw(device: int, baud: int) -> None:
+    """Eight bits, no parity, one stop bit, no flow control, nothing translated. Raises OSError."""
+    speed = getattr(termios, f"B{baud}")
+    try:
+        mode = termios.tcgetattr(device)
+        mode[0] = mode[1] = mode[3] = 0
+        mode[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
+        mode[4] = mode[5] = speed
+        mode[6][termios.VMIN], mode[6][termios.VTIME] = 1, 0  # so that nothing to read is told from the end
+        termios.tcsetattr(device, termios.TCSANOW, mode)
+        termios.tcflush(device, termios.TCIOFLUSH)
+        taken = termios.tcgetattr(device)[4]
+    except termios.error as error:
+        raise OSError(*error.args) from None
+    if taken != speed:
+        raise OSError(errno.EINVAL, f"it does not take {baud} baud")
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

@@ -1,0 +1,110 @@
+"""How often a vehicle has to report each message for a program to be decided in time.
+
+One set of figures: the compiler proves with it that what a step waits for can come before its deadline, and the
+adapters ask the vehicle for it. A message is asked for several times within the time after which its signals are stale,
+and within the shortest deadline of a step that waits for one of them; no more often than any autopilot reports it, and
+often enough for what adapters see effects by. All times in us.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final, NamedTuple
+
+from rtshcua.decision.tree import slots_read, where
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Contract, TimingClass
+from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.signal import Signal
+
+#: Between two reports that are asked for: no fewer, for links and autopilots carry no more, and no more.
+MOST_OFTEN: Final = 50_000
+LEAST_OFTEN: Final = 1_000_000
+#: How many reports are asked for within a time to stale, and within a deadline.
+WITHIN_STALE: Final = 4
+WITHIN_DEADLINE: Final = 2
+
+#: By these the adapters see effects, takeovers and readiness: asked for at least so often, whatever reads them.
+AT_LEAST: Final[Mapping[str, int]] = {
+    "HEARTBEAT": 100_000,
+    "GLOBAL_POSITION_INT": 100_000,
+    "EXTENDED_SYS_STATE": 100_000,
+    "ATTITUDE": 100_000,
+    "GPS_RAW_INT": 500_000,
+    "SYS_STATUS": 500_000,
+}
+#: On a link that carries no more they may come as seldom as this: mode and landed state are asked for besides.
+SUFFICES: Final[Mapping[str, int]] = {
+    "HEARTBEAT": 1_000_000,
+    "GLOBAL_POSITION_INT": 250_000,
+    "EXTENDED_SYS_STATE": 250_000,
+    "ATTITUDE": 250_000,
+    "GPS_RAW_INT": 1_000_000,
+    "SYS_STATUS": 1_000_000,
+}
+#: What comes no more often than this, whatever is asked for: PX4's HEARTBEAT is constant and its CURRENT_MODE came 1.8
+#: times a second (docs/flying/link.md has the recordings); a radio reports once a second, and takes no requests.
+AT_BEST: Final[Mapping[str, int]] = {"HEARTBEAT": 1_000_000, "CURRENT_MODE": 560_000, "RADIO_STATUS": 1_000_000}
+#: How much older than its report a value may be: a receiver measures five times a second, as autopilots come, and what
+#: carries no stamp of its own counts as measured at the last position before it.
+FIX: Final = 200_000
+UNSTAMPED: Final = 100_000
+
+
+class Rate(NamedTuple):
+    """How long it is between two reports of a message: as it is asked for, and as long as will do."""
+
+    asked: int
+    suffices: int
+
+
+def rates(policy: Policy, contracts: Iterable[Contract] = ()) -> dict[str, Rate]:
+    """The rate of each message that a policy's signals are read from. `contracts` are those of a mission's steps, whose
+    own blocks may make deadlines shorter than the policy's skills have.
+    """
+    waits = _waits(policy, contracts)
+    asked: dict[str, int] = {}
+    suffices: dict[str, int] = {}
+    for signal in policy.signals:
+        wait = min((waits[slot] for slot in signal.slots if slot in waits), default=LEAST_OFTEN * WITHIN_DEADLINE)
+        often = min(signal.stale_us // WITHIN_STALE, wait // WITHIN_DEADLINE)
+        seldom = min(signal.stale_us // 2, wait)
+        for source in signal.sources:
+            asked[source.message] = min(often, asked.get(source.message, LEAST_OFTEN))
+            suffices[source.message] = min(seldom, suffices.get(source.message, LEAST_OFTEN))
+    found: dict[str, Rate] = {}
+    for name in asked:
+        often = min(max(asked[name], MOST_OFTEN), AT_LEAST.get(name, LEAST_OFTEN))
+        seldom = min(suffices[name], SUFFICES.get(name, LEAST_OFTEN))
+        found[name] = Rate(often, max(often, seldom))
+    return found
+
+
+def delivered(asked: Mapping[str, Rate]) -> dict[str, int]:
+    """How long it is between two reports of a message on a link that carries them, of any autopilot."""
+    return {name: max(rate.asked, AT_BEST.get(name, 0)) for name, rate in asked.items()}
+
+
+def awaited(policy: Policy, skill: int, contract: Contract) -> Iterator[Clause]:
+    """The clauses that a decision on a contract may wait for: its own, and those of what forbids it."""
+    yield from (*contract.require, *contract.assume, *contract.maintain)
+    for rule in policy.rules:
+        if rule.kind == RuleKind.FORBID and rule.when is not None and skill in (rule.skills or (skill,)):
+            yield rule.when
+
+
+def signal_of(policy: Policy, slot: int) -> Signal:
+    """The signal that owns a slot."""
+    return next(signal for signal in policy.signals if slot in signal.slots)
+
+
+def _waits(policy: Policy, contracts: Iterable[Contract]) -> dict[int, int]:
+    """The shortest deadline within which a slot may be waited for. A reflex does not wait."""
+    numbers = {contract.name: number for number, contract in enumerate(policy.contracts)}
+    waits: dict[int, int] = {}
+    for contract in (*policy.contracts, *contracts):
+        if contract.timing_class == TimingClass.REFLEX:
+            continue
+        clauses = awaited(policy, numbers[contract.name], contract)
+        vehicle = policy.vehicle  # where it is, and its charge, are asked of every step
+        for slot in (*slots_read(clauses, vehicle, policy.monitors), *where(vehicle), vehicle.battery):
+            waits[slot] = min(contract.deadline_us, waits.get(slot, contract.deadline_us))
+    return waits

@@ -1,0 +1,272 @@
+"""Serial lines and TCP connections: found, lost and found again; what is wrong with them is said."""
+
+import errno
+import os
+import pty
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.transport import SerialTransport, TcpListener, TcpTransport, UdpTransport, open_transport
+from rtshcua.onboard.ports import Event, LinkBack, LinkLost, Noted
+from rtshcua.simulation.config import Boot, Kind, SimulationConfig
+from virtual.line import Connection, LinedVehicle, Terminal
+from virtual.policy import POLICY
+
+S = 1_000_000
+HERE = "127.0.0.1"
+CONFIG = SimulationConfig(flavour=Kind.PX4, boot=Boot.FAST)
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[Terminal]:
+    made = Terminal(tmp_path / "ttyUSB0")
+    yield made
+    made.close()
+
+
+def lined(terminal: Terminal, baud: int = 57_600, config: SimulationConfig = CONFIG) -> LinedVehicle:
+    address = Address(Way.SERIAL, str(terminal.path), baud)
+    return LinedVehicle(POLICY, config, address, terminal, baud // 10)
+
+
+def live(vehicle: LinedVehicle, seconds: float, until: Callable[[], bool] = lambda: False) -> list[Event]:
+    """Let time pass; what happened."""
+    events: list[Event] = []
+    end_us = vehicle.clock.elapsed_us + round(seconds * S)
+    while vehicle.clock.elapsed_us < end_us and not until():
+        events += vehicle.poll(vehicle.clock.monotonic_us, 100_000)
+    return events
+
+
+def notes(events: list[Event]) -> list[str]:
+    return [event.text for event in events if isinstance(event, Noted)]
+
+
+# ---------------------------------------------------------------- a serial line
+
+
+@pytest.mark.parametrize("flavour", [Kind.PX4, Kind.ARDUPILOT])
+@pytest.mark.parametrize("baud", [57_600, 921_600])
+def test_a_vehicle_on_a_serial_line_gets_ready_and_the_line_is_not_oversubscribed(
+    terminal: Terminal, baud: int, flavour: Kind
+) -> None:
+    vehicle = lined(terminal, baud, SimulationConfig(flavour=flavour, boot=Boot.FAST))
+    live(vehicle, 30, lambda: vehicle.driver.flavour is not None)
+    assert vehicle.driver.flavour is not None
+    live(vehicle, 20)
+    before, at_us = vehicle.sent_octets, vehicle.clock.elapsed_us
+    vehicle.dropped = 0
+    said = live(vehicle, 15)
+    rate = (vehicle.sent_octets - before) * S // (vehicle.clock.elapsed_us - at_us)
+    assert rate < baud // 10
+    assert vehicle.dropped == 0, "nothing that the vehicle sent was lost for want of room"
+    assert not [event for event in said if isinstance(event, LinkLost)]
+    measured = vehicle.driver.stream_requests.measured
+    assert measured is not None
+    assert abs(measured[0] - rate) < rate // 5, "what is measured is what came"
+    vehicle.close()
+
+
+def test_a_cable_that_is_pulled_is_told_and_found_again_when_it_is_put_back(terminal: Terminal) -> None:
+    vehicle = lined(terminal)
+    live(vehicle, 10, lambda: vehicle.driver.flavour is not None)
+    live(vehicle, 3)
+    terminal.pull()
+    said = live(vehicle, 3)
+    assert any("is gone" in text for text in notes(said))
+    assert [event for event in said if isinstance(event, LinkLost)]
+    assert vehicle.transport.trouble == os.strerror(errno.ENOENT).lower()
+    terminal.plug_in()
+    said = live(vehicle, 5, lambda: vehicle.driver._watch.down is None)
+    assert any("is open again" in text for text in notes(said))
+    assert [event for event in said if isinstance(event, LinkBack)]
+    vehicle.close()
+
+
+def test_a_busy_port_says_so(terminal: Terminal) -> None:
+    address = Address(Way.SERIAL, str(terminal.path), 57_600)
+    first = SerialTransport(address)
+    with pytest.raises(OSError, match="another program has it open") as error:
+        SerialTransport(address)
+    assert error.value.errno == errno.EBUSY
+    first.close()
+    SerialTransport(address).close()
+
+
+def test_what_is_no_serial_device_says_so(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="not a serial device"):
+        SerialTransport(Address(Way.SERIAL, str(tmp_path / "file"), 57_600))
+    with pytest.raises(OSError, match="No such file"):
+        SerialTransport(Address(Way.SERIAL, str(tmp_path / "nothing"), 57_600))
+
+
+def test_garbage_is_told_from_silence(terminal: Terminal) -> None:
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.SERIAL, str(terminal.path), 57_600), None, 5_760)
+    live(vehicle, 1)
+    assert vehicle.connected.silence is None, "nothing came, and nothing is known to be wrong"
+    terminal.write(Random(2).randbytes(600))
+    live(vehicle, 1)
+    assert vehicle.connected.silence is not None
+    assert "600 octets came, and no MAVLink frame" in vehicle.connected.silence
+    assert "baud rate is probably wrong" in vehicle.connected.silence
+    vehicle.close()
+
+
+def test_a_vehicle_that_speaks_the_old_protocol_is_told(terminal: Terminal) -> None:
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.SERIAL, str(terminal.path), 57_600), None, 5_760)
+    beat = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3).pack(mavlink.MAVLink(None, 1, 1), force_mavlink1=True)
+    for _ in range(3):
+        terminal.write(beat)
+        live(vehicle, 0.2)
+    assert vehicle.connected.silence is not None
+    assert vehicle.connected.silence.startswith("3 frames of MAVLink 1 came")
+    assert "MAV_PROTO_VER" in vehicle.connected.silence
+    vehicle.close()
+
+
+def test_a_port_that_takes_nothing_more_holds_nobody_up() -> None:
+    far, near = pty.openpty()
+    transport = SerialTransport(Address(Way.SERIAL, os.ttyname(near), 57_600))
+    for _ in range(2_000):
+        transport.send(bytes(60), None)
+    assert transport.tend(0) == []
+    transport.close()
+    os.close(far)
+    os.close(near)
+
+
+# ---------------------------------------------------------------- TCP
+
+
+def listening() -> socket.socket:
+    made = socket.socket()
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    made.bind((HERE, 0))
+    made.listen()
+    return made
+
+
+def test_it_connects_and_connects_again() -> None:
+    server = listening()
+    port = server.getsockname()[1]
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.TCP, HERE, port), None, 100_000)
+    live(vehicle, 0.1)
+    vehicle.end = Connection(server.accept()[0])
+    live(vehicle, 10, lambda: vehicle.driver.flavour is not None)
+    assert vehicle.driver.flavour is not None
+    live(vehicle, 3)
+    vehicle.end.close()
+    server.close()
+    vehicle.end = None
+    said = live(vehicle, 3)
+    assert any("is gone" in text for text in notes(said))
+    assert vehicle.transport.trouble == "connection refused"
+    server = socket.socket()
+    server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    server.bind((HERE, port))
+    server.listen()
+    live(vehicle, 1)
+    vehicle.end = Connection(server.accept()[0])
+    said = live(vehicle, 5, lambda: vehicle.driver._watch.down is None)
+    assert [event for event in said if isinstance(event, LinkBack)]
+    vehicle.close()
+    server.close()
+
+
+def test_nobody_there_is_the_reason_for_silence() -> None:
+    server = listening()
+    port = server.getsockname()[1]
+    server.close()
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.TCP, HERE, port), None, 100_000)
+    live(vehicle, 1)
+    assert vehicle.connected.silence == "connection refused"
+    vehicle.close()
+
+
+def test_it_waits_for_a_connection_and_a_second_one_is_no_vehicle_of_ours() -> None:
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.TCP_IN, HERE, 0), None, 100_000)
+    assert isinstance(vehicle.transport, TcpListener)
+    assert vehicle.connected.silence == "nobody has connected"
+    stranger, far = (socket.create_connection((HERE, vehicle.transport.port)) for _ in range(2))
+    vehicle.end = Connection(far)
+    live(vehicle, 10, lambda: vehicle.driver.flavour is not None)
+    assert vehicle.driver.flavour is not None
+    live(vehicle, 2)
+    stranger.setblocking(False)
+    stranger.send(b"nothing that is a frame")
+    live(vehicle, 1)
+    with pytest.raises(BlockingIOError):
+        stranger.recv(100)  # what is said is said to the vehicle alone
+    assert vehicle.driver.link.crowd is None
+    stranger.close()
+    far.close()
+    vehicle.end = None
+    live(vehicle, 2)
+    again = socket.create_connection((HERE, vehicle.transport.port))
+    vehicle.end = Connection(again)
+    said = live(vehicle, 5, lambda: vehicle.driver._watch.down is None)
+    assert [event for event in said if isinstance(event, LinkBack)], "the vehicle came back over another connection"
+    vehicle.close()
+
+
+def test_more_connections_than_any_vehicle_needs_are_refused() -> None:
+    transport = TcpListener(Address(Way.TCP_IN, HERE, 0))
+    callers = []
+    for _ in range(6):
+        callers.append(socket.create_connection((HERE, transport.port), timeout=5))
+        transport.tend(0)
+    assert len(transport.lines) == 4
+    for caller in callers:
+        caller.close()
+    transport.close()
+
+
+def test_a_port_that_is_taken_is_an_error_at_once() -> None:
+    taken = listening()
+    with pytest.raises(OSError, match="in use"):
+        TcpListener(Address(Way.TCP_IN, HERE, taken.getsockname()[1]))
+    taken.close()
+    with pytest.raises(OSError):
+        TcpTransport(Address(Way.TCP, "no such host", 1))
+
+
+# ---------------------------------------------------------------- UDP that speaks first
+
+
+def test_udp_that_speaks_first_is_answered() -> None:
+    far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    far.bind((HERE, 0))
+    far.settimeout(5)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.UDP_OUT, HERE, far.getsockname()[1]), None, 100_000)
+    live(vehicle, 0.1)
+    greeting, peer = far.recvfrom(300)
+    assert greeting[5:7] == bytes([1, 191]), "of an onboard computer, never of a ground station"
+    far.connect(peer)
+    vehicle.end = Connection(far)
+    live(vehicle, 10, lambda: vehicle.driver.flavour is not None)
+    assert vehicle.driver.flavour is not None
+    vehicle.close()
+
+
+def test_each_way_has_its_transport(terminal: Terminal) -> None:
+    made = [
+        open_transport(each)
+        for each in (
+            Address(Way.UDP_IN, HERE, 0), Address(Way.UDP_OUT, HERE, 9), Address(Way.TCP, HERE, 9),
+            Address(Way.TCP_IN, HERE, 0), Address(Way.SERIAL, str(terminal.path), 57_600),
+        )
+    ]  # fmt: skip
+    kinds = [UdpTransport, UdpTransport, TcpTransport, TcpListener, SerialTransport]
+    assert [type(each) for each in made] == kinds
+    assert [each.begins for each in made] == [False, True, True, False, True]
+    assert [each.capacity for each in made] == [None, None, None, None, 5_760]
+    for each in made:
+        each.close()

@@ -1,0 +1,78 @@
+"""How often reports are needed: by times to stale and by deadlines, within what vehicles report."""
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.decision.rates import (
+    AT_BEST,
+    AT_LEAST,
+    LEAST_OFTEN,
+    MOST_OFTEN,
+    SUFFICES,
+    Rate,
+    delivered,
+    rates,
+    signal_of,
+)
+from rtshcua.model.flat.contract import Contract, TimingClass
+from rtshcua.model.flat.policy import Policy, RuleKind
+from virtual import case
+from virtual.policy import BATTERY, POLICY, POSITION_X
+
+S = 1_000_000
+GIVEN = case.policy()
+
+
+def quick(deadline_us: int, **fields: object) -> Contract:
+    """The reference policy's first skill that waits for something, with another deadline."""
+    found = next(each for each in GIVEN.contracts if each.timing_class != TimingClass.REFLEX and each.require)
+    return replace(found, deadline_us=deadline_us, **fields)  # type: ignore[arg-type]
+
+
+def test_what_is_stale_late_is_reported_seldom_and_what_effects_are_seen_by_as_often_as_they_need() -> None:
+    found = rates(POLICY)
+    assert found["BATTERY_STATUS"] == Rate(1_000_000, 1_000_000)
+    assert found["GLOBAL_POSITION_INT"] == Rate(100_000, 250_000)
+    assert found["GPS_RAW_INT"] == Rate(500_000, 1_000_000)
+    for name, rate in found.items():
+        assert MOST_OFTEN <= rate.asked <= AT_LEAST.get(name, LEAST_OFTEN)
+        assert rate.asked <= rate.suffices <= max(rate.asked, SUFFICES.get(name, LEAST_OFTEN))
+
+
+@pytest.mark.parametrize(("deadline_us", "asked"), [
+    (3 * S, 1_000_000), (500_000, 250_000), (200_000, 100_000), (100_000, 50_000), (10_000, 50_000),
+])  # fmt: skip
+def test_what_a_step_waits_for_is_reported_twice_within_its_deadline(deadline_us: int, asked: int) -> None:
+    slots = {"GPS_RAW_INT", "BATTERY_STATUS", "GLOBAL_POSITION_INT"}
+    found = rates(GIVEN, [quick(deadline_us)])
+    for name in slots & found.keys():
+        assert found[name].asked <= asked
+        assert found[name].suffices <= max(deadline_us, found[name].asked)
+
+
+def test_a_reflex_waits_for_nothing() -> None:
+    assert rates(GIVEN, [quick(60_000, timing_class=TimingClass.REFLEX)]) == rates(GIVEN)
+
+
+def test_what_forbids_a_skill_is_waited_for_too() -> None:
+    permits = [rule for rule in GIVEN.rules if rule.kind == RuleKind.PERMIT]
+    clause = quick(S).require[0]
+    rule = replace(permits[0], kind=RuleKind.FORBID, when=clause, skills=())
+    bare: Policy = replace(GIVEN, rules=(), contracts=tuple(
+        replace(each, require=(), assume=(), maintain=()) for each in GIVEN.contracts
+    ))  # fmt: skip
+    step = quick(100_000, require=(), assume=(), maintain=())
+    without = rates(bare, [step])
+    for skills in ((), (GIVEN.contracts.index(next(c for c in GIVEN.contracts if c.name == step.name)),)):
+        assert rates(replace(bare, rules=(replace(rule, skills=skills),)), [step]) != without
+    assert rates(replace(bare, rules=(replace(rule, skills=(99,)),)), [step]) == without
+
+
+def test_what_comes_no_more_often_is_not_hoped_for() -> None:
+    asked = {"HEARTBEAT": Rate(100_000, S), "RADIO_STATUS": Rate(50_000, S), "WIND": Rate(50_000, S)}
+    assert delivered(asked) == {"HEARTBEAT": AT_BEST["HEARTBEAT"], "RADIO_STATUS": S, "WIND": 50_000}
+
+
+def test_the_signal_of_a_slot() -> None:
+    assert signal_of(POLICY, BATTERY).name == "battery"
+    assert signal_of(POLICY, POSITION_X + 1).name == "position", "a position has two"

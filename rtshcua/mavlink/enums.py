@@ -7,6 +7,8 @@ others, and may import pymavlink, has them there.
 from typing import Final
 
 MAV_TYPE_GCS: Final = 6
+#: quadrotor, coaxial, hexarotor, octorotor, tricopter, dodecarotor, decarotor
+MULTIROTORS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
 MAV_TYPE_ONBOARD_CONTROLLER: Final = 18
 
 MAV_AUTOPILOT_ARDUPILOTMEGA: Final = 3

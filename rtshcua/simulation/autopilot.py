@@ -189,6 +189,8 @@ class Autopilot:
         self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)
         for name in SYSTEM_PARAMETERS:
             self.parameters.assign(name, config.system)
+        for name, value in config.parameters:
+            self.parameters.own(name, value)
         if config.signing_key is not None:
             self.parameters.assign("MAV_SIGN_CFG", 1)
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
@@ -316,6 +318,7 @@ class Autopilot:
         breached, mode = fence.breach is not None, vehicle.mode
         if breached and mode is not self._mode_in_breach:
             flavour.on_mode_in_breach(self)
+        vehicle.return_under = fence.return_under
         began = fence.step(self.now_us, self._where, vehicle.armed and vehicle.in_air)
         if began is not None:
             self.take_over(Taker.FAILSAFE, partial(flavour.on_breach, self, began))

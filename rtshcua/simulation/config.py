@@ -69,6 +69,8 @@ class SimulationConfig:
     estimate: Estimate = Estimate.CLOSE
     answers: Answers = Answers.AT_ONCE
     boot: Boot = Boot.FAST
+    parameters: tuple[tuple[str, float], ...] = ()
+    """What its owner has set: names of parameters that the flavour has, and their values."""
     faults: tuple[Fault, ...] = ()
     signing_key: bytes | None = None
     """The key of the link from the start; else SETUP_SIGNING may bring one."""

@@ -115,6 +115,10 @@ class FenceLimits:
 
     area: Area = Area()
     ceiling: float = inf
+    floor: float = -inf
+    """For targets alone: on the ground every vehicle is below it."""
+    return_under: float = inf
+    """The height above home under which a return stays."""
 
     def holds(self, point: Point) -> bool:
         """Whether flying is allowed there."""
@@ -186,13 +190,19 @@ class FenceWatch:
         return self._limits is not None
 
     @property
+    def return_under(self) -> float:
+        """The height above home under which a return stays, for the fence's sake."""
+        return inf if self._limits is None else self._limits.return_under
+
+    @property
     def critical(self) -> bool:
         """Whether HEARTBEAT tells of a breach now."""
         return self.breach is not None and self._rules.critical
 
     def allows(self, point: Point) -> bool:
         """Whether the fence that is in force now has nothing against a target there."""
-        return self._limits is None or self._limits.holds(point)
+        limits = self._limits
+        return limits is None or (limits.floor <= point.up and limits.holds(point))
 
     def step(self, now_us: int, where: Callable[[], Point], flying: bool) -> Breach | None:
         """Lets time pass; the breach that began now, if one did. `where` tells where the vehicle believes to be."""

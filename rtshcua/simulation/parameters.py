@@ -73,10 +73,19 @@ class Parameters:
             return None
         value = self._decode(raw, type_)
         if value == value and abs(value) < 1e9:  # NaN and nonsense change nothing
-            self._values[name] = value if parameter.type == REAL32 else float(round(value))
-            if parameter.attribute is not None:
-                setattr(self._handling, parameter.attribute, max(_LEAST, self._values[name] / parameter.scale))
+            self._store(parameter, value)
         return self._message(name)
+
+    def own(self, name: str, value: float) -> None:
+        """The vehicle's owner has set one. Raises ValueError if there is none of that name."""
+        if name not in self._table:
+            raise ValueError(f"this vehicle has no parameter `{name}`")
+        self._store(self._table[name], value)
+
+    def _store(self, parameter: Parameter, value: float) -> None:
+        stored = self._values[parameter.name] = value if parameter.type == REAL32 else float(round(value))
+        if parameter.attribute is not None:
+            setattr(self._handling, parameter.attribute, max(_LEAST, stored / parameter.scale))
 
     def _decode(self, raw: float, type_: int) -> float:
         if self._bytewise and type_ == mavlink.MAV_PARAM_TYPE_INT32:

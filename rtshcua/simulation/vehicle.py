@@ -4,7 +4,7 @@ It is the same for both flavours; `Handling` and the mode table hold what differ
 """
 
 from enum import Enum, IntEnum, auto
-from math import copysign, hypot
+from math import copysign, hypot, inf
 
 from rtshcua.mavlink import enums
 from rtshcua.model.faults import Mode
@@ -73,6 +73,8 @@ class Vehicle:
 
     def __init__(self, handling: Handling, mode: Mode) -> None:
         self.handling = handling
+        self.return_under = inf
+        """The height above home that a return does not climb over, for the fence's sake."""
         self.body = Body()
         self.mode = mode
         self.armed = False
@@ -266,7 +268,7 @@ class Vehicle:
         """Climbs to the height of the way home, flies home and lands, whatever the mode."""
         if self.flies:
             body = self.body
-            self._hold(_RETURN_CLIMB, max(body.up, self.handling.return_up))
+            self._hold(_RETURN_CLIMB, max(body.up, min(self.handling.return_up, self.return_under)))
             if self.handling.comes_back:
                 self.target = self.destination = self._believed(body.north, body.east, self.target.up)
                 self._steer_to_target()

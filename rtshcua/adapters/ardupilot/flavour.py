@@ -4,6 +4,7 @@ It obeys position targets in GUIDED only, and ignores them silently elsewhere; t
 """
 
 from rtshcua.adapters.vehicle import effects, flavour, messages
+from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.effects import Effect
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
@@ -101,5 +102,8 @@ ARDUPILOT = AutopilotFlavour(
     bytewise=False,
     fence=FenceHabits(
         frame=enums.MAV_FRAME_GLOBAL, all_inclusions=True, switches=(("FENCE_TYPE", _POLYGONS), ("FENCE_ENABLE", 1))
+    ),
+    own_fence=OwnFence(
+        "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_MARGIN", "FENCE_TYPE", ("FENCE_ENABLE",)
     ),
 )

@@ -7,7 +7,9 @@ from typing import Final
 import msgspec
 
 from rtshcua.adapters.doctor.examination import ExaminingDriver
-from rtshcua.adapters.doctor.settings import SETTINGS, Setting
+from rtshcua.adapters.doctor.settings import SETTINGS, Need, Setting
+from rtshcua.adapters.vehicle.bounds import Reach, reach_of
+from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
@@ -15,6 +17,7 @@ from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import Signal
+from rtshcua.model.flat.zone import project
 from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.rehearsal import needed
 
@@ -64,13 +67,14 @@ def diagnose(
     yield from _others(vehicle, named=named)
     yield _round_trip(vehicle.source.clock)
     yield _streams(vehicle, flavour)
+    yield _kind(vehicle)
     yield from _version(vehicle, flavour)
     yield from _readiness(vehicle)
     yield from _signals(vehicle, policy, flown, unheard)
     if flown is not None:
         yield _place(vehicle)
         yield _clock(vehicle, utc_error_us)
-    yield from _settings(vehicle, flavour)
+    yield from _settings(vehicle, flavour, policy, flown)
 
 
 def _graded(
@@ -194,6 +198,13 @@ _CAPABILITIES: Final = {
 }
 
 
+def _kind(vehicle: ExaminingDriver) -> VehicleFinding:
+    """Whether it is a multirotor: nothing else is flown."""
+    if vehicle.other_kind is not None:
+        return VehicleFinding("autopilot/kind", STOP, vehicle.other_kind, "a multirotor", "nothing else is flown")
+    return VehicleFinding("autopilot/kind", OK, "a multirotor")
+
+
 def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]:
     message = vehicle.latest("AUTOPILOT_VERSION")
     if message is None:
@@ -201,8 +212,9 @@ def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]
         return
     tested, version = _TESTED[flavour], tuple(message.flight_sw_version.to_bytes(4)[:3])
     found = f"{flavour} {'.'.join(map(str, version))}"
-    advice = f"the answers that we know were recorded of {'.'.join(map(str, tested))}: fly it in simulation first"
-    yield _graded("autopilot/version", found, "", advice, warns=version[:2] != tested)
+    needed = f"{flavour} {'.'.join(map(str, tested))}, which this release was tested with"
+    advice = "fly it in simulation first: what is known of its answers was recorded of that version"
+    yield _graded("autopilot/version", found, needed, advice, warns=version[:2] != tested)
     wanted = _CAPABILITIES[flavour]
     missing = [each for bit, each in wanted.items() if not message.capabilities & bit]
     for name, verdict in missing:
@@ -330,21 +342,43 @@ def _clock(vehicle: ExaminingDriver, utc_error_us: int) -> VehicleFinding:
 # ---------------------------------------------------------------- what it does by itself
 
 
-def _settings(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]:
+def _settings(
+    vehicle: ExaminingDriver, flavour: str, policy: Policy, flown: Mission | None
+) -> Iterator[VehicleFinding]:
     """A finding for each parameter that the vehicle has."""
     if vehicle.parameters is None:
         return
-    values = vehicle.parameters.values
+    values, seen = vehicle.parameters.values, vehicle.seen
+    reach = Reach()
+    if flown is not None and seen.located:
+        here = project(policy.projection, seen.latitude, seen.longitude)
+        reach = reach_of(flown.invocations, policy, here)
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
     for setting in told:
-        yield _setting(setting, values[setting.parameter])
+        yield _setting(setting, values[setting.parameter], setting.needs(policy, reach))
     if not told:
         absent = "none of the parameters that were asked for was answered"
         yield VehicleFinding("settings/unread", UNKNOWN, absent, "what the autopilot does by itself")
 
 
-def _setting(setting: Setting, value: float) -> VehicleFinding:
-    words = setting.words.get(value, f"{value:g}")
-    found = f"{setting.about}: {words} ({setting.parameter} = {value:g})"
+def _setting(setting: Setting, value: float, need: Need | None) -> VehicleFinding:
+    """What it is, what is needed, and how to change it. What a mission cannot fly with is said as `mission/unready`."""
+    slug, name = f"settings/{setting.parameter.lower()}", setting.parameter
+    words = f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
+    found = f"{setting.about}: {words} ({name} = {value:g})"
     why = setting.warns.get(value, "")
-    return _graded(f"settings/{setting.parameter.lower()}", found, "", why, warns=bool(why))
+    if why:
+        better = setting.better
+        how = f"; set `{name}` to {better:g}" if better is not None else ""
+        return _graded(slug, found, setting.words.get(better, "") if better is not None else "", why + how, warns=True)
+    if need is None or setting.mm == 0 or (value == 0 and "0: nowhere" in setting.about):
+        return VehicleFinding(slug, OK, found)
+    has = value * setting.mm
+    if need.least is not None and has < need.least - SAME_MM:
+        wanted, should = "at least", -(-need.least // setting.mm)
+    elif need.most is not None and has > need.most + SAME_MM:
+        wanted, should = "at most", need.most // setting.mm
+    else:
+        return VehicleFinding(slug, OK, found)
+    bound = should * setting.mm / 1_000
+    return _graded(slug, found, f"{wanted} {bound:g}{setting.unit}", f"set `{name}` to {should}", warns=True)

@@ -69,6 +69,8 @@ class Stream:
 class ExaminingDriver(Driver):
     """Listens and asks. `talkers` by (system, component); `streams` of the vehicle's own components by name."""
 
+    judges = True
+
     def __init__(
         self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None,
         system: int | None = None, steps: Sequence[Invocation] = (),

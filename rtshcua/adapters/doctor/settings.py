@@ -1,16 +1,77 @@
-"""Parameters that make an autopilot act by itself in a flight, or keep it from arming, and what they say in words."""
+"""Parameters that make an autopilot act by itself in a flight, keep it from arming, or bound where and how fast it
+flies: what they say in words, what a mission needs of them, and how to change them.
 
-from collections.abc import Mapping
+Sources: the parameter references of PX4 1.16 (docs.px4.io) and ArduCopter 4.7 (ardupilot.org/copter); ArduCopter's
+speeds are WPNAV_* in cm/s before 4.7 and WP_* in m/s from then on.
+"""
+
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
+
+from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.model.flat.policy import Policy
+
+
+class Need(NamedTuple):
+    """What is needed of a parameter: at least or at most so much, in mm or mm/s."""
+
+    least: int | None = None
+    most: int | None = None
 
 
 class Setting(NamedTuple):
-    """A parameter, what it is about, its values in words, and why some of them are worth a warning."""
+    """A parameter, what it is about, its values in words, and why some of them are worth a warning.
+
+    `better` is a value to set in place of those. For a number, `mm` is how many mm, or mm/s, one of it is, and `needs`
+    what a policy and the reach of a mission need of it; None where nothing does.
+    """
 
     parameter: str
     about: str
-    words: Mapping[float, str]
-    warns: Mapping[float, str]
+    words: Mapping[float, str] = {}
+    warns: Mapping[float, str] = {}
+    better: float | None = None
+    mm: int = 0
+    needs: Callable[[Policy, Reach], Need | None] = lambda _policy, _reach: None
+
+    @property
+    def unit(self) -> str:
+        """Of its number, for a person."""
+        return "" if not self.mm else " m/s" if "speed" in self.about else " m"
+
+
+def _speed(policy: Policy, _: Reach) -> Need | None:
+    return Need(most=policy.vehicle.speed) if policy.vehicle.speed else None
+
+
+def _climb(policy: Policy, _: Reach) -> Need | None:
+    return Need(most=policy.vehicle.climb) if policy.vehicle.climb else None
+
+
+def _returns(policy: Policy, _: Reach) -> Need | None:
+    height = policy.vehicle.return_altitude
+    return Need(height, height) if height else None
+
+
+def _far(policy: Policy, reach: Reach) -> Need | None:
+    return Need(least=reach.farthest + policy.vehicle.position_error) if reach.farthest else None
+
+
+def _high(policy: Policy, reach: Reach) -> Need | None:
+    return Need(least=reach.highest + policy.vehicle.position_error) if reach.highest else None
+
+
+def _low(policy: Policy, reach: Reach) -> Need | None:
+    return None if reach.lowest is None else Need(most=reach.lowest - policy.vehicle.position_error)
+
+
+_FENCES: Final[Mapping[float, str]] = {
+    float(bits): " and ".join(
+        name for bit, name in ((1, "ceiling"), (2, "circle"), (4, "areas"), (8, "floor")) if bits & bit
+    )
+    or "none"
+    for bits in range(16)
+}
 
 
 _LOST: Final[Mapping[float, str]] = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "lockdown"}
@@ -22,12 +83,30 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("NAV_RCL_ACT", "when the remote control is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
         Setting(
             "COM_LOW_BAT_ACT", "when the battery is low", {0: "warns only", 2: "land", 3: "return, then land"},
-            {0: "the autopilot does nothing of its own about a battery that runs out"},
+            {0: "the autopilot does nothing of its own about a battery that runs out"}, 3,
         ),
         Setting(
             "GF_ACTION", "at the fence",
             {0: "nothing", 1: "warns only", 2: "hold", 3: "return", 4: "terminate", 5: "land"},
             {0: "its fence is no second line of defence", 1: "its fence is no second line of defence", 4: _MOTORS_OFF},
+            2,
+        ),
+        Setting("GF_MAX_HOR_DIST", "its own fence ends, from home (0: nowhere)", mm=1_000, needs=_far),
+        Setting("GF_MAX_VER_DIST", "its own fence ends, above home (0: nowhere)", mm=1_000, needs=_high),
+        Setting("RTL_RETURN_ALT", "height of a return", mm=1_000, needs=_returns),
+        Setting("MPC_XY_CRUISE", "speed across where a step says none", mm=1_000, needs=_speed),
+        Setting("MPC_XY_VEL_MAX", "greatest speed across", mm=1_000),
+        Setting("MPC_Z_VEL_MAX_UP", "greatest speed up", mm=1_000, needs=_climb),
+        Setting("MPC_Z_VEL_MAX_DN", "greatest speed down", mm=1_000, needs=_climb),
+        Setting(
+            "CP_DIST", "collision prevention keeps away, in position flight (below 0: off)", mm=1_000,
+        ),
+        Setting("EKF2_NOAID_TOUT", "us of dead reckoning before the position counts as lost"),
+        Setting("COM_POS_FS_EPH", "m of horizontal error at which the position counts as lost"),
+        Setting(
+            "COM_RC_OVERRIDE", "sticks take over",
+            {0: "never", 1: "in automatic modes", 2: "in offboard", 3: "in automatic modes and offboard"},
+            {0: "the pilot's sticks end nothing: a switch has to", 2: "the pilot's sticks end nothing in Hold"}, 1,
         ),
         Setting(
             "COM_OBL_RC_ACT", "when offboard control is lost",
@@ -52,23 +131,55 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting(
             "BATT_FS_LOW_ACT", "when the battery is low",
             {0: "warns only", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land", 5: "terminate"},
-            {0: "the autopilot does nothing of its own about a battery that runs out", 5: _MOTORS_OFF},
+            {0: "the autopilot does nothing of its own about a battery that runs out", 5: _MOTORS_OFF}, 2,
+        ),
+        Setting(
+            "BATT_FS_CRT_ACT", "when the battery is critical",
+            {0: "warns only", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land", 5: "terminate"},
+            {5: _MOTORS_OFF}, 1,
+        ),
+        Setting(
+            "FS_DR_ENABLE", "when it flies by dead reckoning",
+            {0: "nothing", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land"},
+            {0: "the autopilot flies on without a position"}, 1,
         ),
         Setting(
             "FS_EKF_ACTION", "when the estimator fails",
             {0: "reports only", 1: "land", 2: "altitude hold", 3: "land, even in a manual mode"},
-            {0: "the autopilot flies on without knowing where it is"},
+            {0: "the autopilot flies on without knowing where it is"}, 1,
         ),
         Setting(
             "FENCE_ENABLE", "fence", {0: "off", 1: "on"}, {0: "its fence is off until a flight of ours switches it on"}
         ),
         Setting(
+            "FENCE_AUTOENABLE", "fence switched on by itself",
+            {0: "no", 1: "at takeoff", 2: "at takeoff, without the floor when landing", 3: "when armed"},
+        ),
+        Setting("FENCE_TYPE", "what the fence is, once it is on", _FENCES),
+        Setting("FENCE_RADIUS", "its circle ends, from home", mm=1_000, needs=_far),
+        Setting("FENCE_ALT_MAX", "its ceiling, above home", mm=1_000, needs=_high),
+        Setting("FENCE_ALT_MIN", "its floor, above home", mm=1_000, needs=_low),
+        Setting("FENCE_MARGIN", "room that it keeps to its fence", mm=1_000),
+        Setting("RTL_ALT", "height of a return", mm=10, needs=_returns),
+        Setting("RTL_ALT_M", "height of a return", mm=1_000, needs=_returns),
+        Setting(
+            "AVOID_ENABLE", "keeps away from (in LOITER and GUIDED velocity flight)",
+            {0: "nothing", 1: "fences", 2: "obstacles", 3: "fences and obstacles", 4: "beacon fences",
+             7: "fences, obstacles and beacon fences"},
+        ),
+        Setting("WPNAV_SPEED", "speed across where a step says none", mm=10, needs=_speed),
+        Setting("WPNAV_SPEED_UP", "speed up", mm=10, needs=_climb),
+        Setting("WPNAV_SPEED_DN", "speed down", mm=10, needs=_climb),
+        Setting("WP_SPD", "speed across where a step says none", mm=1_000, needs=_speed),
+        Setting("WP_SPD_UP", "speed up", mm=1_000, needs=_climb),
+        Setting("WP_SPD_DN", "speed down", mm=1_000, needs=_climb),
+        Setting(
             "FENCE_ACTION", "at the fence",
             {0: "reports only", 1: "return or land", 2: "land", 3: "SmartRTL, return or land", 4: "brake or land",
              5: "SmartRTL or land"},
-            {0: "its fence is no second line of defence"},
+            {0: "its fence is no second line of defence"}, 1,
         ),
-        Setting("ARMING_CHECK", "checks before arming", {0: "none", 1: "all"}, {0: "it arms whatever is wrong"}),
+        Setting("ARMING_CHECK", "checks before arming", {0: "none", 1: "all"}, {0: "it arms whatever is wrong"}, 1),
         Setting("ARMING_SKIPCHK", "checks left out before arming", {0: "none"}, {}),
         Setting("DISARM_DELAY", "seconds until it disarms on the ground", {}, {}),
     ),

@@ -5,6 +5,7 @@ DO_SET_MODE says nothing: only the heartbeat tells, and of a stop only the speed
 """
 
 from rtshcua.adapters.vehicle import effects, flavour, messages
+from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.messages import NAN
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
@@ -78,4 +79,5 @@ PX4 = AutopilotFlavour(
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     bytewise=True,
     fence=FenceHabits(frame=enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, all_inclusions=False, switches=()),
+    own_fence=OwnFence("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
 )

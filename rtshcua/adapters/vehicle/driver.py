@@ -19,6 +19,7 @@ from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
 from rtshcua.codec.frames import Received
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
+from rtshcua.mavlink.enums import MULTIROTORS
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -45,6 +46,9 @@ class Driver:
     `steps` are the mission's: how soon each has to be decided says how often reports are needed.
     """
 
+    #: what a flight would be kept from is told, though nothing is set: for an examination
+    judges = False
+
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
         verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
@@ -53,6 +57,7 @@ class Driver:
         self._policy = policy
         self._signed = verifier is not None
         self._capacity: int | None = None
+        self._steps = steps
         self._fence = fence
         self._manoeuvres = manoeuvres or {}
         self._telemetry = Telemetry(policy, [each.contract for each in steps])
@@ -69,6 +74,8 @@ class Driver:
         self.preflight: Preflight  # what is compared with the policy
         self._heeded: set[str]  # what more is made of than readings
         self.system = 0
+        #: that it is no multirotor, in words
+        self.other_kind: str | None = None
         #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
         self.resumes = False
         self._commander = Commander(slack)
@@ -115,7 +122,7 @@ class Driver:
         mute = None if self._watch.answers else "it answers nothing that it is asked"
         if self._flies:
             return self.link.crowd or mute or self.seen.unready
-        waits = self.link.crowd or self.source.unready or mute or self.preflight.astray
+        waits = self.other_kind or self.link.crowd or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
@@ -213,12 +220,16 @@ class Driver:
         flavour = self.flavour = _FLAVOURS.get(frame.message.autopilot)
         if flavour is not None:
             self.system = frame.system
+            if frame.message.type not in MULTIROTORS:
+                self.other_kind = f"it is no multirotor (MAV_TYPE {frame.message.type})"
             self.link.settle(frame.system)
             self.seen.estimator = Estimator(flavour.estimator)
             self.stream_requests = StreamRequests(self.plan(flavour), self._telemetry.sources)
             slack = self._commander.slack
             self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
-            self.preflight = Preflight(self._policy, flavour, self.seen, fence=self._fence, slack=slack)
+            self.preflight = Preflight(
+                self._policy, flavour, self.seen, self._steps, fence=self._fence, slack=slack, judges=self.judges
+            )
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:

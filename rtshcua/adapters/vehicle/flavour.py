@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.adapters.vehicle import effects, messages
+from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.effects import Effect, Measure
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
@@ -115,7 +116,8 @@ class AutopilotFlavour:
     in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay.
     `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
     top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
-    there. `bytewise`: integer parameters travel as their bytes. `fence` says how it takes a geofence.
+    there. `bytewise`: integer parameters travel as their bytes. `fence` says how it takes a geofence, `own_fence` what
+    bounds it has besides.
     """
 
     name: str
@@ -129,6 +131,7 @@ class AutopilotFlavour:
     returns: tuple[ReturnAltitude, ...]
     bytewise: bool
     fence: FenceHabits
+    own_fence: OwnFence
 
     def mode_name(self, number: int) -> str:
         """The autopilot's name of a `custom_mode`, or the number itself."""

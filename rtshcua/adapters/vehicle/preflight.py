@@ -4,16 +4,18 @@ fence.
 A vehicle that flies already is left alone.
 """
 
+from collections.abc import Sequence
 from typing import Any, Final
 
-from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle import bounds, messages
 from rtshcua.adapters.vehicle.fence import HEEDED as FENCE_HEEDED
-from rtshcua.adapters.vehicle.fence import Fencing
+from rtshcua.adapters.vehicle.fence import Fencing, fence_of
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ReturnAltitude
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.mavlink.quantise import hypot_mm, quantise
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import Projection, project
 
@@ -28,19 +30,23 @@ HEEDED: Final = (*FENCE_HEEDED, "PARAM_VALUE")
 class Preflight:
     """Compares place and return altitude with the policy's, sees to the fence, and asks why the vehicle would not arm.
 
-    `notes` collects what an operator should know. `fence` False leaves the vehicle's fence as it is. `slack` stretches
-    waits, as in `Driver`.
+    `notes` collects what an operator should know. `fence` False leaves the vehicle's fence as it is; what it would be
+    is judged all the same where `judges` says so. `steps` are the mission's: the autopilot's own bounds must leave room
+    for them. `slack` stretches waits, as in `Driver`.
     """
 
     def __init__(
-        self, policy: Policy, flavour: AutopilotFlavour, seen: ObservedVehicle, *, fence: bool, slack: int = 1
-    ) -> None:
+        self, policy: Policy, flavour: AutopilotFlavour, seen: ObservedVehicle, steps: Sequence[Invocation] = (),
+        *, fence: bool, slack: int = 1, judges: bool = False,
+    ) -> None:  # fmt: skip
         self._flavour = flavour
         self._seen = seen
         self._projection, self._home_within = policy.projection, policy.vehicle.home_within
         self._wanted_mm = policy.vehicle.return_altitude
         self._parameters = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
         self._fencing = Fencing(policy, flavour, self._parameters, wanted=fence, slack=slack)
+        self._policy, self._steps = policy, steps
+        self._arms = (fence or judges) and bool(flavour.fence.switches and fence_of(policy, flavour.fence).items)
         self._told = False
         self._checked_us: int | None = None
         self.notes: list[str] = []
@@ -50,6 +56,9 @@ class Preflight:
         if self._wanted_mm and self._found is None:
             for each in self._flavour.returns:
                 self._parameters.read(each.parameter)
+        for name in self._flavour.own_fence.names if self._steps else ():
+            if name not in self._parameters.values:
+                self._parameters.read(name)
         out = self._parameters.due(system, now_us)
         if self._seen.prearm_fails and (self._checked_us is None or now_us - self._checked_us >= CHECK_US):
             self._checked_us = now_us
@@ -59,6 +68,7 @@ class Preflight:
         if not self._told and self._fencing.unready is None:
             self._told = True
             self.notes.append(self._fencing.note)
+            self.notes += self._narrower_than_airspace()
         return out
 
     def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
@@ -68,6 +78,19 @@ class Preflight:
             return []
         return self._fencing.take(name, message, system, now_us)
 
+    def _narrower_than_airspace(self) -> list[str]:
+        """What of the airspace its own fence takes away, though the mission does without."""
+        if not self._steps:
+            return []
+        found = bounds.narrower(
+            self._flavour.own_fence, self._parameters.values, bounds.airspace_reach(self._policy), 0, armed=self._arms
+        )
+        return [
+            f"its own fence is narrower than the airspace: `{each.parameter}` is {each.value:g}, and the airspace goes "
+            f"{each.needed} m {each.about}"
+            for each in found
+        ]
+
     @property
     def unready(self) -> str | None:
         """What is not settled, in words."""
@@ -76,7 +99,8 @@ class Preflight:
     @property
     def astray(self) -> str | None:
         """What is known to be otherwise than the policy has it, in words."""
-        return self._far_from_home() or (None if self._found is None else self._returns_at(self._found))
+        returns = None if self._found is None else self._returns_at(self._found)
+        return self._far_from_home() or returns or self._bounded()
 
     @property
     def unplaced(self) -> str | None:
@@ -87,12 +111,41 @@ class Preflight:
     def unread(self) -> str | None:
         """That its return altitude is not known, in words."""
         if not self._wanted_mm or self._found is not None:
-            return None
+            return self._bounds_unread()
         names = [each.parameter for each in self._flavour.returns]
         quoted = " or ".join(f"`{name}`" for name in names)
         if all(map(self._parameters.is_absent, names)):
             return f"it does not tell its return altitude ({quoted})"
         return f"its return altitude ({quoted}) was not read yet"
+
+    def _bounds_unread(self) -> str | None:
+        """That the bounds of its own fence are not known, in words. One that the vehicle lacks bounds nothing."""
+        own, parameters = self._flavour.own_fence, self._parameters
+        if not self._steps:
+            return None
+        if not all(name in parameters.values or parameters.is_absent(name) for name in own.names):
+            return "the bounds of its own fence were not read yet"
+        missing = bounds.unknown(own, parameters.values, armed=self._arms)
+        if missing is None or missing == own.types:
+            return None
+        return f"it does not tell a bound of its own fence (`{missing}`)"
+
+    def _bounded(self) -> str | None:
+        """That its own fence keeps it from where the mission goes."""
+        if not self._steps or not self._seen.located or self._bounds_unread() is not None:
+            return None
+        own, values = self._flavour.own_fence, self._parameters.values
+        home = project(self._projection, self._seen.latitude, self._seen.longitude)
+        reach, room = bounds.reach_of(self._steps, self._policy, home), self._policy.vehicle.position_error
+        found = next(bounds.narrower(own, values, reach, room, armed=self._arms), None)
+        if found is None:
+            return None
+        least = "most" if found.bit == bounds.FLOOR_BIT else "least"
+        off = "" if own.types is None else f", or take {found.bit} out of `{own.types}`, which is {values[own.types]:g}"
+        return (
+            f"its own fence ends {found.value:g} m {found.about} (`{found.parameter}`), where the mission has targets "
+            f"beyond, which it would ignore: set `{found.parameter}` to {found.needed} at the {least}{off}"
+        )
 
     def _far_from_home(self) -> str | None:
         """Where it stands becomes its home, which all of the policy is drawn around."""

@@ -44,8 +44,8 @@ _REPOSITION_M_S = 1.25
 _PARAMETERS = frozenset({"PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "PARAM_SET"})
 """What another thread answers (`GCS_MAVLINK::param_io_timer`)."""
 
-_CEILING, _CIRCLE, _POLYGON = 1, 2, 4
-"""The bits of FENCE_TYPE; the floor (8) is not in this vehicle."""
+_CEILING, _CIRCLE, _POLYGON, _FLOOR = 1, 2, 4, 8
+"""The bits of FENCE_TYPE."""
 _REPORT, _RETURN, _LAND, _BRAKE = 0, 1, 2, 4
 """FENCE_ACTION; the smart returns (3, 5) are plain ones here."""
 _GIVE_UP_M = 100.0
@@ -63,7 +63,9 @@ def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
     if kinds & _CIRCLE:
         included = (*included, Circle((0.0, 0.0), value("FENCE_RADIUS")))
     ceiling = value("FENCE_ALT_MAX") if kinds & _CEILING else inf
-    return FenceLimits(Area(included, excluded, every=True), ceiling)
+    floor = value("FENCE_ALT_MIN") if kinds & _FLOOR else -inf
+    # `ModeRTL::compute_return_target` takes a return down to `get_safe_alt_max`
+    return FenceLimits(Area(included, excluded, every=True), ceiling, floor, ceiling - value("FENCE_MARGIN"))
 
 
 def _name(limits: FenceLimits, point: Point) -> str:

@@ -34,7 +34,7 @@ def examine(
     policy = policy or case.policy()
     clock = VirtualClock()
     vehicle = VirtualVehicle(policy, config, clock, fence=False)
-    vehicle.driver = ExaminingDriver(policy, clock, vehicle.frames)
+    vehicle.driver = ExaminingDriver(policy, clock, vehicle.frames, steps=MISSION.invocations)
     prepare(vehicle)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
@@ -74,6 +74,61 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     asked = {each.command for each in names if each.get_type() == "COMMAND_LONG"}
     own_checks = {mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # it looks again, and says why not
     assert asked - own_checks == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "slug", "needed", "advice"),
+    [
+        ("ardupilot", {"FENCE_RADIUS": 5.0}, "settings/fence_radius", "at least ", "set `FENCE_RADIUS` to "),
+        ("ardupilot", {"FENCE_ALT_MAX": 5.0}, "settings/fence_alt_max", "at least ", "set `FENCE_ALT_MAX` to "),
+        ("px4", {"GF_MAX_HOR_DIST": 5.0}, "settings/gf_max_hor_dist", "at least ", "set `GF_MAX_HOR_DIST` to "),
+        ("ardupilot", {"WPNAV_SPEED": 5_000.0}, "settings/wpnav_speed", "at most 12 m/s", "to 1200"),
+        ("px4", {"MPC_Z_VEL_MAX_UP": 8.0}, "settings/mpc_z_vel_max_up", "at most ", "set `MPC_Z_VEL_MAX_UP` to "),
+        ("px4", {"GF_ACTION": 0.0}, "settings/gf_action", "hold", "second line of defence; set `GF_ACTION` to 2"),
+        ("ardupilot", {"FS_EKF_ACTION": 0.0}, "settings/fs_ekf_action", "land", "set `FS_EKF_ACTION` to 1"),
+    ],
+)
+def test_a_parameter_that_interferes_says_what_is_needed_and_how_to_change_it(
+    flavour: str, parameters: dict[str, float], slug: str, needed: str, advice: str
+) -> None:
+    found = examine(case.simulated(flavour, parameters=tuple(parameters.items())))
+    finding = found[slug]
+    assert finding.verdict is MissionVerdict.WARN
+    assert finding.needed.startswith(needed)
+    assert advice in finding.advice
+    name = next(iter(parameters))
+    assert name in finding.found
+    beyond = name in ("FENCE_RADIUS", "FENCE_ALT_MAX", "GF_MAX_HOR_DIST")
+    assert ("mission/unready" in stops(found)) is beyond, "where it cannot fly at all, that is said"
+
+
+@FLAVOURS
+def test_what_bounds_nothing_is_told_and_well(flavour: str) -> None:
+    found = examine(case.simulated(flavour))
+    told = {slug: each.verdict for slug, each in found.items() if slug.startswith("settings/")}
+    bounds = {
+        "px4": {"settings/gf_max_hor_dist", "settings/gf_max_ver_dist", "settings/rtl_return_alt"},
+        "ardupilot": {"settings/fence_radius", "settings/fence_alt_max", "settings/fence_type", "settings/rtl_alt"},
+    }[flavour]
+    assert {told[slug] for slug in bounds} == {MissionVerdict.OK}
+
+
+def test_what_is_no_multirotor_is_refused() -> None:
+    def winged(vehicle: VirtualVehicle) -> None:
+        sender = Codec(1, 1)
+
+        def hurt(datagram: bytes) -> list[bytes]:
+            (frame,) = Codec(0, 0).parse(datagram)
+            if frame.name != "HEARTBEAT":
+                return [datagram]
+            frame.message.type = mavlink.MAV_TYPE_FIXED_WING
+            return [sender.pack(frame.message)]
+
+        vehicle.hurt = hurt
+
+    found = examine(case.simulated("ardupilot"), prepare=winged)
+    assert found["autopilot/kind"].found == "it is no multirotor (MAV_TYPE 1)"
+    assert "autopilot/kind" in stops(found)
 
 
 def test_a_link_that_is_too_slow_stops_a_mission_and_one_that_delivers_less_is_told() -> None:

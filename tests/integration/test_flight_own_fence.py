@@ -1,0 +1,51 @@
+"""An autopilot's own circle and ceiling are compared with the mission before it flies."""
+
+import pytest
+
+from rtshcua.onboard.ports import Ending
+from virtual.flight import Flight
+from virtual.shipped import shipped, simulated
+
+#: parameters of its owner's, and what is said of them; `one_bridge` goes some 200 m away at 20 m
+NARROW = {
+    "a circle": ("ardupilot", {"FENCE_RADIUS": 50.0}, "`FENCE_RADIUS`", "take 2 out of `FENCE_TYPE`, which is 7"),
+    "a ceiling": ("ardupilot", {"FENCE_ALT_MAX": 15.0}, "`FENCE_ALT_MAX`", "take 1 out of `FENCE_TYPE`"),
+    "a margin": ("ardupilot", {"FENCE_ALT_MAX": 31.0, "FENCE_MARGIN": 20.0}, "`FENCE_ALT_MAX`", "50 at the least"),
+    "a floor": ("ardupilot", {"FENCE_TYPE": 15.0, "FENCE_ALT_MIN": 40.0}, "`FENCE_ALT_MIN`", "at the most"),
+    "a circle of PX4's": ("px4", {"GF_MAX_HOR_DIST": 50.0}, "`GF_MAX_HOR_DIST`", "at the least"),
+    "a ceiling of PX4's": ("px4", {"GF_MAX_VER_DIST": 15.0}, "`GF_MAX_VER_DIST`", "at the least"),
+}
+
+
+@pytest.mark.parametrize("case", NARROW)
+def test_a_mission_beyond_the_autopilots_own_fence_is_refused_and_why_is_said(case: str) -> None:
+    flavour, parameters, names, helps = NARROW[case]
+    flight = Flight(shipped("one_bridge"), simulated(flavour, parameters=tuple(parameters.items())))
+    flown = flight.fly()
+    assert flown.ending is Ending.REFUSED
+    assert flown.dispatched() == []
+    unready = flight.vehicle.driver.unready
+    assert unready is not None
+    assert names in unready
+    assert helps in unready
+    assert not [each for each in flown.effects("noted") if "fence was set" in each["detail"]], "nothing was uploaded"
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "fence"),
+    [
+        ("ardupilot", {"FENCE_RADIUS": 20.0, "FENCE_TYPE": 4.0}, True),  # no circle is armed
+        ("ardupilot", {"FENCE_RADIUS": 20.0}, False),  # no fence is
+    ],
+)
+def test_what_is_not_armed_bounds_nothing(flavour: str, parameters: dict[str, float], fence: bool) -> None:
+    config = simulated(flavour, parameters=tuple(parameters.items()))
+    assert Flight(shipped("short"), config, fence=fence).fly().ending is Ending.COMPLETED
+
+
+def test_a_fence_that_leaves_the_mission_room_and_not_the_airspace_is_noted() -> None:
+    config = simulated("ardupilot", parameters=(("FENCE_RADIUS", 60.0),))
+    flown = Flight(shipped("short"), config).fly()
+    assert flown.ending is Ending.COMPLETED
+    noted = [each["detail"] for each in flown.effects("noted")]
+    assert any("narrower than the airspace: `FENCE_RADIUS` is 60" in each for each in noted)

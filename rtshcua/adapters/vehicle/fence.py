@@ -295,7 +295,14 @@ class Fencing:
         if not fence.items:
             return f"no fence was set, for none can say this airspace: {left_out}"
         many = f"{len(fence.items)} item{'' if len(fence.items) == 1 else 's'}"
+        changes = [
+            f"`{name}` from {before:g} to {after:g}"
+            for name, (before, after) in self._parameters.changed.items()
+            if name in dict(self._habits.switches)
+        ]
         text = f"its fence was set to the policy's airspace ({many}), and read back"
+        if changes:
+            text = f"{text}; switched on with {' and '.join(changes)}, which stays so"
         return f"{text}; not in it: {left_out}" if left_out else text
 
     @property

@@ -41,6 +41,8 @@ class VehicleParameters:
         self.values: dict[str, float] = {}
         self._types: dict[str, int] = {}
         self._wanted: dict[str, _Wanted] = {}
+        #: what was set: the value that was found, and the one that is wanted
+        self.changed: dict[str, tuple[float, float]] = {}
 
     def read(self, name: str) -> None:
         """Ask for one that is not asked for yet."""
@@ -53,6 +55,8 @@ class VehicleParameters:
 
     def write(self, name: str, value: float) -> None:
         """Set one that was read before."""
+        before, _ = self.changed.get(name, (self.values[name], 0.0))
+        self.changed[name] = before, value
         self._wanted[name] = _Wanted(value)
 
     def has(self, name: str, bits: int) -> bool:

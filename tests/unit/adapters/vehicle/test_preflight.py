@@ -103,13 +103,24 @@ def at_home() -> ObservedVehicle:
     return ObservedVehicle(latitude=PROJECTION.latitude, longitude=PROJECTION.longitude, located=True)
 
 
+def done(flavour: Flavour) -> str:
+    """What is told of a fence that was set: on ArduCopter parameters are changed for it."""
+    text = "its fence was set to the policy's airspace (4 items), and read back"
+    switched = "; switched on with `FENCE_TYPE` from 3 to 7 and `FENCE_ENABLE` from 0 to 1, which stays so"
+    return text + (switched if flavour is ARDUPILOT else "")
+
+
 @FLAVOURS
 def test_all_is_settled_and_told_once(flavour: Flavour) -> None:
     one, port = preflight(flavour), Port(flavour)
     assert "was not read yet" in (one.unready or "")
     port.settle(one)
     assert one.unready is None
-    assert one.notes == ["its fence was set to the policy's airspace (4 items), and read back"]
+    switched = "; switched on with `FENCE_TYPE` from 3 to 7 and `FENCE_ENABLE` from 0 to 1, which stays so"
+    assert one.notes == [
+        "its fence was set to the policy's airspace (4 items), and read back"
+        + (switched if flavour is ARDUPILOT else "")
+    ]
     assert [port.items[number].command for number in range(4)] == [5001] * 4
     assert {item.frame for item in port.items.values()} == {flavour.fence.frame}
 
@@ -242,7 +253,11 @@ def test_what_failed_is_begun_again(flavour: Flavour) -> None:
     port.lose = lambda name: False
     port.settle(one)
     assert one.unready is None
-    assert one.notes == ["its fence was set to the policy's airspace (4 items), and read back"]
+    switched = "; switched on with `FENCE_TYPE` from 3 to 7 and `FENCE_ENABLE` from 0 to 1, which stays so"
+    assert one.notes == [
+        "its fence was set to the policy's airspace (4 items), and read back"
+        + (switched if flavour is ARDUPILOT else "")
+    ]
 
 
 def test_a_switch_that_is_no_number_is_off() -> None:

@@ -1,5 +1,7 @@
 """What keeps a flight from beginning: a documented exit code, one clear message, no traceback, and nothing sent."""
 
+import os
+import pty
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -53,6 +55,16 @@ def test_a_busy_port(ground: Any, capfd: Any) -> None:
         code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{busy}", *IDENTITY)
     assert code == 8
     assert f"cannot listen at `udpin:127.0.0.1:{busy}`: address already in use" in err
+
+
+def test_a_line_that_carries_too_little(ground: Any, capfd: Any) -> None:
+    far, near = pty.openpty()
+    code, err = refused(capfd, ground.bundle(), "--connect", f"serial:{os.ttyname(near)}:9600", *IDENTITY)
+    os.close(far)
+    os.close(near)
+    assert code == 5
+    assert "the link carries 960 octets a second" in err
+    assert "19200 baud would" in err
 
 
 def test_an_address_that_is_not_ours(ground: Any, capfd: Any) -> None:

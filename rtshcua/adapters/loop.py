@@ -124,6 +124,8 @@ class RunLoop:
                     self._vehicle.release()
                 case ports.Announce(severity, text):
                     self._vehicle.announce(severity, text)
+                case ports.Expect(steps):
+                    self._vehicle.expect(steps)
                 case ports.End(how):
                     self._held = None
                     ending = how

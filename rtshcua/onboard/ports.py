@@ -10,6 +10,7 @@ from typing import Final, Protocol, dataclass_transform
 
 import msgspec
 
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now
 
 
@@ -239,6 +240,12 @@ class Announce(Frozen, frozen=True):
     text: str
 
 
+class Expect(Frozen, frozen=True):
+    """From now on these are the mission's steps: reports are to come as often as they need them."""
+
+    steps: tuple[Invocation, ...]
+
+
 class Reply(Frozen, frozen=True):
     """The answer to what `sender` presented: a stable slug, and a text for a person."""
 
@@ -253,7 +260,7 @@ class End(Frozen, frozen=True):
     ending: Ending
 
 
-Action = Dispatch | Release | Append | Announce | Reply | End
+Action = Dispatch | Release | Append | Announce | Expect | Reply | End
 
 
 # ---------------------------------------------------------------- the other side
@@ -305,6 +312,10 @@ class Vehicle(Protocol):
 
     def announce(self, severity: int, text: str) -> None:
         """Tell any ground station, as STATUSTEXT; left out when the link is busy."""
+        ...
+
+    def expect(self, steps: Sequence[Invocation]) -> None:
+        """From now on these are the mission's steps: ask for reports as often as they need them."""
         ...
 
 

@@ -112,6 +112,10 @@ class VirtualVehicle:
         """Send a STATUSTEXT."""
         self.driver.announce(severity, text)
 
+    def expect(self, steps: Sequence[Invocation]) -> None:
+        """Ask for reports as often as these steps need them."""
+        self.driver.expect(steps)
+
     def _send(self, frames: Sequence[bytes], events: list[Event]) -> None:
         for frame in frames:
             self.sent += 1

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from rtshcua.cli.sources import compile_sources
 from rtshcua.evidence.report import Verdict
-from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.onboard.ports import Ending, Event, Presented
 from rtshcua.wire.approval import ApprovalDocument, sign_approval
 from rtshcua.wire.keys import Duty
@@ -99,13 +101,30 @@ def test_a_refusal_brings_it_home(low: bytes) -> None:
 
 
 def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
+    expected: list[Sequence[Invocation]] = []
+
     def document(flight: Flight) -> bytes:
+        vehicle: Any = flight.vehicle
+        vehicle.expect = expected.append
         flying = flight.loaded.in_force
         return sign_replacement(shorter, over=flying.bundle, flight=flying.flight, kept=2, key=case.KEYS[Duty.MISSION])
 
     flown = fly(low, "ardupilot", '"detail":"goto"', document)
     assert flown.ending is Ending.COMPLETED
     assert flown.dispatched() == ["takeoff", "goto", "hover", "return_home"]
+    assert [[step.contract.name for step in steps] for steps in expected] == [flown.dispatched()]
+
+
+def test_what_a_new_step_waits_for_comes_within_its_deadline(low: bytes, shorter: Mission) -> None:
+    def quick(step: Invocation) -> Invocation:
+        return replace(step, contract=replace(step.contract, deadline_us=200_000))
+
+    vehicle = Flight(low, simulated("px4")).vehicle
+    vehicle.poll(vehicle.clock.monotonic_us, 10 * S)
+    before = dict(vehicle.driver.stream_requests.plan.intervals)
+    vehicle.expect([quick(step) for step in shorter.invocations])
+    after = vehicle.driver.stream_requests.plan.intervals
+    assert before["GPS_RAW_INT"] > after["GPS_RAW_INT"] == 100_000
 
 
 def test_a_recall_brings_it_home_by_the_contingency(low: bytes) -> None:

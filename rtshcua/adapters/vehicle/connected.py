@@ -8,6 +8,7 @@ from rtshcua.adapters.vehicle.driver import HEARTBEAT_US, Driver
 from rtshcua.adapters.vehicle.transport import Transport
 from rtshcua.codec.stream import FrameStream, StreamCounts
 from rtshcua.mavlink.framing import unsigned
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.ports import Command, Event, Noted
 
 #: One poll takes no more datagrams, and no more time, by its clock or the machine's, than this: a flood must not starve
@@ -100,6 +101,10 @@ class ConnectedVehicle:
     def announce(self, severity: int, text: str) -> None:
         """Tell any ground station on the link."""
         self.driver.announce(severity, text)
+
+    def expect(self, steps: Sequence[Invocation]) -> None:
+        """Ask for reports as often as these steps need them."""
+        self.driver.expect(steps)
 
     def close(self) -> None:
         """Give the port back."""

@@ -105,6 +105,12 @@ class Driver:
         wanted = {**always, **self._telemetry.rates, **estimator, **AT_TIMES}
         return plan_streams(wanted, self._capacity, signed=self._signed)
 
+    def expect(self, steps: Sequence[Invocation]) -> None:
+        """These are the mission's steps from now on: what they need more often is asked for anew."""
+        self._telemetry.need(self._policy, [each.contract for each in steps])
+        if self.flavour is not None:
+            self.stream_requests.replan(self.plan(self.flavour))
+
     @property
     def shortfall(self) -> str | None:
         """That the link carries too little for any flavour, in words."""

@@ -110,9 +110,7 @@ class StreamRequests:
     def __init__(self, plan: StreamPlan, needed: Iterable[frozenset[str]]) -> None:
         self.plan = plan
         self._needed = [*needed, *[frozenset({name}) for name in AT_LEAST]]
-        known = {name: us for name, us in plan.intervals.items() if messages.number_of(name) is not None}
-        self._at_times = {name: us for name, us in known.items() if name in AT_TIMES}
-        self._wanted = {name: us for name, us in known.items() if name not in AT_TIMES}
+        self._at_times, self._wanted = _sorted(plan)
         self._queue = [*self._wanted, *self._at_times]
         self._refused: set[str] = set()
         self._heard_us: dict[str, int] = {}
@@ -130,6 +128,15 @@ class StreamRequests:
         #: octets a second that came, and the interval in us of each message that was asked for; None before measured
         self.measured: tuple[int, Mapping[str, int]] | None = None
         self.notes: list[str] = []
+
+    def replan(self, plan: StreamPlan) -> None:
+        """Other rates are needed: those that differ are asked for, and measured anew."""
+        before, self.plan = {**self._wanted, **self._at_times}, plan
+        self._at_times, self._wanted = _sorted(plan)
+        self._queue += [name for name, us in {**self._wanted, **self._at_times}.items() if before.get(name) != us]
+        self._measured_us = None
+        if plan.shortfall is not None:
+            self.notes.append(plan.shortfall)
 
     def heard(self, name: str, now_us: int, octets: int = 0) -> None:
         """A message came, in a frame of so many octets."""
@@ -253,3 +260,10 @@ class StreamRequests:
     def _is_quiet(self, name: str, now_us: int) -> bool:
         last_us = max(self._heard_us.get(name, 0), self._since_us or 0)
         return name not in self._refused and now_us - last_us > QUIET_US
+
+
+def _sorted(plan: StreamPlan) -> tuple[dict[str, int], dict[str, int]]:
+    """The intervals of what comes at times only, and of all else that the dialect has."""
+    known = {name: us for name, us in plan.intervals.items() if messages.number_of(name) is not None}
+    at_times = {name: us for name, us in known.items() if name in AT_TIMES}
+    return at_times, {name: us for name, us in known.items() if name not in AT_TIMES}

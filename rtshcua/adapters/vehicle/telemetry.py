@@ -55,6 +55,10 @@ class Telemetry:
         #: for each signal, the messages that may carry it
         self.sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
 
+    def need(self, policy: Policy, contracts: Sequence[Contract]) -> None:
+        """Reports are needed as often as these contracts of a mission's steps say."""
+        self.rates = rates(policy, contracts)
+
     def read(
         self, name: str, message: Any, component: int = AUTOPILOT, doubtful: frozenset[str] = _NONE
     ) -> tuple[tuple[int, int | None], ...]:

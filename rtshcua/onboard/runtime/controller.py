@@ -14,7 +14,7 @@ from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Failed, LinkLost
+from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Expect, Failed, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
@@ -362,7 +362,9 @@ class MissionController:
 
     def replaced(self) -> None:
         """A replacement is in force: steps that were not released are others now."""
-        self.queue.replace(self._loaded.bundle.mission)
+        mission = self._loaded.bundle.mission
+        self.queue.replace(mission)
+        self._journal.add(Expect(mission.invocations))
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED, *, holds: bool = True) -> None:
         """Fly the current step's chain, or the contingency, down to the ground. Without `holds`, links that hold are

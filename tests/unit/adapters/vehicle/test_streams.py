@@ -93,6 +93,17 @@ def test_what_is_delivered_is_measured_and_told_once() -> None:
     assert line.streams.notes == [f"streams: 1890 octets a second asked for, {octets} came in all"]
 
 
+def test_other_rates_that_are_needed_under_way_are_asked_for() -> None:
+    line = Line(None, {})
+    line.run(2 * MEASURE_US / S)
+    before = len(line.asked)
+    line.streams.replan(plan_streams({**RATES, "HEARTBEAT": Rate(50_000, S)}, None, signed=False))
+    line.run(1)
+    assert line.asked[before:] == [("HEARTBEAT", 50_000)], "the others are as they were"
+    line.streams.replan(plan_streams(RATES, 960, signed=False))
+    assert "carries 960 octets" in line.streams.notes[-1]
+
+
 def test_what_nobody_asked_for_is_turned_off_where_it_takes_the_room() -> None:
     """As PX4 does on a companion's port: its own streams fill the line."""
     line = Line(2_400, {"ATTITUDE_QUATERNION": 20_000, "HIGHRES_IMU": 20_000, "TIMESYNC": 100_000})

@@ -30,6 +30,7 @@ AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
 HOME_MOVES: Final = 10_000
 
 _KIND: Final = LAYOUTS[HEARTBEAT].at("autopilot")
+_BASE_MODE: Final = LAYOUTS[HEARTBEAT].at("base_mode")
 _position: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("lat lon alt relative_alt")
 
 # why a frame does not leave
@@ -38,7 +39,9 @@ NO_VEHICLE: Final = Refusal("frame/no-vehicle", "no autopilot was heard yet")
 NOT_OURS: Final = Refusal("frame/not-ours", "it claims another sender")
 WRONG_TARGET: Final = Refusal("frame/wrong-target", "it is to another system or component, or to everybody")
 FORCED_ARMING: Final = Refusal("frame/forced-arming", "it arms or disarms past the autopilot's own checks")
-AFTER_START: Final = Refusal("frame/after-start", "it is about a fence, once anything flew")
+AFTER_START: Final = Refusal(
+    "frame/after-start", "it is about a fence, once anything flew or while the motors are armed"
+)
 NO_SESSION: Final = Refusal("frame/no-session", "it moves the vehicle, and nothing that was permitted does so now")
 NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command that was permitted")
 #: the leg there was never checked
@@ -86,6 +89,7 @@ class FrameSession:
         self._started = False  # a session was opened: fences stay as they are
         self._system = 0
         self._autopilot = 0  # MAV_AUTOPILOT
+        self._armed = False  # as its last heartbeat says
         self._home_amsl: int | None = None  # mm
         self._settled_amsl: int | None = None  # the same, when the takeoff was permitted
 
@@ -110,10 +114,12 @@ class FrameSession:
         heard = read_frame(frame)
         if heard is None or heard.component != AUTOPILOT:
             return
-        if heard.message == HEARTBEAT and not self._system:
+        if heard.message == HEARTBEAT:
             autopilot = heard.fields[_KIND]
-            if autopilot in KNOWN:
+            if not self._system and autopilot in KNOWN:
                 self._system, self._autopilot = heard.system, autopilot
+            if heard.system == self._system:
+                self._armed = bool(heard.fields[_BASE_MODE] & enums.MAV_MODE_FLAG_SAFETY_ARMED)
         elif heard.message == GLOBAL_POSITION_INT and heard.system == self._system:
             latitude, longitude, amsl, above_home = _position(heard.fields)
             self._here = latitude, longitude
@@ -147,7 +153,7 @@ class FrameSession:
         if allow_list.is_housekeeping(frame):
             return None
         if allow_list.is_of_fence(frame):
-            return AFTER_START if self._started else None
+            return AFTER_START if self._started or self._armed else None
         # 4. what is permitted now
         return self._refuse_motion(frame, now_us)
 

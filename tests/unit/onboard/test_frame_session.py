@@ -342,6 +342,20 @@ def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
     assert gate.seal(pack(ALWAYS[0], system=SYSTEM + 1), NOW) is NOT_OURS
 
 
+@pytest.mark.parametrize("message", BEFORE_FLIGHT, ids=named)
+def test_a_fence_is_not_handed_to_a_vehicle_that_is_armed(message: Any) -> None:
+    """Whoever armed it: a run may begin while it flies."""
+    gate = FrameSession()
+    gate.observe(pack(heartbeat(PX4), component=1))
+    assert not isinstance(gate.seal(pack(message), NOW), Refusal)
+    gate.observe(pack(m.MAVLink_heartbeat_message(2, PX4, 128, 0, 4, 3), component=1))
+    assert gate.seal(pack(message), NOW) is AFTER_START
+    gate.observe(pack(heartbeat(PX4), system=SYSTEM + 1, component=1))
+    assert gate.seal(pack(message), NOW) is AFTER_START, "another vehicle tells nothing of this one"
+    gate.observe(pack(heartbeat(PX4), component=1))
+    assert not isinstance(gate.seal(pack(message), NOW), Refusal)
+
+
 def test_before_a_vehicle_is_known_only_a_greeting_leaves() -> None:
     """Over some links a vehicle waits to be spoken to."""
     gate = FrameSession()

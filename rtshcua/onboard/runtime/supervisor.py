@@ -10,6 +10,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Reason
 from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.seen import seen
 from rtshcua.wire.response import Answer
 
 _DURATION = "lasts longer than it may"
@@ -55,12 +56,14 @@ class Supervisor:
         self.grace = Grace()
 
     def violated(self, state: State, now: Now) -> str | None:
-        """The text of what does not hold any more, or None while all does."""
+        """The text of what does not hold any more, with the values that it read, or None while all does."""
         contract = self._prepared.invocation.contract
         at_us = now.monotonic_us
         if 0 < contract.duration_us < at_us - self._started_us:
             return _DURATION
-        return self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
+        text = self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
+        values = "" if text is None else seen(text, self._prepared, self._policy, state)
+        return f"{text}: {values}" if values else text
 
 
 class RetryPolicy:

@@ -263,7 +263,7 @@ def test_a_breach_is_judged_once_all_is_fresh_and_not_before(order: int) -> None
     come_back(run, order)
     assert run.flown[sent:] == ["hover"]
     (violated,) = (record for record in run.records if record.get("event") == "violated")
-    assert violated["detail"] == "wind.speed < 10 m/s"
+    assert violated["detail"] == "wind.speed < 10 m/s: wind.speed = 12 m/s"
     assert run.events.index("fresh") < run.events.index("violated")
 
 

@@ -69,7 +69,7 @@ def compile_sources(
     if paths[0].suffix.lower() == ".json":
         given = PROPOSED if pins is None else pins._replace(source=pins.source or PROPOSED.source)
     reading = read_sources(paths, given or PROPOSED)
-    if pins is not None and given is not pins and pins.policies is None:
+    if pins is not None and given is not None and given is not pins and pins.policies is None:
         named = frozenset(shown(str(path)) for path in paths[1:])
         given = given._replace(policies=policies_of(reading.program, named))
     compiled = compile_program(

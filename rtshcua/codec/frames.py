@@ -10,7 +10,7 @@ tests/unit/codec/test_decode.py holds that both give the same for every kind of 
 
 from binascii import crc_hqx
 from collections.abc import Callable, Container, Mapping
-from functools import cache
+from functools import lru_cache
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -52,7 +52,7 @@ class Kind(NamedTuple):
     """The payload of a message, zeros at its end included; None where it holds texts."""
 
 
-@cache
+@lru_cache(maxsize=1024)  # more than the dialect has; a hostile link may name 2^24 numbers
 def kind_of(number: int) -> Kind | None:
     """The kind of a message; None for one that the dialect does not have."""
     of = ardupilotmega.mavlink_map.get(number)

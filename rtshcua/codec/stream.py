@@ -6,7 +6,16 @@ Octets that belong to no frame are counted, by what they seem to be, so that a p
 from typing import Final, NamedTuple
 
 from rtshcua.codec.frames import kind_of
-from rtshcua.mavlink.framing import CHECKSUM, FLAG_SIGNED, FLAGS, HEADER, MARKER, checks, frame_length, message_id
+from rtshcua.mavlink.framing import (
+    CHECKSUM,
+    FLAG_SIGNED,
+    FLAGS,
+    HEADER,
+    MARKER,
+    frame_length,
+    message_id,
+    octets_of_checksum,
+)
 
 #: a frame of MAVLink 1: marker, length, sequence, system, component, message; then payload and checksum
 _OLD_MARKER: Final = 0xFE
@@ -90,4 +99,4 @@ def _is_good(frame: bytes, following: bytes) -> bool:
     if kind is None:
         return frame[0] == MARKER and following[:1] == bytes([MARKER])
     end = header + frame[1]
-    return checks(frame[1:end] + kind.extra, frame[end], frame[end + 1])
+    return octets_of_checksum(frame[1:end] + kind.extra) == frame[end : end + CHECKSUM]

@@ -151,10 +151,10 @@ def answers(frame: Frame, limits: Iterable[Limit]) -> Iterator[Block]:
         here = frame.made | dict(limit.made) | {limit.variable: limit.holds}
         role, comments = policy.roles[rule.approver], _comments([limit])
         for word in ("approved", "refused"):
-            said = (f"{word} by role {role}",)
+            said = [f"{word} by role {role}"]
             if rule.second != -1:
-                said = (said[0], f"approved by role {policy.roles[rule.second]}")
-            yield block(frame, ", ".join(said), here, comments=comments, premises=said)
+                said.append(f"approved by role {policy.roles[rule.second]}")
+            yield block(frame, ", ".join(said), here, comments=comments, premises=tuple(said))
         for us in (rule.within_us, rule.within_us + 1):
             ago = f"released {written.duration(us)} ago"
             yield block(frame, f"not answered, {ago}", here, comments=comments, premises=(ago,))

@@ -122,7 +122,8 @@ class Ground:
 
     def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight", return_mm: int = case.LOW) -> str:
         """A bundle issued now, of these steps or else the low ones; its file's name. 0: any height to return at."""
-        keys = {duty: self.store.signing_key(duty) for duty in (Duty.POLICY, Duty.MISSION)}
+        mission_key = self.store.signing_key(Duty.MISSION, whose="agent")
+        keys = {Duty.POLICY: self.store.signing_key(Duty.POLICY), Duty.MISSION: mission_key}
         mission = case.mission(case.low_steps() if steps is None else steps, time.time_ns() // 1_000)
         policy = case.policy()
         policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=return_mm))

@@ -61,7 +61,14 @@ def run() -> Iterator[Followed]:
 def test_the_first_lines_say_what_flies(run: Followed) -> None:
     run.agents.events(run.clock.now())
     hello, mission = run.told()
-    assert hello == {"type": "hello", "format": "rtshcua/agent", "version": 1, "vehicle": "quad-07", "mode": "software"}
+    assert hello == {
+        "type": "hello",
+        "format": "rtshcua/agent",
+        "version": 1,
+        "vehicle": "quad-07",
+        "flight": "0" * 32,
+        "mode": "software",
+    }
     assert mission["digest"] == run.loaded.bundle.mission_digest.hex()
     assert [(step["step"], step["skill"], step["phase"]) for step in mission["steps"]] == [
         (0, "takeoff", "departure"), (1, "goto", "inspection"), (2, "inspect_area", "inspection"),

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua import library
-from rtshcua.adapters.files.reach import Reach
+from rtshcua.adapters.files.readable import Readable
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.pins import PROPOSED, Pins, policies_of
@@ -29,26 +29,26 @@ def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
     what it claims beyond `pins` is a finding.
     """
     first, shipped = paths[0], str(library.root())
-    reach = Reach(paths)
+    readable = Readable(shipped, paths)
     rest = [str(path) for path in paths[1:]]
     if first.suffix.lower() == ".json":
         from rtshcua.ground.agent.specification import load_specification  # brings pydantic
 
         program, specification = load_specification(
-            str(first), rest, reach.read, shipped, reach.listing, reach.pack, pins
+            str(first), rest, readable.read, shipped, readable.listing, readable.pack, pins
         )
         return Reading(program, specification.pointed)
-    return Reading(load([str(first), *rest], reach.read, shipped, reach.listing, packs=reach.pack), tuple)
+    return Reading(load([str(first), *rest], readable.read, shipped, readable.listing, packs=readable.pack), tuple)
 
 
 def read_text(name: str, text: str) -> Reading:
     """A source that is not written yet, as if it were in the file `name`, and all that it imports."""
-    reach = Reach([name])
+    readable = Readable(str(library.root()), [name])
 
     def read(path: str) -> bytes:
-        return text.encode("utf-8") if path == shown(name) else reach.read(path)
+        return text.encode("utf-8") if path == shown(name) else readable.read(path)
 
-    return Reading(load([name], read, str(library.root()), reach.listing, packs=reach.pack), tuple)
+    return Reading(load([name], read, str(library.root()), readable.listing, packs=readable.pack), tuple)
 
 
 def compile_sources(

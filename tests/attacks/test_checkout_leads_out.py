@@ -143,7 +143,7 @@ def test_the_language_server_stays_in_the_workspace(here: Path, workspace: bool)
         session.look_in([str(here)])
     (here / "good.rts").write_text("\n")
     (here / "a.rts").write_text('import "../mine.rts"\nimport "good.rts"\n')
-    session._reach.ask(here / "a.rts") if not workspace else None
+    session._readable.ask(here / "a.rts") if not workspace else None
     program = session.desk.view("a.rts").program
     assert [unit.file for unit in program.units] == ["a.rts", "good.rts"]
     assert [each.code.id for each in program.diagnostics] == ["E0108"]

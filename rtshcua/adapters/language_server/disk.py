@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
-from rtshcua.adapters.files.reach import Reach
+from rtshcua.adapters.files.readable import Readable
 from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.language.paths import shown
 
@@ -16,9 +16,9 @@ MOST = 2_000
 _DRIVE = re.compile(r"/[A-Za-z]:(?=/|\Z)")
 
 
-def desk(library: str, reach: Reach) -> Desk:
+def desk(library: str, readable: Readable) -> Desk:
     """An empty desk over what may be read of the disk."""
-    return Desk(reach.read, library, reach.listing, reach.pack)
+    return Desk(readable.read, library, readable.listing, readable.pack)
 
 
 def sources(folders: Iterable[str]) -> Iterator[str]:

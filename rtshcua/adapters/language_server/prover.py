@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rtshcua.adapters.files.project import Project, Projects
-from rtshcua.adapters.files.reach import Reach
+from rtshcua.adapters.files.readable import Readable
 from rtshcua.adapters.language_server.disk import desk
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.compiler.program import examine_program
@@ -53,10 +53,10 @@ def main(library: str) -> None:
     os.dup2(2, 1)  # whatever prints must not reach the messages
     os.nice(5)  # a keystroke that is answered meanwhile goes first
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    reach = Reach()
-    known = desk(library, reach)
+    readable = Readable(library)
+    known = desk(library, readable)
     while (job := _take(incoming)) is not None:
-        reach.folders = list(job[2])
+        readable.folders = list(job[2])
         try:
             found: Found = examined(known, job)
         except Exception:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from lsprotocol import types as lsp
 
-from rtshcua.adapters.files.reach import Reach
+from rtshcua.adapters.files.readable import Readable
 from rtshcua.adapters.language_server.disk import desk, name_of, path_of
 from rtshcua.adapters.language_server.prover import Found, Proving
 from rtshcua.adapters.language_server.searching import Searching
@@ -43,8 +43,8 @@ class Session(Texts):
         tell: Callable[[lsp.PublishDiagnosticsParams], None],
         say: Callable[[str], None] = log.warning,
     ) -> None:
-        self._reach = Reach()
-        super().__init__(desk(library, self._reach), library, dialect.load())
+        self._readable = Readable(library)
+        super().__init__(desk(library, self._readable), library, dialect.load())
         self._tell = tell
         self._proving = Proving(library, say)
         self.searching = Searching()
@@ -66,13 +66,13 @@ class Session(Texts):
     def look_in(self, folders: list[str]) -> None:
         """The workspace is these folders: imports lead to no others."""
         self.folders = folders
-        self._reach.folders = [os.path.realpath(each) for each in folders]
+        self._readable.folders = [os.path.realpath(each) for each in folders]
 
     def open(self, uri: str, version: int, text: str) -> None:
         """A text was opened. Where there is no workspace, its project is one."""
         name = name_of(uri)
         if not self.folders and path_of(uri) is not None:
-            self._reach.ask(name)
+            self._readable.ask(name)
         self.opened[name] = Opened(uri, version, Lines(text, self.encoding))
         self.desk.put(name, text)
         self.desk.forget()
@@ -153,7 +153,7 @@ class Session(Texts):
         texts = {name: opened.lines.text for name, opened in self.opened.items()}
         for name, opened in self.opened.items():
             if opened.whole_stamp != opened.stamp:
-                self._proving.ask(name, texts, self._taker(name, opened.stamp), self._reach.edges)
+                self._proving.ask(name, texts, self._taker(name, opened.stamp), self._readable.edges)
 
     def _taker(self, name: str, stamp: int) -> Callable[[Found], None]:
         def take(found: Found) -> None:

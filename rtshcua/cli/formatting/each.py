@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rtshcua.adapters.files.reach import Reach
+from rtshcua import library
+from rtshcua.adapters.files.readable import Readable
 from rtshcua.adapters.store.writing import rewrite
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
@@ -39,7 +40,7 @@ class Laid:
 def of_file(path: Path, width: int, *, write: bool) -> Laid:
     """Lays a file out, and replaces it if that is asked for and it changes."""
     try:
-        data = Reach([path]).read(str(path))
+        data = Readable(str(library.root()), [path]).read(str(path))
     except OSError as error:
         from rtshcua.ground.language.faults import unreadable  # with the model, for which the usual case has no need
 

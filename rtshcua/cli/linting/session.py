@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
+from rtshcua import library
 from rtshcua.adapters.files.lint_cache import LintCache
-from rtshcua.adapters.files.reach import Reach
+from rtshcua.adapters.files.readable import Readable
 from rtshcua.cli.asked import SPECIFICATION, roots
 from rtshcua.cli.linting.examined import Examined, decoded, encoded
 from rtshcua.cli.linting.mark import mark
@@ -21,7 +22,7 @@ class Session:
     """Files as they were first read, or as they are to be (`put`), and what was found in their programs."""
 
     def __init__(self, asked: Iterable[Path] = ()) -> None:
-        self._reach = Reach(asked)
+        self._readable = Readable(str(library.root()), asked)
         self._data: dict[str, bytes | OSError | ValueError] = {}
         self._digests: dict[str, str | None] = {}
         self._sources: dict[str, Source] = {}
@@ -37,7 +38,7 @@ class Session:
         found = self._data.get(name)
         if found is None:
             try:
-                found = self._reach.read(name)
+                found = self._readable.read(name)
             except (OSError, ValueError) as error:
                 found = error
             self._data[name] = found
@@ -62,11 +63,11 @@ class Session:
 
     def folder(self, pack: str) -> str | None:
         """The folder of an installed pack."""
-        return self._reach.pack(pack)
+        return self._readable.pack(pack)
 
     def listing(self, name: str) -> list[str]:
         """The names in a folder, for suggestions. Raises OSError."""
-        return self._reach.listing(name)
+        return self._readable.listing(name)
 
     def sources(self, names: Sequence[str]) -> dict[str, Source]:
         """The texts of files; what cannot be had, or is no text, is left out or made as legible as it can be."""

@@ -9,7 +9,6 @@ from errno import EACCES
 from pathlib import Path
 from typing import Final
 
-from rtshcua import library
 from rtshcua.adapters.store.checkout import Outside, checkout_of, lies_in
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.ground.language.size import MAX_SIZE
@@ -19,16 +18,16 @@ ALLOWED: Final = "RTSHCUA_IMPORTS"
 _WHY: Final = f"it lies outside of the project (`{ALLOWED}` names further folders)"
 
 
-class Reach:
-    """Folders, and files that were asked for themselves. `folders` may be changed at any time."""
+class Readable:
+    """Folders, that of the `library` first, and files that were asked for themselves; `folders` may change."""
 
-    def __init__(self, asked: Iterable[str | Path] = (), folders: Iterable[str | Path] = ()) -> None:
+    def __init__(self, library: str, asked: Iterable[str | Path] = ()) -> None:
         allowed = [each for each in os.environ.get(ALLOWED, "").split(os.pathsep) if os.path.isabs(each)]  # noqa: PTH117
-        self._always = {os.path.realpath(each): None for each in (str(library.root()), *allowed)}
-        self.folders = [os.path.realpath(each) for each in folders]
+        self._always = {os.path.realpath(each): None for each in (library, *allowed)}
+        self.folders: list[str] = []
         self._edges: dict[str, str | None] = {}
         self._asked: set[str] = set()
-        self._packs: dict[str, str | None] = {"lib": str(library.root())}
+        self._packs: dict[str, str | None] = {"lib": library}
         for path in asked:
             self.ask(path)
 

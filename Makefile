@@ -9,7 +9,7 @@ unexport PYTHONHOME PYTHONPATH PYTHONDONTWRITEBYTECODE
 MAKEFLAGS += --no-print-directory
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test clients lint soak fuzz mutate wrong bench size clean
+.PHONY: help setup demo test clients lint soak fuzz mutate wrong bench size dist clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -54,6 +54,10 @@ bench: setup ## run every benchmark; each prints a ratio against a peer or a lim
 
 size: setup ## count modules, code lines, shared names and functions that are too long, by package
 	@$(BIN)/python .make/size
+
+dist: setup ## build the wheel into dist, and its bill of materials (CycloneDX); the same bytes each time
+	$(BIN)/python -m build --wheel --no-isolation --outdir dist
+	$(BIN)/python .make/sbom > dist/rtshcua.cdx.json
 
 clean: ## remove set-up, builds and caches; runs/ and keys stay
 	rm -rf .venv build dist .coverage .coverage.* .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

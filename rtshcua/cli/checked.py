@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from rtshcua.cli.asked import unfolded
+from rtshcua.cli.asked import SPECIFICATION, unfolded
 from rtshcua.cli.bounds import bounds_told
 from rtshcua.cli.checking import Mission, check_all
 from rtshcua.cli.earlier import Earlier, earlier_policies
+from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.programs import programs
 from rtshcua.cli.progress import watched
+from rtshcua.diagnostics.codes import UNKNOWN_NAME
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 
@@ -32,6 +34,9 @@ def check_sources(
         return findings.end(earlier)
     found = check_all(watched(programs(files, tuple(with_))), earlier)
     code = exit_code(found.diagnostics) if findings.report(found.diagnostics, found.sources) else ExitCode.OK
+    alone = len(files) == 1 and not with_ and files[0].suffix.lower() == SPECIFICATION
+    if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
+        say(" help: what a specification speaks of stands in its policy's sources: `--with FILE` names them")
     if code is ExitCode.OK and not as_json:
         print(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
         for mission in found.missions:

@@ -261,3 +261,16 @@ def test_progress_is_for_a_person_who_waits(monkeypatch: pytest.MonkeyPatch) -> 
         assert list(watched(items[:count])) == items[:count]
         assert ("3/5 file 2" in stream.getvalue()) == shown
         assert stream.getvalue().endswith("\r\033[K") == shown
+
+
+def test_a_specification_without_its_policy_says_how_to_name_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proposal = json.loads((Path(__file__).parents[3] / "missions/proposal.json").read_text(encoding="utf-8"))
+    monkeypatch.chdir(tmp_path)
+    Path("alone.json").write_text(json.dumps(proposal | {"imports": []}), encoding="utf-8")
+    assert main(["check", "alone.json"]) == ExitCode.DIAGNOSTICS
+    assert "`--with FILE` names them" in capsys.readouterr().err
+    Path("policy.rts").write_text('import "lib:policies/bridge_inspection.rts"\n', encoding="utf-8")
+    assert main(["check", "alone.json", "--with", "policy.rts"]) == ExitCode.OK
+    assert "names them" not in capsys.readouterr().err

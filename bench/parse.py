@@ -23,7 +23,7 @@ RATIO = 1.0
 ROUNDS = 7
 LINES = 2_000
 MOST_LINES = 50_000
-GROWTH = 2.0
+GROWTH = 1.3
 """The time a line at `MOST_LINES` may take, relative to that at a tenth of it."""
 CEILING = 2_048
 """Bytes of memory a line, of the IR and of all that parsing needs at its peak, without the text."""

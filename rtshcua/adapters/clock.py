@@ -4,11 +4,13 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.ports import Clock, ClockStepped
 
-#: How far UTC may be off where nothing better is known, in us.
+#: How far UTC may be off in a simulation, in us: it has the time of the machine that it runs on.
 UTC_ERROR_US = 100_000
+#: How much more it may be off after each second, in us: the kernel takes no clock for worse (500 ppm, MAXFREQ).
+DRIFT_US = 500
 
 
 def _machine_us() -> tuple[int, int]:
@@ -30,18 +32,34 @@ class LinkClock(Clock, Protocol):
         """How far this clock goes, at most, in that time of the machine's."""
         ...
 
+    def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
+        """From now on UTC is true to `error_us`; with `ahead_us` it is so far ahead of monotonic time, from now on."""
+        ...
+
 
 class SystemClock:
-    """Monotonic time and UTC of the machine, in us. UTC is read once and carried on: a clock step moves nothing."""
+    """Monotonic time and UTC of the machine, in us. UTC is read once and carried on: a clock step moves nothing.
 
-    def __init__(self, utc_error_us: int = UTC_ERROR_US) -> None:
+    How far it may be off is not known until somebody says so (`utc.UtcWatch`), and grows from then on.
+    """
+
+    def __init__(self, utc_error_us: int = UTC_UNKNOWN_US) -> None:
         self._utc_error_us = utc_error_us
-        self._ahead_us = time.time_ns() // 1_000 - time.monotonic_ns() // 1_000
+        self._bounded_us = time.monotonic_ns() // 1_000
+        self._ahead_us = time.time_ns() // 1_000 - self._bounded_us
 
     def now(self) -> Now:
         """The present moment."""
         monotonic_us = time.monotonic_ns() // 1_000
-        return Now(monotonic_us, monotonic_us + self._ahead_us, self._utc_error_us)
+        grown_us = (monotonic_us - self._bounded_us) * DRIFT_US // 1_000_000
+        error_us = min(self._utc_error_us + grown_us, UTC_UNKNOWN_US)
+        return Now(monotonic_us, monotonic_us + self._ahead_us, error_us)
+
+    def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
+        """See `LinkClock`."""
+        self._utc_error_us, self._bounded_us = error_us, time.monotonic_ns() // 1_000
+        if ahead_us is not None:
+            self._ahead_us = ahead_us
 
     def heard(self, boot_us: int) -> None:
         """The vehicle's own time does not matter here."""
@@ -118,6 +136,12 @@ class PacedClock:
             run_us = min(int(silent_ns * self._speed) // 1_000, self.LEAD_US) + free_us
         self._last_us = max(self._last_us, self._base_us + run_us)
         return Now(self._last_us, self._last_us + self._ahead_us, self._utc_error_us)
+
+    def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
+        """See `LinkClock`; a simulated time of day grows no worse."""
+        self._utc_error_us = error_us
+        if ahead_us is not None:
+            self._ahead_us = ahead_us
 
     def heard(self, boot_us: int) -> None:
         """Follow the vehicle's time. One that goes backwards (a new start) is set aside."""

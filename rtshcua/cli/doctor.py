@@ -18,6 +18,7 @@ from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.utc import kernel_error_us
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
@@ -99,7 +100,7 @@ def doctor(
             )
         findings = list(
             diagnose(
-                vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=clock.now().utc_error_us,
+                vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
                 unheard=signing.unheard, named=system is not None,
             )
         )  # fmt: skip

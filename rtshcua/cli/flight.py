@@ -3,7 +3,7 @@
 import secrets
 import shlex
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from rtshcua.adapters.files.logs import disclosure_of
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
+from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.closing import close_log, keep_summary
@@ -22,6 +23,7 @@ from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
 from rtshcua.cli.live.telling import Teller, plan_of
 from rtshcua.cli.live.watching import Watching
 from rtshcua.cli.past import LOG_BEFORE, Past
+from rtshcua.cli.refused import Refused
 from rtshcua.cli.simulation import SIMULATED
 from rtshcua.cli.tape import Tape
 from rtshcua.cli.witnessed import Witnessing
@@ -70,7 +72,8 @@ _KNOWING = (
 
 class Flight:
     """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off.
-    `simulated`: what the log says of a flight that was.
+    `simulated`: what the log says of a flight that was. `trusted` raises `Refused` where the bundle is not to be
+    trusted by the time that the clock has now.
 
     Once it is made, the first record is on the disk. Raises OSError where the disk does not take it.
     """
@@ -79,7 +82,8 @@ class Flight:
         self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts,
         tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
-        events: Sequence[Event], past: Past, witnesses: Witnessing, agents: Agents | None = None,
+        events: Sequence[Event], past: Past, witnesses: Witnessing, utc: UtcWatch,
+        trusted: Callable[[], None], agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
@@ -114,6 +118,8 @@ class Flight:
             self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
         if past.note:
             self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
+        self._utc, self._trusted = utc, trusted
+        self._sink.append(self._recorder.effect(now, CLOCK, detail=utc.bound.told()), WRITTEN)
         self._sink.settle()
         witnesses.begin(log.path, lambda: self._sink.synced)
         self._incidents = incidents
@@ -185,10 +191,29 @@ class Flight:
                 also += self._agents.events(self._clock.now())
             also += self._witnesses.events(self._clock.now().monotonic_us)
             also += self._steps.events(self._clock.now())
+            if self._utc.waits:
+                also += self._look_at_utc()
             ending = loop.turn(also)
             if ending is not None:
                 return ending
             also = []
+
+    def _look_at_utc(self) -> list[Event]:
+        """The vehicle may tell the time of day after the log began: from then on it is known. By it something may have
+        expired that this machine's clock took for good; then nothing flies.
+        """
+        now, flavour = self._clock.now(), self._vehicle.driver.flavour
+        if flavour is None or not self._utc.look(self._vehicle.driver.source, flavour.name, now.monotonic_us):
+            return []
+        self._vehicle.driver.asks_utc = False
+        now = self._clock.now()
+        self._sink.append(self._recorder.effect(now, CLOCK, detail=self._utc.bound.told()), WRITTEN)
+        try:
+            self._trusted()
+        except Refused as refused:
+            self._feed.post(Note(f"by the vehicle's time: {refused}"))
+            return [Interrupted(now.monotonic_us)]
+        return []
 
     def _what_follows(self) -> str:
         """What comes of the first request to stop."""

@@ -16,6 +16,7 @@ from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.adapters.utc import UtcWatch
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
@@ -28,7 +29,7 @@ from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
-from rtshcua.cli.meeting import meet, unopened
+from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, mark_opened
 from rtshcua.cli.past import Past
 from rtshcua.cli.refused import Refused as Refused
@@ -66,6 +67,7 @@ class Launch:
     """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`.
 
     `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
+    `utc_error_us`: what the operator says that UTC is off by at most.
     """
 
     bundle: Path
@@ -89,12 +91,14 @@ class Launch:
     system: int | None = None
     witnesses: tuple[Address, ...] = ()
     incidents: "Incidents | None" = None
+    utc_error_us: int | None = None
 
 
 def launch(order: Launch) -> ExitCode:
     """Fly, and show how it ended. Raises `Refused`, and OSError for files that cannot be read or written."""
     bundle = _read(order.bundle)
     clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
+    utc = _utc(order, clock)
     try:
         root, signed_root, log_key = _trust(order, clock.now().utc_us)
         loaded = _load(order, bundle, root, clock)
@@ -119,7 +123,10 @@ def launch(order: Launch) -> ExitCode:
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = None if order.agent_socket is None else stack.enter_context(Agents(order.agent_socket, loaded))
+            vehicle.driver.asks_utc = utc.waits
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
+            events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
+            _hold_trust(bundle, signed_root, loaded, clock)
             if order.dry_run:
                 from rtshcua.cli.dry_run import dry_run  # shows what would pass as `why` does, which is of the ground
 
@@ -135,13 +142,15 @@ def launch(order: Launch) -> ExitCode:
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
-                past=past, witnesses=witnesses, agents=agents, incidents=order.incidents,
+                past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc,
+                trusted=lambda: _hold_trust(bundle, signed_root, loaded, clock),
                 simulated=simulation.told(order.speed, own=order.link is None),
             )  # fmt: skip
             del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
-            for note in (*signing.notes, *filter(None, [past.note])):
+            unsure = [UTC_NOTE] if utc.waits else []
+            for note in (*signing.notes, *filter(None, [past.note]), *unsure):
                 feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
@@ -196,6 +205,23 @@ def _trust(order: Launch, now_us: int) -> tuple[TrustRoot, bytes, SigningKey]:
         text = f"the trust root names no log key {key.kid.hex()}: nobody could verify the log"
         raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, "`--log-key` gives one that it names")
     return root, signed, key
+
+
+def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
+    """Who vouches for UTC; a simulation has that of the machine that it runs on."""
+    if order.link is not None and order.speed == 1:
+        return UtcWatch(clock, order.utc_error_us)
+    return UtcWatch.simulated(clock)
+
+
+def _hold_trust(bundle: bytes, signed_root: bytes, loaded: Loaded, clock: LinkClock) -> None:
+    """What was verified by this machine's time of day holds by the vehicle's, too. Raises `Refused`."""
+    now_us = clock.now().utc_us
+    try:
+        root = open_root(signed_root, pinned=cose.unverified(signed_root, limit=MAX_ROOT).kid, now_us=now_us)
+        open_bundle(bundle, root=root, vehicle=loaded.vehicle, now_us=now_us)
+    except Untrusted as error:
+        raise Refused(code_of(error.slug), *untrusted(error)) from None
 
 
 def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Loaded:

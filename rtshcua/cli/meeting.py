@@ -4,6 +4,7 @@ import time
 from typing import Final
 
 from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.utc import UtcWatch
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.interrupts import Interrupts
@@ -34,6 +35,13 @@ def unopened(link: Address, error: OSError) -> Refusal:
     verb = "listen at" if link.way in (Way.UDP_IN, Way.TCP_IN) else "open"
     return Refusal("port", f"cannot {verb} `{link}`: {(error.strerror or str(error)).lower()}", PORT_HELP[link.way])
 
+
+#: How long the vehicle's time is waited for where the operator stated how far ours is off, in seconds
+UTC_S = 3.0
+UTC_NOTE: Final = (
+    "nothing tells how far this machine's time of day is off: until the vehicle does, steps are deferred "
+    "(`--utc-error 500ms` states it)"
+)
 
 _POLL_S = 0.05
 _HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"
@@ -76,4 +84,21 @@ def meet(
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if vehicle.driver.link.crowd is not None:
         raise Refused(ExitCode.REFUSED, "two-vehicles", vehicle.driver.link.crowd, "one vehicle to a port is safest")
+    return events
+
+
+def await_utc(utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool) -> list[Event]:
+    """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. `patient`: it is
+    waited for, and then what the operator stated holds; else the flight waits for it itself.
+    """
+    events: list[Event] = []
+    until_s = time.monotonic() + (UTC_S if patient else 0)
+    while utc.waits:
+        flavour = vehicle.driver.flavour
+        taken = flavour is not None and utc.look(vehicle.driver.source, flavour.name, clock.now().monotonic_us)
+        if taken or time.monotonic() >= until_s:
+            break
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    utc.settle()
+    vehicle.driver.asks_utc = utc.waits
     return events

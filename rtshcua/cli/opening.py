@@ -65,10 +65,11 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -
     """Open the bundle, which works once: after the first record is on the disk, so that a disk that is full uses up no
     bundle, and before anything is sent. Another run may have been faster; then this one does not fly.
     """
-    policy = loaded.bundle.policy
+    policy, now = loaded.bundle.policy, clock.now()
+    earliest_us = now.utc_us - now.utc_error_us  # nothing is forgotten that may not have expired yet
     try:
         opening = FileReplayStore(state, loaded.vehicle).open_once(
-            loaded.bundle.mission_digest, loaded.expires_us, clock.now().utc_us, policy.name, policy.version
+            loaded.bundle.mission_digest, loaded.expires_us, earliest_us, policy.name, policy.version
         )
     except OSError:
         flight.refuse()

@@ -12,6 +12,7 @@ from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.last_log import known_end
 from rtshcua.adapters.files.recovery import InUse, Recovered, Signer, examine, recover
+from rtshcua.adapters.utc import UtcWatch
 from rtshcua.cli.faults import fail, of_each, tell
 from rtshcua.cli.outcome import is_log, logs_meant
 from rtshcua.cli.unlock import unlock
@@ -70,7 +71,9 @@ def signer_of(log_key: SigningKey) -> Signer:
     def certify(text: bytes) -> bytes:
         return log_key.sign(text, duty=Duty.LOG)
 
-    return Signer(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), SystemClock().now)
+    clock = SystemClock()
+    UtcWatch(clock)  # the kernel may vouch for it; nobody else is there
+    return Signer(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)
 
 
 def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -> ExitCode:

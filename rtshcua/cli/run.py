@@ -15,6 +15,7 @@ from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.cli import simulated, witnessed
+from rtshcua.cli.clock_error import duration_us, utc_error_text
 from rtshcua.cli.faults import fail, misaddressed, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.diagnostics.exits import ExitCode
@@ -67,6 +68,12 @@ def run(
     no_fence: Annotated[
         bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
     ] = False,
+    utc_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", callback=utc_error_text, help="how far UTC is off here, if neither kernel nor vehicle says"
+        ),
+    ] = None,
     agent_socket: Annotated[
         Path | None, typer.Option(metavar="PATH", help="a local socket: records go out, signed documents come in")
     ] = None,
@@ -97,8 +104,9 @@ def run(
         return fail(ExitCode.USAGE, "`--scenario` is for the simulated vehicle, and does not go with `--connect`")
     if scenario is not None and (battery is not None or wind or fault or rehearsal):
         return fail(ExitCode.USAGE, "`--scenario` says how the vehicle starts and what goes wrong", _SCENARIO_HELP)
-    if own and system is not None:
-        return fail(ExitCode.USAGE, "`--system` goes with `--connect`: the simulated vehicle is alone")
+    lonely = _LONELY[system is not None, utc_error is not None]
+    if own and lonely:
+        return fail(ExitCode.USAGE, lonely)
     if fresh_state and (state_dir is not None or not own):
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
@@ -143,6 +151,7 @@ def run(
             system=system,
             witnesses=witnesses,
             incidents=incidents,
+            utc_error_us=duration_us(utc_error),
         )
         try:
             return launch(order)
@@ -157,6 +166,10 @@ def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents"
 
 
 _SCENARIO_HELP = "with it go `--flavour` and `--seed`; `--battery`, `--wind`, `--fault` and `--dry-run` do not"
+_SYSTEM = "`--system` goes with `--connect`: the simulated vehicle is alone"
+_UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's time"
+#: what is wrong without `--connect`, by whether `--system` and `--utc-error` are given
+_LONELY = {(False, False): "", (True, False): _SYSTEM, (True, True): _SYSTEM, (False, True): _UTC}
 _VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
 

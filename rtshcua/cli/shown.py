@@ -2,6 +2,8 @@
 
 from datetime import UTC, datetime
 
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US
+
 _LAST_US = 253_402_300_799_999_999  # the end of the year 9999
 
 
@@ -10,6 +12,13 @@ def utc(us: int) -> str:
     if not 0 <= us <= _LAST_US:
         return f"{us} us"
     return datetime.fromtimestamp(us // 1_000_000, UTC).strftime("%Y-%m-%d %H:%M:%SZ")
+
+
+def true_to(error_us: int) -> str:
+    """How far a UTC time may be off, or that nobody knows."""
+    if error_us >= UTC_UNKNOWN_US:
+        return "and nothing tells how far that is off"
+    return f"true to {error_us / 1_000:g} ms" if error_us < 1_000_000 else f"true to {error_us / 1_000_000:g} s"
 
 
 def plain(text: str) -> str:

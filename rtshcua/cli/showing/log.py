@@ -9,7 +9,7 @@ import msgspec
 from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
-from rtshcua.cli.shown import many, utc
+from rtshcua.cli.shown import many, true_to, utc
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import parse, read_signature, split
 from rtshcua.evidence.reading import read
@@ -70,7 +70,7 @@ def _records(lines: Iterable[bytes]) -> Iterator[AnyRecord | Flaw]:
 
 def _head(page: Page, genesis: Genesis) -> None:
     page.head(f"Log of mission {genesis.mission} on {genesis.vehicle}")
-    page.row("begun", f"{utc(genesis.utc_us)}, true to {genesis.utc_error_us / 1_000_000:g} s")
+    page.row("begun", f"{utc(genesis.utc_us)}, {true_to(genesis.utc_error_us)}")
     page.row("mode", genesis.mode)
     page.row("log key", genesis.log_kid)
     page.row("boot", genesis.boot)

@@ -9,7 +9,7 @@ from rtshcua.cli.showing import words
 from rtshcua.cli.showing.bundle import claimed
 from rtshcua.cli.showing.log import Names, detail_of
 from rtshcua.cli.showing.page import Page
-from rtshcua.cli.shown import utc
+from rtshcua.cli.shown import true_to, utc
 from rtshcua.cli.simulation import SIMULATED
 from rtshcua.evidence.durability import SYNCED
 from rtshcua.evidence.durability import WORDS as DURABILITIES
@@ -83,7 +83,7 @@ def show_record(page: Page, told: Told, report: Report) -> dict[str, object]:
     page.head(f"Record {record.seq}: {told.what.strip(' ·')}")
     page.row("type", record.type)
     ago = f"{(record.at_us - genesis.at_us) / 1_000_000:.3f} s after the log began"
-    page.row("when", f"{utc(record.utc_us)}, true to {record.utc_error_us / 1_000:g} ms; {ago}")
+    page.row("when", f"{utc(record.utc_us)}, {true_to(record.utc_error_us)}; {ago}")
     if told.simulated:
         page.row("times", f"those of {told.simulated}")
     if isinstance(record, Decision):

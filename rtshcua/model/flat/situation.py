@@ -16,8 +16,15 @@ class State(Flat, frozen=True):
     monitors: tuple[int, ...] = ()
 
 
+#: the bound on the error of a UTC that nothing vouches for, in us: whatever is asked of the time of day is unknown then
+UTC_UNKNOWN_US = 1 << 52
+
+
 class Now(Flat, frozen=True):
-    """The moment of a decision, in us: monotonic, and UTC since the epoch with a bound on its error."""
+    """The moment of a decision, in us: monotonic, and UTC since the epoch with a bound on its error.
+
+    Where nobody knows how far UTC is off, the bound is `UTC_UNKNOWN_US`: 142 years, so that no window is inside it.
+    """
 
     monotonic_us: int
     utc_us: int

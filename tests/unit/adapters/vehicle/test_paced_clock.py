@@ -101,5 +101,5 @@ def test_the_systems_clock_does_not_listen() -> None:
     after = clock.now()
     assert before.monotonic_us <= after.monotonic_us < before.monotonic_us + 10_000_000
     assert after.utc_us - before.utc_us == after.monotonic_us - before.monotonic_us
-    assert after.utc_error_us == 5
+    assert 5 <= after.utc_error_us < 5 + 10 * 500, "it grows"
     assert (clock.real_seconds(1_500_000), clock.us_in(1.5)) == (1.5, 1_500_000)

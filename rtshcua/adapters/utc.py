@@ -1,0 +1,130 @@
+"""How far UTC may be off, and who says so.
+
+In this order: the kernel, if it is synchronised (NTP, PTP); the vehicle's SYSTEM_TIME, which it has from its satellite
+receiver; a bound that the operator states. Else it is not known, and whatever asks for the time of day is unknown:
+freshness, approvals, the hours of zones. What is assumed of a clock that nobody keeps right decides nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US
+
+#: the effect that says in the log where the bound came from
+CLOCK: Final = "clock"
+#: With GPS, in us. PX4 sets its clock when it is off by more than 5 s, for that stops all else for a moment
+#: (`SET_CLOCK_DRIFT_TIME_S`, src/drivers/gps/gps.cpp). ArduPilot sets its own by the receiver while it is disarmed, and
+#: leaves it alone while it is armed (AP_RTC.cpp, `set_utc_usec`): some ms at arming, and a crystal's drift since.
+VEHICLE_US: Final = {"px4": 6_000_000, "ardupilot": 1_000_000}
+#: SYSTEM_TIME says when it was made in whole ms
+_STAMP_US: Final = 1_000
+
+
+class TellsUtc(Protocol):
+    """What the vehicle said of the time; see `SourceTime`."""
+
+    def utc(self, now_us: int) -> tuple[int, int] | None:
+        """UTC less our monotonic time, and how far the link leaves it open, both in us; None while it is not told."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class UtcBound:
+    """Where the bound comes from (`kernel`, `vehicle`, `operator`, `simulated`, `unknown`), and what it was, in us."""
+
+    source: str
+    error_us: int
+
+    def told(self) -> str:
+        """As the log has it."""
+        if self.source == "unknown":
+            return "unknown: nothing tells how far UTC may be off"
+        return f"{self.source}: UTC is true to {self.error_us} us"
+
+
+def kernel_error_us() -> int | None:
+    """What the kernel says UTC is off by at most, in us; None where it is not synchronised, or does not say.
+
+    `adjtimex(2)` with no mode set changes nothing: STA_UNSYNC in `status`, the state TIME_ERROR, and `maxerror`.
+    """
+    try:
+        import ctypes  # noqa: PLC0415  only where it is asked, which no other command does
+
+        class Timex(ctypes.Structure):
+            """`struct timex`, up to `status`, and room for the rest."""
+
+            _fields_ = (
+                ("modes", ctypes.c_uint),
+                ("offset", ctypes.c_long),
+                ("freq", ctypes.c_long),
+                ("maxerror", ctypes.c_long),
+                ("esterror", ctypes.c_long),
+                ("status", ctypes.c_int),
+                ("rest", ctypes.c_byte * 512),
+            )
+
+        timex = Timex()
+        state = ctypes.CDLL(None).adjtimex(ctypes.byref(timex))
+    except (ImportError, OSError, AttributeError):  # another system than Linux
+        return None
+    return synchronised_us(state, timex.status, timex.maxerror)
+
+
+_STA_UNSYNC: Final = 0x40
+_TIME_ERROR: Final = 5
+
+
+def synchronised_us(state: int, status: int, maxerror: int) -> int | None:
+    """The bound of an answer of `adjtimex`; None where the clock is not synchronised."""
+    wrong = state < 0 or state == _TIME_ERROR or status & _STA_UNSYNC
+    return None if wrong or maxerror < 0 else maxerror
+
+
+class UtcWatch:
+    """Bounds a clock's UTC by the best that is known, once; `bound` is what it has come to so far.
+
+    `stated_us` is what the operator says, None for nothing. While only that is known, or nothing, `look` takes the
+    vehicle's own time where it comes; until `settle` says that no more is waited for.
+    """
+
+    def __init__(
+        self, clock: LinkClock, stated_us: int | None = None, kernel_us: Callable[[], int | None] | None = None
+    ) -> None:
+        self._clock = clock
+        self._stated_us = stated_us
+        kernel = (kernel_us or kernel_error_us)()
+        self.bound = UtcBound("unknown", UTC_UNKNOWN_US)
+        if kernel is not None:
+            self._take("kernel", kernel)
+
+    @classmethod
+    def simulated(cls, clock: LinkClock) -> "UtcWatch":
+        """Of a vehicle that this machine simulates: it has this machine's time of day."""
+        watch = cls(clock, kernel_us=lambda: None)
+        watch._take("simulated", UTC_ERROR_US)
+        return watch
+
+    @property
+    def waits(self) -> bool:
+        """Whether the vehicle's time would still be taken."""
+        return self.bound.source == "unknown"
+
+    def look(self, told: TellsUtc, flavour: str, now_us: int) -> bool:
+        """Take the vehicle's own time, if it is needed and told. Whether it was taken."""
+        utc = told.utc(now_us) if self.waits else None
+        if utc is None:
+            return False
+        ahead_us, open_us = utc
+        self._take("vehicle", VEHICLE_US[flavour] + open_us + _STAMP_US, ahead_us)
+        return True
+
+    def settle(self) -> None:
+        """The vehicle's time was waited for long enough: what the operator states holds, if it was stated."""
+        if self.waits and self._stated_us is not None:
+            self._take("operator", self._stated_us)
+
+    def _take(self, source: str, error_us: int, ahead_us: int | None = None) -> None:
+        self._clock.bound_utc(error_us, ahead_us)
+        self.bound = UtcBound(source, error_us)

@@ -1,0 +1,60 @@
+"""Where the kernel does not vouch for this machine's clock, the vehicle's time of day decides; or nothing does."""
+
+import json
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters import utc
+from rtshcua.cli import meeting
+from rtshcua.cli.app import main
+from rtshcua.diagnostics.exits import ExitCode
+
+
+def rehearsed(ground: Any, capfd: Any, port: int, *words: str) -> dict[str, Any]:
+    """What a rehearsal on a vehicle that lives as fast as we do says of the first step."""
+    code = main(
+        [
+            "run", ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--dry-run",
+            "--json", *words,
+        ]
+    )  # fmt: skip
+    out, err = capfd.readouterr()
+    assert code in (ExitCode.OK, ExitCode.REFUSED), err
+    step: dict[str, Any] = json.loads(out)["steps"][0]
+    return step
+
+
+@pytest.fixture(autouse=True)
+def unsynchronised(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ground.folder)
+    monkeypatch.setattr(utc, "kernel_error_us", lambda: None)
+
+
+def test_the_vehicles_time_bounds_ours(ground: Any, capfd: Any, port: int) -> None:
+    """ArduCopter tells it when it is asked."""
+    ground.vehicle(port, 1, "--flavour", "ardupilot")
+    step = rehearsed(ground, capfd, port)
+    assert step["outcome"] == "allow", step
+
+
+def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
+    ground: Any, capfd: Any, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(meeting, "UTC_S", 0.5)
+    ground.vehicle(port, 1, "--flavour", "ardupilot", "--fault", "mute,at=0s,message=SYSTEM_TIME")
+    step = rehearsed(ground, capfd, port)
+    assert (step["outcome"], step["reason"]) == ("defer", "freshness/clock-uncertain"), step
+    assert rehearsed(ground, capfd, port, "--utc-error", "200ms")["outcome"] == "allow"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--utc-error", "soon", "--connect", "udpin:127.0.0.1:1", "--vehicle", "quad-07"], "is no time"),
+        (["--utc-error", "1s"], "goes with `--connect`"),
+    ],
+)
+def test_what_no_operator_means(ground: Any, capfd: Any, words: list[str], said: str) -> None:
+    assert main(["run", ground.bundle(), *words]) == ExitCode.USAGE
+    assert said in capfd.readouterr().err

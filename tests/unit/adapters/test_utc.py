@@ -1,0 +1,139 @@
+"""How far UTC may be off: who vouches for it, in which order, and what becomes of it where nobody does."""
+
+from collections.abc import Callable
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from reference import flat_case as flat
+from rtshcua.adapters.clock import DRIFT_US, PacedClock, SystemClock
+from rtshcua.adapters.utc import VEHICLE_US, UtcWatch, kernel_error_us, synchronised_us
+from rtshcua.adapters.vehicle.source_time import SourceTime
+from rtshcua.codec.frames import Received
+from rtshcua.decision.decide import decide
+from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
+from rtshcua.model.outcome import Outcome, Reason
+
+NOW_US = 1_800_000_000_000_000
+
+
+class Vehicle:
+    """Tells that UTC is so far ahead of our monotonic time, or nothing."""
+
+    def __init__(self, ahead_us: int | None = None) -> None:
+        self._ahead_us = ahead_us
+
+    def utc(self, now_us: int) -> tuple[int, int] | None:
+        return None if self._ahead_us is None else (self._ahead_us, 2_000)
+
+
+def says(us: int | None) -> Callable[[], int | None]:
+    return lambda: us
+
+
+@pytest.mark.parametrize(
+    ("state", "status", "maxerror", "us"),
+    [
+        (0, 0x2001, 1_500, 1_500),
+        (0, 0x41, 1_500, None),  # STA_UNSYNC
+        (5, 0x01, 1_500, None),  # TIME_ERROR
+        (-1, 0, 0, None),  # the call failed
+        (0, 0, -3, None),
+    ],
+)
+def test_the_kernel_vouches_for_its_clock_only_while_it_is_synchronised(
+    state: int, status: int, maxerror: int, us: int | None
+) -> None:
+    assert synchronised_us(state, status, maxerror) == us
+
+
+def test_this_machines_kernel_is_asked_and_answers_or_does_not() -> None:
+    us = kernel_error_us()
+    assert us is None or us >= 0
+
+
+@pytest.mark.parametrize(
+    ("kernel_us", "ahead_us", "stated_us", "source", "error_us"),
+    [
+        (3_000, 5, 9, "kernel", 3_000),
+        (None, 5, 9, "vehicle", VEHICLE_US["px4"] + 3_000),
+        (None, None, 500_000, "operator", 500_000),
+        (None, None, None, "unknown", UTC_UNKNOWN_US),
+    ],
+)
+def test_the_first_that_tells_is_believed(
+    kernel_us: int | None, ahead_us: int | None, stated_us: int | None, source: str, error_us: int
+) -> None:
+    clock = SystemClock()
+    watch = UtcWatch(clock, stated_us, says(kernel_us))
+    taken = watch.look(Vehicle(ahead_us), "px4", clock.now().monotonic_us)
+    watch.settle()
+    assert (watch.bound.source, watch.bound.error_us) == (source, error_us)
+    assert taken == (source == "vehicle")
+    assert watch.waits == (source == "unknown")
+    assert error_us <= clock.now().utc_error_us <= error_us + 60 * DRIFT_US
+    assert source in watch.bound.told()
+    if source == "vehicle":
+        now = clock.now()
+        assert now.utc_us - now.monotonic_us == ahead_us, "its time of day replaces ours"
+
+
+def test_the_vehicle_may_tell_late_and_once_it_did_nothing_moves_any_more() -> None:
+    clock = SystemClock()
+    watch = UtcWatch(clock, None, says(None))
+    watch.settle()
+    assert watch.waits
+    assert watch.look(Vehicle(7), "ardupilot", 0)
+    assert not watch.look(Vehicle(8), "ardupilot", 0)
+    now = clock.now()
+    assert now.utc_us - now.monotonic_us == 7
+
+
+def test_a_simulation_has_the_time_of_its_machine() -> None:
+    clock = PacedClock(10)
+    watch = UtcWatch.simulated(clock)
+    assert (watch.bound.source, clock.now().utc_error_us, watch.waits) == ("simulated", 100_000, False)
+
+
+def test_a_clock_that_nobody_keeps_right_grows_worse() -> None:
+    clock = SystemClock(1_000)
+    clock._bounded_us -= 3_600_000_000
+    assert clock.now().utc_error_us >= 1_000 + 3_600 * DRIFT_US
+    assert SystemClock().now().utc_error_us == UTC_UNKNOWN_US
+
+
+def test_the_vehicles_time_is_known_as_well_as_its_clock() -> None:
+    """It was up for 5 s at 100 s of ours; the answer took 4 ms; SYSTEM_TIME says when that was."""
+    source = SourceTime()
+    ts1_ns = source.clock.due(99_998_000)
+    assert ts1_ns is not None
+    for message, at_us in (
+        (mavlink.MAVLink_timesync_message(5_000_000_000, ts1_ns), 100_002_000),
+        (mavlink.MAVLink_system_time_message(0, 5_010), 100_012_000),  # before its receiver told it
+    ):
+        source.of(Received(message, message.get_type(), 1, 1, 0, False, b""), at_us)
+    assert source.utc(100_012_000) is None
+    message = mavlink.MAVLink_system_time_message(NOW_US, 5_020)
+    source.of(Received(message, message.get_type(), 1, 1, 2, False, b""), 100_022_000)
+    told = source.utc(100_022_000)
+    assert told is not None
+    ahead_us, open_us = told
+    assert open_us <= 4_000
+    assert abs(100_020_000 + ahead_us - NOW_US) <= open_us
+
+
+def test_where_utc_is_unknown_so_is_whatever_asks_for_it() -> None:
+    """Freshness and the hours of a permit: the step waits, and is not permitted."""
+    policy = prepare(flat.POLICY)
+    assert not isinstance(policy, Refusal)
+    invocations = prepare_mission(flat.MISSION, policy)
+    assert not isinstance(invocations, Refusal)
+    step = invocations[0]
+    context = flat.context(step.invocation)
+    known = decide(step, flat.state({}), policy, context, flat.NOW)
+    assert known.outcome == Outcome.ALLOW
+    unknown = Now(flat.NOW.monotonic_us, flat.NOW.utc_us, UTC_UNKNOWN_US)
+    decision = decide(step, flat.state({}), policy, context, unknown)
+    assert (decision.outcome, decision.reason) == (Outcome.DEFER, Reason.CLOCK_UNCERTAIN)

@@ -41,6 +41,8 @@ def check_sources(
         print(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
         for mission in found.missions:
             print(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
+        for left_out in found.left_out:
+            print(left_out.told())
         for each in found.versions:
             print(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
         if since is not None and not found.versions:
@@ -49,6 +51,7 @@ def check_sources(
         code,
         missions=[{"mission": each.name, "file": each.file} | each.bounds._asdict() for each in found.missions],
         versions=[{"policy": each.name, "version": each.version, "earlier": each.earlier} for each in found.versions],
+        left_out=[each._asdict() for each in found.left_out],
     )
 
 

@@ -10,6 +10,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.bounds import Bounds
 from rtshcua.ground.versions.raised import Compared, compare
+from rtshcua.model.flat.policy import Policy
 
 
 class Mission(NamedTuple):
@@ -20,13 +21,34 @@ class Mission(NamedTuple):
     bounds: Bounds
 
 
+class LeftOut(NamedTuple):
+    """What does not count of a policy for a vehicle: how many clauses and rules; and the signals that it lacks."""
+
+    policy: str
+    vehicle: str
+    without: tuple[str, ...]
+    clauses: int
+    rules: int
+
+    def told(self) -> str:
+        """In words."""
+        counts = [
+            f"{count} {what}{'s' * (count != 1)}"
+            for count, what in ((self.clauses, "clause"), (self.rules, "rule"))
+            if count
+        ]
+        without = ", ".join(self.without)
+        return f"{self.policy} on {self.vehicle}: {' and '.join(counts)} `where fitted` left out, without {without}"
+
+
 class Found(NamedTuple):
-    """Everything that was found, each thing once; of what is free of errors its bounds and versions."""
+    """Everything that was found, each thing once; of what has no errors its bounds, its versions, what is left out."""
 
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
     missions: tuple[Mission, ...]
     versions: tuple[Compared, ...]
+    left_out: tuple[LeftOut, ...]
 
 
 def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
@@ -35,16 +57,24 @@ def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
     sources: dict[str, Source] = {}
     missions: dict[tuple[str, str], Mission] = {}
     versions: dict[Compared, None] = {}
+    left_out: dict[LeftOut, None] = {}
     for each in asked:
         program = each.reading.program
         checked = examine(each.reading)
         sources |= program.sources
         compared = compare(checked.policies, earlier.policies, earlier.name, program.sources)
         versions |= dict.fromkeys(compared)
+        left_out |= {_left_out(lowered.policy): None for lowered in checked.policies if lowered.policy.left_out}
         wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
         for diagnostic in wrong:  # a file that two programs share has its findings once
             found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
         files = {mission.name.text: unit.file for unit in program.units for mission in unit.missions}
         for name, bounds in checked.bounds.items():
             missions.setdefault((files[name], name), Mission(name, files[name], bounds))
-    return Found(tuple(found.values()), sources, tuple(missions.values()), tuple(versions))
+    return Found(tuple(found.values()), sources, tuple(missions.values()), tuple(versions), tuple(left_out))
+
+
+def _left_out(policy: Policy) -> LeftOut:
+    rules = sum(each.skill < 0 for each in policy.left_out)
+    vehicle = policy.vehicle
+    return LeftOut(policy.name, vehicle.name, vehicle.without, len(policy.left_out) - rules, rules)

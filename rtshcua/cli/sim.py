@@ -51,6 +51,9 @@ def sim(
     signing_key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="it obeys only what is signed with this key (keys link)")
     ] = None,
+    stock: Annotated[
+        bool, typer.Option("--stock", help="GPS, barometer and battery alone: no radio, range finder, wind or voltage")
+    ] = False,
     usb: Annotated[
         bool, typer.Option("--usb", help="with a key: it takes this link for USB, and obeys anyone")
     ] = False,
@@ -84,6 +87,7 @@ def sim(
             return fail(ExitCode.INPUT, str(error))
         words.append(f"--signing-key={signing_key}")
     words += ["--usb"] if usb else []
+    words += ["--stock"] if stock else []
     words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
     try:
         vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", "--system", str(system), *words])

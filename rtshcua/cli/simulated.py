@@ -73,7 +73,7 @@ def arguments(
 
 
 def of_policy(policy: Policy) -> list[str]:
-    """Options that make it the vehicle of a policy: its home, its endurance, its return, and no faster than it."""
+    """Options that make it the vehicle of a policy: its home, its endurance, its return, no faster, what it reads."""
     fits = fitting(policy)
     home = fits.home
     return [
@@ -81,4 +81,5 @@ def of_policy(policy: Policy) -> list[str]:
         f"--home={home.latitude / 1e7:.7f},{home.longitude / 1e7:.7f},{home.amsl_mm // 1_000}",
         f"--hover={fits.hover_us / 60_000_000:.3f}",
         f"--cruise={fits.cruise_mm_s / 1_000:.3f}",
+        *(sorted(f"--extra={extra}" for extra in fits.extras) or ["--stock"]),
     ]

@@ -110,6 +110,9 @@ NOT_FITTED = _code("E0413", "not-fitted", "a condition reads a signal of a senso
 NEEDED_SIGNAL = _code(
     "E0414", "needed-signal", "a vehicle is said to be without a signal that no flight can do without"
 )
+UNSELECTED = _code(
+    "E0415", "unselected", "a signal does not say which of several sensors it is read from, or says it twice"
+)
 
 # E05: zones and geometry
 BAD_POLYGON = _code("E0501", "bad-polygon", "the corners do not make a simple polygon with an area")

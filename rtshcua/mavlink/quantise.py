@@ -1,7 +1,7 @@
 """Telemetry becomes integers here, once, where frames arrive; no float goes further.
 
 Canonical units: length mm, speed mm/s, duration us, angle (latitude and longitude too) 1e-7 degree, ratio 1/10000,
-count 1.
+voltage mV, count 1.
 """
 
 from collections.abc import Container, Mapping
@@ -39,6 +39,7 @@ UNITS: Mapping[Dimension, Mapping[str, tuple[int, int]]] = MappingProxyType(
             # 180/pi to 15 digits: off by less than one part in 10^15, far below one canonical unit in a whole turn.
             "rad": (572_957_795_130_823, 1_000_000),
         },
+        Dimension.VOLTAGE: {"mV": (1, 1), "cV": (10, 1), "V": (1000, 1)},
         Dimension.RATIO: {"%": (100, 1), "d%": (10, 1), "c%": (1, 1)},
         Dimension.COUNT: {"": (1, 1)},
     }

@@ -10,6 +10,9 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
 from rtshcua.mavlink.signing import Verifier
 
 RADIO_STATUS: Final = 109
+#: who a SiK radio says that it is: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
+#: Firmware/radio/mavlink.c
+RADIO_SYSTEM, RADIO = 51, 68
 #: us; radios report each second
 SPAN_US: Final = 5_000_000
 

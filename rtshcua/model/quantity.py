@@ -17,6 +17,7 @@ class Dimension(Enum):
     DURATION = "duration"  # us
     ANGLE = "angle"  # 1e-7 degree
     RATIO = "ratio"  # 1/10000
+    VOLTAGE = "voltage"  # mV
     COUNT = "count"  # 1
 
 
@@ -52,6 +53,8 @@ UNITS: dict[str, Unit] = {
     "h": Unit(Dimension.DURATION, 3_600_000_000),
     "%": Unit(Dimension.RATIO, 100),
     "deg": Unit(Dimension.ANGLE, 10_000_000),
+    "mV": Unit(Dimension.VOLTAGE, 1),
+    "V": Unit(Dimension.VOLTAGE, 1_000),
 }
 
 #: The unit in which a person reads a canonical value of each dimension, largest that divides it first.
@@ -62,6 +65,7 @@ DISPLAY: dict[Dimension, tuple[str, ...]] = {
     Dimension.DURATION: ("min", "s", "ms", "us"),
     Dimension.ANGLE: ("deg",),
     Dimension.RATIO: ("%",),
+    Dimension.VOLTAGE: ("V", "mV"),
 }
 
 

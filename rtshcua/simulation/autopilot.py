@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import StrEnum
 from functools import partial
+from math import sin
 from random import Random
 from types import MappingProxyType
 
@@ -17,7 +18,7 @@ from rtshcua.model.faults import Mode
 from rtshcua.simulation.answers import Lanes
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.command import Command
-from rtshcua.simulation.config import Answers, Boot, Estimate, SimulationConfig
+from rtshcua.simulation.config import Answers, Boot, Estimate, Extra, SimulationConfig
 from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
@@ -35,6 +36,8 @@ from rtshcua.simulation.vehicle import Event, Vehicle
 
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
+_RIPPLE = 0.01
+"""m/s by which an estimate of the wind goes up and down."""
 LOW_TO_ARM = 0.08
 """The battery level at which it does not arm any more."""
 OFF_US = 1_500_000
@@ -167,10 +170,13 @@ class Autopilot:
         """How long it goes on saying nothing, for it starts again."""
         self.taker: Taker | None = None
         """Who first took the vehicle over in flight, if somebody did."""
+        self.extras = config.extras
         self.link_quality = 10_000
         """What the radio tells of the link, in 1/10000."""
         self.outbox: list[Message] = []
         self.air = Air(config.wind, Random(f"{config.seed} wind"))
+        self.looked_down = False
+        """Whether the last DISTANCE_SENSOR was of the range finder that looks down, of two."""
         self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
         self._fast = config.boot is Boot.FAST
         pace = flavour.boot.all_s / FAST_S if self._fast else 1.0
@@ -205,6 +211,7 @@ class Autopilot:
         """What begins anew with each start. What outlives one is in `__init__`: all that is stored, and the world."""
         flavour = self.flavour
         self.ground_station_seen = False
+        self._wind: tuple[float, float] | None = None
         self.last_target_us: int | None = None
         self._boot_texts = deque(() if self._fast else flavour.boot.texts)
         self.failsafes = Failsafes(
@@ -379,6 +386,18 @@ class Autopilot:
         """Where the vehicle believes to be, noise apart."""
         body, (north, east) = self.vehicle.body, self.sensors.error
         return Point(body.north + north, body.east + east, body.up)
+
+    @property
+    def wind(self) -> tuple[float, float] | None:
+        """The last estimate of the wind, to the north and to the east in m/s; None where there is none yet.
+
+        It is made of what the air does to the body that flies: there is none before a flight, and after one the last
+        stays (section 5 of vehicles.md). An estimate is never twice the same.
+        """
+        if Extra.WIND in self.extras and self.vehicle.in_air and self.sensors.locates:
+            ripple = _RIPPLE * sin(self.now_us / 1_000_000)
+            self._wind = self.air.north + ripple, self.air.east + ripple
+        return self._wind
 
     def _time(self) -> int:
         return self.now_us

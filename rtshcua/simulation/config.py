@@ -46,6 +46,26 @@ class Estimate(StrEnum):
     """As with a satellite receiver: a metre off, slowly straying, and late."""
 
 
+class Extra(StrEnum):
+    """What may be fitted beside GPS, barometer and battery, and what the vehicle then tells."""
+
+    RADIO = "radio"
+    """A SiK radio in the link: RADIO_STATUS, as system 51 and component 68."""
+    RANGE = "range"
+    """Range finders ahead and all around: DISTANCE_SENSOR with orientation 0, OBSTACLE_DISTANCE."""
+    ALTIMETER = "altimeter"
+    """A range finder that looks down, as PX4's own simulation has: DISTANCE_SENSOR with orientation 25."""
+    WIND = "wind"
+    """It is tuned to estimate the wind by its drag, which it does in the air."""
+    VOLTAGE = "voltage"
+    """The battery's voltage is measured."""
+
+
+STOCK: frozenset[Extra] = frozenset()
+"""A stock vehicle: GPS, barometer and battery alone."""
+EQUIPPED = frozenset({Extra.RADIO, Extra.RANGE, Extra.WIND, Extra.VOLTAGE})
+
+
 @dataclass(frozen=True, slots=True)
 class SimulationConfig:
     """All that can be chosen; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
@@ -71,6 +91,8 @@ class SimulationConfig:
     boot: Boot = Boot.FAST
     parameters: tuple[tuple[str, float], ...] = ()
     """What its owner has set: names of parameters that the flavour has, and their values."""
+    extras: frozenset[Extra] = EQUIPPED
+    """What is fitted beside GPS, barometer and battery."""
     faults: tuple[Fault, ...] = ()
     signing_key: bytes | None = None
     """The key of the link from the start; else SETUP_SIGNING may bring one."""

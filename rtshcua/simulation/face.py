@@ -10,28 +10,30 @@ from collections.abc import Callable, Mapping
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec, Message, Received
+from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message
 from rtshcua.simulation.commands import UNSUPPORTED
+from rtshcua.simulation.config import Extra
 from rtshcua.simulation.telemetry import radio_status
 from rtshcua.simulation.transfer import Peer, Transfer
 
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 FENCE_PREFIXES = ("FENCE_", "GF_")
 """How the names of the parameters begin that make the fence another one."""
-RADIO = mavlink.MAV_COMP_ID_TELEMETRY_RADIO
 _RADIO_INTERVAL_US = 1_000_000
+_NEVER = 1 << 62
 
 
 class Face:
-    """Answers for an autopilot as (system, 1), and for its radio as (system, 68)."""
+    """Answers for an autopilot as (system, 1), and for its radio, if there is one, as (51, 68)."""
 
     def __init__(self, autopilot: Autopilot, system: int) -> None:
         self._autopilot = autopilot
         self._system = system
         self._codec = Codec(system, COMPONENT)
-        self._radio = Codec(system, RADIO)
-        self.radio_due_us = 0
+        self._radio = Codec(RADIO_SYSTEM, RADIO)
+        self.radio_due_us = 0 if Extra.RADIO in autopilot.extras else _NEVER
         """When the radio sends next, by the world's time: it runs on while the autopilot's loop halts."""
 
     @property

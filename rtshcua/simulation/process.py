@@ -21,7 +21,7 @@ from pathlib import Path
 
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.simulation.autopilot import TICK_US
-from rtshcua.simulation.config import HOME, Answers, Boot, Estimate, Kind, SimulationConfig
+from rtshcua.simulation.config import EQUIPPED, HOME, STOCK, Answers, Boot, Estimate, Extra, Kind, SimulationConfig
 from rtshcua.simulation.faults import parse_fault
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
@@ -52,6 +52,8 @@ def parser() -> argparse.ArgumentParser:
     add("--estimate", choices=list(Estimate), default=Estimate.CLOSE, help="how near it is to what is: cm, or as real")
     add("--answers", choices=list(Answers), default=Answers.RECORDED, help="how long each takes: none, or as recorded")
     add("--boot", choices=list(Boot), default=Boot.FAST, help="how sensors come up: in a second, or as recorded")
+    add("--stock", action="store_true", help="GPS, barometer and battery alone: nothing else is fitted")
+    add("--extra", choices=list(Extra), action="append", help="what is fitted instead of the usual; may be repeated")
     add("--signing-key", type=_key, metavar="FILE", help="the link's key: 32 octets, or as many in hexadecimal")
     add("--usb", action="store_true", help="the vehicle takes the link for USB: it obeys without signatures")
     add("--fault", type=_fault, action="append", default=[], metavar="KIND,at=TIME,...", help="may be repeated")
@@ -79,6 +81,7 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         estimate=Estimate(options.estimate),
         answers=Answers(options.answers),
         boot=Boot(options.boot),
+        extras=STOCK if options.stock else EQUIPPED if options.extra is None else frozenset(map(Extra, options.extra)),
         faults=tuple(options.fault),
         signing_key=options.signing_key,
         usb=options.usb,

@@ -4,7 +4,7 @@ The wind is a mean that faults may step, and gusts about it, drawn from a seeded
 """
 
 from dataclasses import dataclass
-from math import asin, atan2, cos, degrees, exp, hypot, pi, radians, sin, sqrt
+from math import asin, atan2, cos, exp, hypot, pi, radians, sin, sqrt
 from random import Random
 
 from rtshcua.simulation.kinematics import Body
@@ -49,16 +49,6 @@ class Air:
 
     def _sum(self) -> None:
         self.north, self.east = self._mean[0] + self._gust_north, self._mean[1] + self._gust_east
-
-    @property
-    def speed(self) -> float:
-        """m/s."""
-        return hypot(self.north, self.east)
-
-    @property
-    def from_degrees(self) -> float:
-        """Where it blows from, -180 to 180, as WIND.direction has it."""
-        return degrees(atan2(-self.east, -self.north))
 
 
 RANGE_MIN_M, RANGE_MAX_M = 0.2, 40.0

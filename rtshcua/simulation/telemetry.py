@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
+from rtshcua.simulation.config import Extra
 from rtshcua.simulation.failsafe import LOW_TO_LAND
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
 
@@ -38,6 +39,7 @@ _SENSORS = (
     | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     | mavlink.MAV_SYS_STATUS_PREARM_CHECK
 )
+_NO_VOLTAGE = 65_535
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
@@ -88,8 +90,12 @@ def sys_status(a: Autopilot) -> Message | None:
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     battery = a.battery
     return _SYS_STATUS(
-        present, enabled, healthy, 250, battery.millivolts, battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
+        present, enabled, healthy, 250, _millivolts(a), battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
     )
+
+
+def _millivolts(a: Autopilot) -> int:
+    return a.battery.millivolts if Extra.VOLTAGE in a.extras else _NO_VOLTAGE
 
 
 def gps_raw_int(a: Autopilot) -> Message:
@@ -163,7 +169,7 @@ def battery_status(a: Autopilot) -> Message:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_LOW
     else:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_OK
-    voltages = [battery.millivolts] + [65_535] * 9
+    voltages = [_millivolts(a)] + [_NO_VOLTAGE] * 9
     return _BATTERY_STATUS(
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
@@ -189,8 +195,24 @@ def home_position(a: Autopilot) -> Message | None:
     )
 
 
-def distance_sensor(a: Autopilot) -> Message:
-    """DISTANCE_SENSOR looking ahead; its greatest distance if nothing is there."""
+def distance_sensor(a: Autopilot) -> Message | None:
+    """DISTANCE_SENSOR of what looks ahead or down, of both in turn; its greatest distance if nothing is there."""
+    ahead, down = Extra.RANGE in a.extras, Extra.ALTIMETER in a.extras
+    a.looked_down = down and not (ahead and a.looked_down)
+    if a.looked_down:
+        return _looks_down(a)
+    return _looks_ahead(a) if ahead else None
+
+
+def _looks_down(a: Autopilot) -> Message:
+    """As recorded from PX4's simulation."""
+    return _DISTANCE_SENSOR(
+        a.boot_ms, 0, 10_000, round(a.vehicle.body.up * 100), mavlink.MAV_DISTANCE_SENSOR_LASER, 0,
+        mavlink.MAV_SENSOR_ROTATION_PITCH_270, 0,
+    )  # fmt: skip
+
+
+def _looks_ahead(a: Autopilot) -> Message:
     seen = a.surroundings.ahead(a.vehicle.body)
     return _DISTANCE_SENSOR(
         a.boot_ms,
@@ -198,14 +220,16 @@ def distance_sensor(a: Autopilot) -> Message:
         int(RANGE_MAX_M * 100),
         int((RANGE_MAX_M if seen is None else seen) * 100),
         mavlink.MAV_DISTANCE_SENSOR_LASER,
-        0,
+        1 if Extra.ALTIMETER in a.extras else 0,
         mavlink.MAV_SENSOR_ROTATION_NONE,
         255,
     )
 
 
-def obstacle_distance(a: Autopilot) -> Message:
+def obstacle_distance(a: Autopilot) -> Message | None:
     """OBSTACLE_DISTANCE all around, from ahead clockwise; a centimetre more than its greatest distance is nothing."""
+    if Extra.RANGE not in a.extras:
+        return None
     furthest = int(RANGE_MAX_M * 100)
     seen = a.surroundings.around(a.vehicle.body)
     return mavlink.MAVLink_obstacle_distance_message(
@@ -241,8 +265,8 @@ def autopilot_version(capabilities: int, version: int, numbered: int) -> Builder
 
 
 def system_time(a: Autopilot) -> Message:
-    """SYSTEM_TIME: the time of day, and since the start."""
-    return _SYSTEM_TIME(a.utc_us + a.now_us, a.boot_ms)
+    """SYSTEM_TIME: the time of day, once the receiver told it (0 before, as recorded), and since the start."""
+    return _SYSTEM_TIME(a.utc_us + a.now_us if a.sensors.receives else 0, a.boot_ms)
 
 
 AVAILABLE_MODES = 435

@@ -3,18 +3,34 @@
 from typing import Any
 
 from rtshcua.model.flat.policy import Policy
-from rtshcua.simulation.config import HOME, SimulationConfig
+from rtshcua.model.quantity import Dimension
+from rtshcua.simulation.config import HOME, Extra, SimulationConfig
 from rtshcua.simulation.place import Home
 
 _CRUISE_MM_S = 5_000
+_TOLD_IN = {
+    "RADIO_STATUS": Extra.RADIO, "DISTANCE_SENSOR": Extra.RANGE, "OBSTACLE_DISTANCE": Extra.RANGE,
+    "WIND": Extra.WIND, "WIND_COV": Extra.WIND,
+}  # fmt: skip
+
+
+def _extras(policy: Policy) -> frozenset[Extra]:
+    """What has to be fitted for the signals of a policy to come."""
+    voltage = (signal.dimension == Dimension.VOLTAGE.value for signal in policy.signals)
+    messages = {source.message for signal in policy.signals for source in signal.sources}
+    extras = {extra for message, extra in _TOLD_IN.items() if message in messages}
+    return frozenset(extras | {Extra.VOLTAGE} if any(voltage) else extras)
 
 
 def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
-    """A vehicle with a policy's home, its endurance, its return, and no faster than it; `chosen` is what else it is."""
+    """A vehicle with a policy's home, its endurance, its return, no faster than it, with the sensors that it reads;
+    `chosen` is what else it is.
+    """
     vehicle, projection = policy.vehicle, policy.projection
     fits: dict[str, Any] = {
         "home": Home(projection.latitude, projection.longitude, HOME.amsl_mm),
         "hover_us": vehicle.endurance_us,
+        "extras": _extras(policy),
         "cruise_mm_s": min(_CRUISE_MM_S, vehicle.speed or _CRUISE_MM_S),
     }
     if vehicle.return_altitude:

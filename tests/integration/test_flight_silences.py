@@ -18,7 +18,7 @@ from rtshcua.onboard.runtime.view import Stage
 from rtshcua.virtual.vehicle import TICK_US
 from virtual import case
 from virtual.flight import Flight, Flown
-from virtual.shipped import shipped, simulated
+from virtual.shipped import equipped, shipped, simulated
 
 FLAVOURS = ("px4", "ardupilot")
 SECONDS = (0.5, 1.0, 2.5, 3.5, 5.0, 8.0, 20.0, 45.0)
@@ -63,7 +63,7 @@ STAGES: dict[str, Callable[[Flight], bool]] = {
 def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
     """The standard mission; what falls back does so for the wind."""
     # heard this often, frames that come in another order are as many apart as they are on a real link
-    flight = Flight(shipped("standard"), simulated(flavour, seed=round(seconds * 10)), tick_us=TICK_US)
+    flight = Flight(equipped("standard"), simulated(flavour, seed=round(seconds * 10)), tick_us=TICK_US)
     since_us: list[int] = []
     blown: list[bool] = []
     under_way = WAITED if stage == "waiting" else UNDER_WAY

@@ -11,9 +11,7 @@ from pathlib import Path
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua import library
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.cli.sources import compile_sources
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
@@ -24,6 +22,9 @@ from rtshcua.model.flat.zone import SHIFT, Projection
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
 from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
+from rtshcua.wire import bundle as bundles
+from rtshcua.wire import cose, names
+from virtual.shipped import equipped
 
 TRACES = Path(__file__).resolve().parents[1] / "traces"
 SECOND = 1_000_000
@@ -42,9 +43,8 @@ START_US = 5_000_000
 @cache
 def shipped_policy() -> Policy:
     """The policy of the shipped missions, with all the signals that one of them needs."""
-    compiled, _ = compile_sources([library.root() / "missions" / "one_bridge.rts"], mission=None, issued_at_us=0)
-    assert compiled.policy is not None
-    return compiled.policy
+    policy, _ = (cose.unverified(envelope).payload for envelope in bundles.envelopes(equipped("one_bridge")))
+    return bundles.parse(names.POLICY, policy, Policy)
 
 
 def at_home(latitude: int, longitude: int) -> Policy:

@@ -16,7 +16,6 @@ nominal noon {
   under yard on quad by role operator through agent at "2026-06-01T10:00:00Z" phase flight
   given battery = 80 %, gps.fix = fix_3d, position = 47.39774 N, 8.54559 E, height = 10 m
   given velocity.north = 0 m/s, velocity.east = 0 m/s, velocity.down = 0 m/s
-  given obstacle.distance = 40 m
 }
 """
 TESTS = """import "policy.rts"

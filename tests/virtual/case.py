@@ -6,7 +6,7 @@ from math import cos, radians
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.contract import Contract, MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
@@ -58,7 +58,17 @@ def policy() -> Policy:
         flat.apply(flat.Op.AND, (flat.Op.ARGUMENT_IN, 0, flat.IN_BRIDGE), low),
     )
     rules[0] = replace(rules[0], when=scope)
-    return replace(flat.POLICY, signals=tuple(signals), rules=tuple(rules), projection=_projection())
+    contracts = tuple(map(_flyable, flat.CONTRACTS))
+    return replace(
+        flat.POLICY, signals=tuple(signals), contracts=contracts, rules=tuple(rules), projection=_projection()
+    )
+
+
+def _flyable(contract: Contract) -> Contract:
+    """The wind is known in the air only: a takeoff does not ask for it."""
+    if contract.name != "takeoff":
+        return contract
+    return replace(contract, assume=(), reads=(flat.BATTERY, flat.FIX))
 
 
 def step(number: int, phase: int, skill: int, plan: Plan, *arguments: int, **fields: object) -> Invocation:
@@ -89,7 +99,9 @@ def mission(steps: Sequence[Invocation] | None = None, issued_at_us: int = flat.
     return replace(
         flat.MISSION,
         issued_at_us=issued_at_us,
-        invocations=tuple(replace(each, issued_at_us=issued_at_us) for each in chosen),
+        invocations=tuple(
+            replace(each, issued_at_us=issued_at_us, contract=_flyable(each.contract)) for each in chosen
+        ),
     )
 
 

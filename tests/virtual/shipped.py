@@ -1,6 +1,8 @@
 """The missions that ship, compiled and sealed as `rtshcua compile` does it."""
 
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rtshcua import library
@@ -13,8 +15,21 @@ NAMES = ("short", "standard", "extended", "one_bridge")
 
 @cache
 def shipped(name: str, issued_at_us: int = case.flat.ISSUED) -> bytes:
-    """The bundle of `missions/<name>.rts`, issued at a UTC time."""
-    source = library.root() / "missions" / f"{name}.rts"
+    """The bundle of `missions/<name>.rts`, issued at a UTC time: for a stock copter."""
+    return _bundle(library.root() / "missions" / f"{name}.rts", issued_at_us)
+
+
+@cache
+def equipped(name: str) -> bytes:
+    """The same for the copter on which everything is fitted."""
+    text = (library.root() / "missions" / f"{name}.rts").read_text(encoding="utf-8")
+    with TemporaryDirectory() as folder:
+        source = Path(folder) / f"{name}.rts"
+        source.write_text(text.replace(" on quad ", " on surveyor "), encoding="utf-8")
+        return _bundle(source, case.flat.ISSUED)
+
+
+def _bundle(source: Path, issued_at_us: int) -> bytes:
     compiled, _ = compile_sources([source], mission=None, issued_at_us=issued_at_us)
     assert compiled.policy is not None, compiled.diagnostics
     assert compiled.mission is not None

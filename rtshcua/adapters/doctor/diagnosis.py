@@ -11,6 +11,7 @@ from rtshcua.adapters.doctor.settings import SETTINGS, Need, Setting
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
 from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.source_time import VehicleClock
+from rtshcua.adapters.vehicle.streams import IN_THE_AIR
 from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
@@ -47,13 +48,14 @@ class VehicleFinding(msgspec.Struct, frozen=True):
 
 
 def diagnose(
-    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, utc_error_us: int,
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, utc_error_us: int | None,
     unheard: frozenset[int] = frozenset(), named: bool = False,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
     """What was found. `flown` is the mission that the vehicle is to fly, None where only signals were asked about.
 
     `keyed`: a link key was given, and what is not signed with it was dropped. `unheard` are the slots of signals that
-    cannot come on this link, for nobody signs what carries them. `named`: the operator said which system is meant.
+    cannot come on this link, for nobody signs what carries them. `utc_error_us` is what the kernel says that
+    this machine's UTC is off by at most, None where it does not say. `named`: the operator said which system is meant.
 
     Before a heartbeat of an autopilot was heard there is nothing to say.
     """
@@ -305,9 +307,13 @@ def _signal(
         found = f"`{signal.name}` stays unknown: nobody signs {names}, and nothing unsigned is believed here"
         return VehicleFinding(slug, bad, found, names, "`--unsigned-radio`, here and for `run`")
     heard = next((name for name in sources if name in vehicle.streams), None)
+    unknown = any(vehicle.values.get(slot) is None for slot in slots)
+    if unknown and IN_THE_AIR.issuperset(sources) and not vehicle.seen.airborne:
+        found = f"`{signal.name}` is known in the air only, so nothing is known of it yet"
+        return VehicleFinding(slug, UNKNOWN, found, "a step that takes off does not ask for it")
     if heard is None:
         return VehicleFinding(slug, bad, f"`{signal.name}` stays unknown: no {names}", names, _ADVICE)
-    if any(vehicle.values.get(slot) is None for slot in slots):
+    if unknown:
         found = f"`{signal.name}` is unknown now: {heard} comes, and says so or is not vouched for"
         return VehicleFinding(slug, bad, found, "a value")
     interval_us, stale_ms = vehicle.streams[heard].interval_us, signal.stale_us // 1_000
@@ -328,8 +334,17 @@ def _place(vehicle: ExaminingDriver) -> VehicleFinding:
     return VehicleFinding("mission/place", OK, "home and return altitude are those of the policy")
 
 
-def _clock(vehicle: ExaminingDriver, utc_error_us: int) -> VehicleFinding:
+def _clock(vehicle: ExaminingDriver, utc_error_us: int | None) -> VehicleFinding:
     ahead_us = vehicle.ahead_us
+    if utc_error_us is None:
+        return _graded(
+            "mission/clock",
+            "this machine's clock is not synchronised, and the vehicle's own time counts (SYSTEM_TIME)"
+            if ahead_us is not None
+            else "nothing tells how far UTC is off: this machine is not synchronised, and the vehicle tells no time",
+            "the time of day, and how far it may be off", "synchronise this machine, or state it: `run --utc-error 1s`",
+            stops=ahead_us is None,
+        )  # fmt: skip
     if ahead_us is None:
         return VehicleFinding("mission/clock", UNKNOWN, "the vehicle does not tell the time (SYSTEM_TIME)")
     if abs(ahead_us) <= _CLOCK_US + utc_error_us:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from rtshcua.adapters.doctor.settings import SETTINGS
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.adapters.vehicle.link import Heard
+from rtshcua.adapters.vehicle.link import Heard, is_radio
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
@@ -92,7 +92,7 @@ class ExaminingDriver(Driver):
         heard = super().receive(datagram, now_us)
         self._meet(datagram, now_us)
         for frame in heard.frames:
-            if frame.system == self.system:
+            if frame.system == self.system or is_radio(frame):
                 self._examine(frame, now_us)
         self._note(heard.events)
         return heard
@@ -116,8 +116,12 @@ class ExaminingDriver(Driver):
         send: list[Any] = self.parameters.due(self.system, now_us)
         if self._asked_us is None or now_us - self._asked_us >= _ASK_US:
             self._asked_us = now_us
-            send += [messages.request(self.system, name) for name in _ONCE if name not in self.streams]
+            send += [messages.request(self.system, name) for name in _ONCE if not self._told(name)]
         return events, frames + self._pack(send, now_us, events)
+
+    def _told(self, name: str) -> bool:
+        """Whether it said what it was asked for; before its receiver has the time it says that it has none."""
+        return name in self.streams and (name != "SYSTEM_TIME" or self.ahead_us is not None)
 
     def latest(self, name: str) -> Any:
         """The last message of a name; None if there was none."""

@@ -6,13 +6,13 @@ from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages, observed, preflight
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stages
-from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink
+from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink, is_radio
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.preflight import Preflight
-from rtshcua.adapters.vehicle.source_time import SourceTime
-from rtshcua.adapters.vehicle.streams import AT_TIMES, PATIENCE_US, StreamPlan, StreamRequests, plan_streams
+from rtshcua.adapters.vehicle.source_time import EACH_US, SourceTime
+from rtshcua.adapters.vehicle.streams import AT_TIMES, IN_THE_AIR, PATIENCE_US, StreamPlan, StreamRequests, plan_streams
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
@@ -76,6 +76,9 @@ class Driver:
         self.system = 0
         #: that it is no multirotor, in words
         self.other_kind: str | None = None
+        #: the vehicle's own time of day is wanted: it is asked for until it is told
+        self.asks_utc = False
+        self._asked_utc_us = 0
         #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
         self.resumes = False
         self._commander = Commander(slack)
@@ -143,7 +146,7 @@ class Driver:
         for frame in received:
             if self.flavour is None:
                 self._choose(frame)
-            if frame.system == self.system and self.flavour is not None:
+            if self.flavour is not None and (frame.system == self.system or is_radio(frame)):
                 if frame.component == AUTOPILOT and (watch.heard_us != now_us or watch.down or self._was_mute):
                     watch.heard_us = now_us  # one frame tells of a moment what all of that moment do
                     self._look(now_us, events)
@@ -166,6 +169,9 @@ class Driver:
         ts1_ns = self.source.clock.due(now_us)
         if ts1_ns is not None:
             send.append(messages.time_sync(ts1_ns))
+        if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
+            self._asked_utc_us = now_us
+            send.append(messages.request(self.system, "SYSTEM_TIME"))
         send += self.stream_requests.due(self.system, now_us)
         if not self._was_ready and self.seen.down:
             send += self.preflight.due(self.system, now_us)
@@ -230,7 +236,8 @@ class Driver:
                 self.other_kind = f"it is no multirotor (MAV_TYPE {frame.message.type})"
             self.link.settle(frame.system)
             self.seen.estimator = Estimator(flavour.estimator)
-            self.stream_requests = StreamRequests(self.plan(flavour), self._telemetry.sources)
+            needed = [group for group in self._telemetry.sources if not group <= IN_THE_AIR]
+            self.stream_requests = StreamRequests(self.plan(flavour), needed)
             slack = self._commander.slack
             self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
             self.preflight = Preflight(

@@ -12,7 +12,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import unsigned
-from rtshcua.mavlink.radio import UnsignedRadio
+from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM, UnsignedRadio
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.ports import Event
@@ -23,6 +23,14 @@ _NOBODY: Final = 255
 _DELIVERED: Final = 1
 #: what the boundary learns of the vehicle from
 _OBSERVED: Final = ("HEARTBEAT", "GLOBAL_POSITION_INT")
+
+
+def is_radio(frame: Received) -> bool:
+    """Whether it is the status of a SiK radio in a link between two: it speaks for itself, as no part of a vehicle.
+
+    Which vehicle's link it is about nobody can tell where several speak, so with a named `system` it is not heard.
+    """
+    return frame.name == "RADIO_STATUS" and (frame.system, frame.component) == (RADIO_SYSTEM, RADIO)
 
 
 class Heard(NamedTuple):
@@ -56,7 +64,8 @@ class VehicleLink:
     def settle(self, system: int) -> None:
         """From now on be part of this system, and hear nobody else."""
         self._system = system
-        self._codec = Codec(system, OURS, only={system}, verifier=self._verifier)
+        heard = {system} if self._named else {system, RADIO_SYSTEM}
+        self._codec = Codec(system, OURS, only=heard, verifier=self._verifier)
         others = Codec(0, 0, only=frozenset(range(256)) - {system}, verifier=self._verifier)
         # with a key, a second sender of the vehicle's own frames is nobody: at most it repeats them
         self._others = others, Codec(0, 0) if self._verifier is None else others
@@ -93,9 +102,11 @@ class VehicleLink:
         if self._others is not None:
             self.overhear(datagram, now_us, elsewhere=False)
         for each in self._codec.parse(datagram, now_us):
-            _, name, _, component, _, _, _ = each
+            _, name, system, component, _, _, _ = each
             if component == OURS:
                 continue  # what comes back under our own name says nothing of the vehicle
+            if system == RADIO_SYSTEM != self._system and self._system and not is_radio(each):
+                continue
             received.append(each)
             if name in _OBSERVED:
                 self._frames.observe(unsigned(each.frame))

@@ -14,6 +14,10 @@ Stamps are found by the name of their field. `time_boot_ms` counts ms since boot
 translates. In GPS_RAW_INT it is when the fix was measured (ArduPilot: `last_fix_time_ms`), in HOME_POSITION when
 home was set. 0 says nothing: PX4 sends it while the receiver tells no UTC (streams/GPS_RAW_INT.hpp). A stamp that does
 not advance is the same measurement again, and keeps the time that it was given first.
+
+WIND has no stamp, and ArduPilot sends the last estimate of a flight for ever after it (vehicles.md, section 5). An
+estimate of three floating-point numbers is never twice the same while it is made, so one that does not change is the
+same measurement again, too.
 """
 
 from collections import deque
@@ -186,6 +190,7 @@ class SourceTime:
         self._until_us = 0  # the offset holds until then
         self._unix_us: int | None = None  # UNIX time minus time since boot
         self._told: dict[tuple[int, str], tuple[int, int]] = {}  # the last stamp of a message, and its time
+        self._wind: tuple[tuple[float, ...], int | None] = (), None  # the last estimate, and its time
         self._sent_us: int | None = None  # the last frame was sent at this time or later
         self._came_us = 0
         self._newest = 0
@@ -200,6 +205,17 @@ class SourceTime:
     def unready(self) -> str | None:
         """What stands against trusting any age, in words."""
         return "its clock is not known yet: no TIMESYNC answer" if self.clock.answered_us is None else None
+
+    def utc(self, now_us: int) -> tuple[int, int] | None:
+        """UTC as the vehicle has it less our monotonic time, and how far the way of the frames leaves it open, in us.
+
+        None until it has told its time (SYSTEM_TIME), and has answered when it was asked for its clock.
+        """
+        least_us, open_us = self.clock.offset_us(now_us), self.clock.error_us
+        if self._unix_us is None or least_us is None or open_us is None:
+            return None
+        half_us = (open_us + 1) // 2
+        return self._unix_us - least_us - half_us, half_us
 
     def of(self, frame: Received, now_us: int) -> int | None:
         """The earliest time at which what a frame says may have been measured, at most `now_us`; None where no bound is
@@ -217,12 +233,21 @@ class SourceTime:
             at_us = self._at(name, getattr(message, stamp.field), stamp, now_us)
             if name == "SYSTEM_TIME" and message.time_unix_usec >= _UNIX_US and message.time_boot_ms:
                 self._unix_us = message.time_unix_usec - message.time_boot_ms * 1_000
+        elif name == "WIND":
+            return self._of_unstamped(message, self._follow(number, None, now_us))
         elif name == "TIMESYNC":
             self._synchronise(message, now_us)
             if self._offset_us is not None:  # a request of its own holds its time in `ts1`
                 at_us = self._checked(self._offset_us + (message.tc1 or message.ts1) // 1_000, now_us)
         sent_us = self._follow(number, at_us, now_us)
         return sent_us if at_us is None else at_us
+
+    def _of_unstamped(self, wind: Any, sent_us: int | None) -> int | None:
+        """An estimate is as old as the first report of it."""
+        told = wind.direction, wind.speed, wind.speed_z
+        if told != self._wind[0] or self._wind[1] is None:
+            self._wind = told, sent_us
+        return self._wind[1]
 
     def _of_another(self, name: str, message: Any, component: int, stamp: _Stamp | None, now_us: int) -> int | None:
         """Its stamps are of a clock of its own: they tell only whether it measured anew."""
@@ -281,6 +306,7 @@ class SourceTime:
         self.stepped = self.clock.answer(message.tc1, message.ts1, now_us)
         if self.stepped:
             self._told.clear()
+            self._wind = (), None
             self._sent_us = None
             self._order = [None] * _NUMBERS
         self._refresh(now_us)

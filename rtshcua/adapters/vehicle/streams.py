@@ -97,6 +97,10 @@ def plan_streams(rates: Mapping[str, Rate], capacity: int | None, *, signed: boo
     return StreamPlan(intervals, load(intervals), least, capacity)
 
 
+#: What comes in the air only, so that nothing waits for it on the ground: an estimate of the wind.
+IN_THE_AIR = frozenset({"WIND", "WIND_COV"})
+
+
 class StreamRequests:
     """SET_MESSAGE_INTERVAL for each message of the plan, one request outstanding at a time.
 

@@ -16,6 +16,9 @@ from rtshcua.model.flat.signal import POSITION, Signal, SignalSource
 from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, project
 
 _Read: TypeAlias = Callable[[Any], int | None]  # a field of a message
+Where = tuple[tuple[str, int], ...]
+"""The fields that select a sensor, and their raw values."""
+
 _NONE: Final = frozenset[str]()
 _NUMBERS: Final = (int, float)  # as `int | float` it would be made anew for each field
 
@@ -42,8 +45,8 @@ class Telemetry:
     def __init__(self, policy: Policy, contracts: Sequence[Contract] = ()) -> None:
         vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
-        self._told: set[str] = set()  # what came of the autopilot: of each name, always the same slots
-        self._first: dict[tuple[int, str], Any] = {}
+        self._told: set[tuple[str, Where]] = set()  # what came of the autopilot: of each, always the same slots
+        self._first: dict[tuple[int, str, Where], Any] = {}
         self._by_message: dict[str, list[_Carried]] = {}
         for signal in policy.signals:
             for source in signal.sources:
@@ -68,34 +71,47 @@ class Telemetry:
         here: see `source_time`.
         """
         carried = self._by_message.get(name)
-        if carried is None or (message.instance_field is not None and not self._is_first(name, message, component)):
+        if carried is None:
             return ()
         if component != AUTOPILOT:
             doubtful = _NONE
         empty = name == "WIND" and _says_nothing(message)
         values: list[tuple[int, int | None]] = []
-        for fields, slots, read in carried:
+        instanced = message.instance_field is not None
+        told: list[tuple[str, Where]] = []
+        for fields, slots, read, selected in carried:
+            if selected and not _is_selected(selected, message):
+                continue
+            if instanced and not self._is_first(name, message, component, selected):
+                continue
+            told.append((name, selected))
             if empty or (doubtful and not doubtful.isdisjoint(fields)):
                 values += [(slot, None) for slot in slots]
             else:
                 values += zip(slots, read(message), strict=True)
         if component == AUTOPILOT:
-            if name not in self._told:
-                self._told.add(name)
+            if not self._told.issuperset(told):
+                self._told.update(told)
                 self._own.update(slot for slot, _ in values)
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
 
-    def _is_first(self, name: str, message: Any, component: int) -> bool:
-        """Whether this comes from the lowest instance of its sensor that the component was heard to have."""
+    def _is_first(self, name: str, message: Any, component: int, where: Where) -> bool:
+        """Whether this comes from the lowest instance that the component was heard to have of a selected sensor."""
         instance = getattr(message, message.instance_field)
-        first = self._first[component, name] = min(instance, self._first.get((component, name), instance))
+        key = component, name, where
+        first = self._first[key] = min(instance, self._first.get(key, instance))
         return bool(instance == first)
+
+
+def _is_selected(where: Where, message: Any) -> bool:
+    """Whether a message is of the sensor that is meant, where there may be several."""
+    return all(getattr(message, name) == value for name, value in where)
 
 
 def _check(signal: Signal, source: SignalSource) -> None:
     message = dialect.load().messages.get(source.message)
-    for name in source.fields:
+    for name in (*source.fields, *(name for name, _ in source.where)):
         field = None if message is None else message.fields.get(name)
         if field is None or field.length or field.type == "char":
             raise UnknownSource(
@@ -110,14 +126,15 @@ class _Carried(NamedTuple):
     fields: tuple[str, ...]
     slots: tuple[int, ...]
     read: Callable[[Any], Sequence[int | None]]
+    where: Where
 
 
 def _carried(signal: Signal, source: SignalSource, projection: Projection) -> _Carried:
     """Prepared once, for it is read from each message of its name."""
     first, *more = [_field(source, field) for field in source.fields]
     if signal.kind == POSITION:
-        return _Carried(source.fields, (signal.slot, signal.slot + 1), _place(first, more[0], projection))
-    return _Carried(source.fields, (signal.slot,), _number(first, *more))
+        return _Carried(source.fields, (signal.slot, signal.slot + 1), _place(first, more[0], projection), source.where)
+    return _Carried(source.fields, (signal.slot,), _number(first, *more), source.where)
 
 
 def _number(first: _Read, second: _Read | None = None) -> Callable[[Any], Sequence[int | None]]:

@@ -30,7 +30,7 @@ def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
     left_out = [
         f"{clause.part} {clause.text}: the vehicle is without a sensor for it"
         for clause in policy.left_out
-        if policy.contracts[clause.skill].name == contract.name
+        if clause.skill >= 0 and policy.contracts[clause.skill].name == contract.name
     ]
     return [
         ("motion", words.motion(contract)),

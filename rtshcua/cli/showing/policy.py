@@ -5,7 +5,7 @@ from rtshcua.cli.showing import words
 from rtshcua.cli.showing.contract import show_contract
 from rtshcua.cli.showing.page import Page
 from rtshcua.model.flat.policy import AfterSilence, Policy, WithoutEvidence
-from rtshcua.model.flat.signal import Signal
+from rtshcua.model.flat.signal import Signal, SignalSource
 from rtshcua.onboard.runtime.limits import Limits, falling_us
 
 #: what `without evidence` says, and means
@@ -39,9 +39,7 @@ def show_policy(page: Page, policy: Policy) -> None:
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
     page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
     if vehicle.without:
-        page.row(
-            "without", f"{', '.join(vehicle.without)}: not fitted; clauses `where fitted` that read it are left out"
-        )
+        page.row("without", f"{', '.join(vehicle.without)}: not fitted; what reads it `where fitted` is left out")
     page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
     page.row("roles", ", ".join(policy.roles))
     page.rows("sources", policy.sources)
@@ -51,6 +49,9 @@ def show_policy(page: Page, policy: Policy) -> None:
         page.row(str(number), rule.text, width=2)
         if rule.target is not None:
             page.row("", f"flies {words.link(policy, rule.target)}", width=2)
+    rules_left_out = [each.text for each in policy.left_out if each.skill < 0]
+    if rules_left_out:
+        page.rows("left out", [f"{text}: the vehicle is without a sensor for it" for text in rules_left_out])
     page.row("airspace", "anywhere" if policy.airspace is None else policy.airspace.text.removeprefix("airspace "))
     page.rows("contingency", [f"{n} {words.link(policy, link)}" for n, link in enumerate(policy.contingency)])
     if policy.contingency and all(0 <= link.skill < len(policy.contracts) for link in policy.contingency):
@@ -80,8 +81,13 @@ def show_policy(page: Page, policy: Policy) -> None:
         show_contract(page, policy, contract)
 
 
+def _source(source: SignalSource) -> str:
+    where = " and ".join(f"{name} = {value}" for name, value in source.where)
+    return f"{source.message}.{', .'.join(source.fields)}" + (f" where {where}" if where else "")
+
+
 def _signal(signal: Signal) -> str:
-    sources = [f"{source.message}.{', .'.join(source.fields)}" for source in signal.sources]
+    sources = [_source(source) for source in signal.sources]
     unknown = sorted({value for source in signal.sources for value in source.unknown})
     parts = [f"{signal.dimension} from {' or '.join(sources)}", f"stale after {words.duration(signal.stale_us)}"]
     if unknown:

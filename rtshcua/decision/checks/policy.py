@@ -80,8 +80,9 @@ def _without(policy: Policy) -> Iterator[str]:
     for left_out in policy.left_out:
         if not names:
             yield f"`{left_out.text}` is left out, and it is without no signal"
-        yield from index("skill", left_out.skill, len(policy.contracts))
-        if left_out.part not in ("require", "assume", "maintain"):
+        if left_out.part in ("require", "assume", "maintain"):
+            yield from index("skill", left_out.skill, len(policy.contracts))
+        elif left_out.part not in ("forbid", "confirm", "degrade") or left_out.skill != -1:
             yield f"`{left_out.text}` is left out of `{left_out.part}`, which no contract has"
 
 

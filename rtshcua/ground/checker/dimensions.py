@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from rtshcua.ground.checker.types import COUNT, DURATION, LENGTH, RATIO, SPEED, Type
 from rtshcua.model.quantity import Dimension
 
-#: how many canonical units make the unit that needs no factor in a product: m, m/s, s, degree, the whole, one
+#: how many canonical units make the unit that needs no factor in a product: m, m/s, s, degree, the whole, V, one
 COHERENT: Mapping[Dimension, int] = {
     Dimension.LENGTH: 1_000,
     Dimension.ALTITUDE: 1_000,
@@ -13,6 +13,7 @@ COHERENT: Mapping[Dimension, int] = {
     Dimension.DURATION: 1_000_000,
     Dimension.ANGLE: 10_000_000,
     Dimension.RATIO: 10_000,
+    Dimension.VOLTAGE: 1_000,
     Dimension.COUNT: 1,
 }
 

@@ -22,6 +22,7 @@ LARGEST: Mapping[Dimension, int] = {
     Dimension.DURATION: MAX_DURATION,
     Dimension.ANGLE: MAX_VALUE,
     Dimension.RATIO: MAX_VALUE,
+    Dimension.VOLTAGE: MAX_VALUE,
     Dimension.COUNT: MAX_VALUE,
 }
 

@@ -67,6 +67,7 @@ _WORDS = {
     Dimension.DURATION: "a duration",
     Dimension.ANGLE: "an angle",
     Dimension.RATIO: "a ratio",
+    Dimension.VOLTAGE: "a voltage",
     Dimension.COUNT: "a plain number",
     None: "a number",
 }
@@ -79,6 +80,7 @@ EXAMPLES = {
     Dimension.DURATION: "10 s",
     Dimension.ANGLE: "90 deg",
     Dimension.RATIO: "25 %",
+    Dimension.VOLTAGE: "14.2 V",
     Dimension.COUNT: "3",
 }
 

@@ -1,8 +1,9 @@
 """E0413: what reads a signal of a sensor that the vehicle is without.
 
 A signal that is declared is required: one that never comes is unknown, and nothing that reads it is ever permitted. So
-a vehicle says which sensors it is without, a clause says whether it applies only `where fitted`, and what reads such a
-signal all the same is refused. What a clause that is left out said is kept in the policy, for people to read.
+a vehicle says which sensors it is without, a clause or a rule says whether it applies only `where fitted`, and what
+reads such a signal all the same is refused. What is left out is kept in the policy, for people to read. A `permit` has
+no `where fitted`: without its condition it would permit more, and without itself nothing that a reader expects.
 """
 
 from collections.abc import Iterable
@@ -15,7 +16,7 @@ from rtshcua.ground.checker.uses import brought_about
 from rtshcua.model.ir.expression import Condition
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.ir.places import VehicleDecl
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.policies import PolicyDecl, Rule
 from rtshcua.model.ir.skills import Clause, SkillDecl
 
 
@@ -33,14 +34,20 @@ def applies(clause: Clause, without: frozenset[str]) -> bool:
     return not (clause.where_fitted and lacking(clause.condition, without))
 
 
+def rule_applies(rule: Rule, without: frozenset[str]) -> bool:
+    """Whether a rule counts for a vehicle that is without these signals."""
+    return not (rule.where_fitted and rule.when is not None and lacking(rule.when, without))
+
+
 def check_policy(context: Context, policy: PolicyDecl, vehicle: VehicleDecl, skills: Iterable[SkillDecl]) -> None:
     """Report the rules and clauses of a policy that read what the vehicle is without."""
     if not vehicle.without:
         return
     for rule in policy.rules:
-        if rule.when is not None:
+        if rule.when is not None and not rule.where_fitted:
+            help = "leave the signal out of the rule" if rule.kind == "permit" else "end the rule in `where fitted`"
             with context.report.within(brought_about(rule)):
-                _check(context, vehicle, rule.when, "leave the signal out of the rule")
+                _check(context, vehicle, rule.when, help)
     for skill in skills:
         for clause in (*skill.require, *skill.assume, *skill.maintain):
             if not clause.where_fitted:

@@ -83,7 +83,7 @@ def lower_policy(
     contracts = Contracts(context, numbers, conditions, zones, table, flat_vehicle)
     roles = _roles(policy)
     lowered = [contracts.contract(skill) for skill in skills]
-    lowered_rules = Rules(context, numbers, roles, conditions, contracts, table).lowered(policy)
+    lowered_rules = Rules(context, numbers, roles, conditions, contracts, table, flat_vehicle.without).lowered(policy)
     contingency = contracts.chain(policy.contingency)
     airspace = _airspace(policy, zones, table)
     silence = policy.without_link

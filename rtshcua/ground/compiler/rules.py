@@ -11,9 +11,10 @@ from rtshcua.ground.checker.uses import brought_about
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.contracts import Contracts, cells_of
 from rtshcua.ground.compiler.files import Files, shortened
+from rtshcua.ground.compiler.fitted import rule_applies
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import SourceKind
-from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.flat.policy import LeftOut, Rule, RuleKind
 from rtshcua.model.ir.expression import Condition, Junction
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.policies import Delegation, PolicyDecl
@@ -22,7 +23,10 @@ from rtshcua.model.ir.skills import SkillDecl
 
 
 class Rules:
-    """Lowers the rules of one policy; `numbers` are the indexes of its skills, `roles` its roles in order."""
+    """Lowers the rules of one policy; `numbers` are the indexes of its skills, `roles` its roles in order.
+
+    `without` are the signals that the vehicle is without.
+    """
 
     def __init__(
         self,
@@ -32,7 +36,9 @@ class Rules:
         conditions: Conditions,
         contracts: Contracts,
         files: Files,
+        without: Iterable[str],
     ) -> None:
+        self._without = frozenset(without)
         self._context = context
         self._numbers = numbers
         self._roles = {role: number for number, role in enumerate(roles)}
@@ -42,10 +48,13 @@ class Rules:
 
     def lowered(self, policy: PolicyDecl) -> tuple[tuple[Rule, RuleDecl], ...]:
         """All rules in source order, with their declarations; one whose skills keep its arguments in different cells
-        becomes several.
+        becomes several, and one that does not apply to the vehicle none.
         """
         found: list[tuple[Rule, RuleDecl]] = []
         for rule in policy.rules:
+            if not rule_applies(rule, self._without):
+                self._contracts.left_out.append(LeftOut(-1, rule.kind, *self._files.place(rule.span)))
+                continue
             with self._context.report.within(brought_about(rule)):
                 found += [(flat, rule) for flat in self._rule(rule)]
         return tuple(found)

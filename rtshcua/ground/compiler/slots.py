@@ -1,8 +1,9 @@
 """State slots for the signals that a policy reads, and the signals as the state monitor needs them."""
 
+from collections.abc import Iterator
 from math import gcd
 
-from rtshcua.ground.checker.checks.signals import sentinel
+from rtshcua.ground.checker.checks.signals import selected_value, sentinel
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Kind, Type
@@ -74,7 +75,14 @@ class Slots:
             numerator=numerator // common,
             denominator=denominator // common,
             unknown=tuple(sorted({mark for mark in marks if mark is not None})),
+            where=tuple(sorted(self._selected(source))),
         )
+
+    def _selected(self, source: SourceDecl) -> Iterator[tuple[str, int]]:
+        for each in source.where:
+            value = selected_value(self._context.dialect, source.message.text, each)
+            assert value is not None
+            yield each.field.text, value
 
 
 def enum_labels(context: Context, enum: EnumDecl) -> tuple[tuple[int, str], ...]:

@@ -48,7 +48,7 @@ KEYWORDS: Mapping[str, str] = {
     "without": "`without evidence land` or `refuse`: what becomes of a flight whose records are not kept. `without"
     " link for 30 s contingency` or `continue`: what follows when the vehicle was silent for longer. In a vehicle:"
     " signals whose sensors are not fitted.",
-    "fitted": "`where fitted`: the clause is left out for a vehicle without a sensor for what it reads.",
+    "fitted": "`where fitted`: the clause, or the rule, is left out for a vehicle without a sensor for what it reads.",
     "template": "Rules with parameters, which policies `use`.",
     "use": "Puts the rules of a template into the policy, with these arguments.",
     "any": "Every skill, or after `by` every role.",
@@ -146,6 +146,7 @@ TYPES: Mapping[str, str] = {
     "duration": "A time, kept in us: `us`, `ms`, `s`, `min`, `h`.",
     "ratio": "A part of a whole, kept in 1/10000: `%`.",
     "angle": "An angle, kept in 1e-7 degree: `deg`.",
+    "voltage": "A voltage, kept in mV: `mV`, `V`.",
     "count": "A plain number.",
     "position": "A place on the ground, WGS 84.",
     "zone": "A zone.",

@@ -83,7 +83,7 @@ class _Walk(Conditions):
         yield Occurrence(signal.type.span, Target(sort, signal.type.text))
         for source in signal.sources:
             yield Occurrence(source.message.span, Target(Sort.MESSAGE, source.message.text))
-            for field in source.fields:
+            for field in (*source.fields, *(each.field for each in source.where)):
                 yield Occurrence(field.span, Target(Sort.FIELD, field.text, source.message.text))
         for name in signal.unknown_at:
             if enum is not None and any(member.name.text == name.text for member in enum.members):

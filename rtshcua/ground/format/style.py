@@ -49,7 +49,7 @@ ITEMS = {
     # declarations
     "import_file": _PART,
     "enum": _PART,
-    "signal": _style("or", cuts=(":", "=", "unknown", "stale")),
+    "signal": _style("or", "where", cuts=(":", "=", "unknown", "stale")),
     "zone": _style("feature", "hole", cuts=("=", "from")),
     "vehicle": _PART,
     "skill": _PART,

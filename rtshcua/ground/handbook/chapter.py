@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from rtshcua.ground.compiler.fitted import applies
+from rtshcua.ground.compiler.fitted import applies, rule_applies
 from rtshcua.ground.handbook.changes import Changes, changes
 from rtshcua.ground.handbook.model import (
     CaseTold,
@@ -69,6 +69,11 @@ def chapter(
         return_altitude=policy.vehicle.return_altitude,
         rights=rights(subject),
         rules=tuple(_rule(subject, number, changed) for number in range(len(policy.rules))),
+        rules_left_out=tuple(
+            told_rule(each, rule_names(subject, each))
+            for each in declaration.rules
+            if not rule_applies(each, frozenset(policy.vehicle.without))
+        ),
         airspace=told_airspace(declaration.airspace),
         contingency=told_chain(declaration.contingency, subject.names),
         evidence=told_evidence(declaration.without_evidence),

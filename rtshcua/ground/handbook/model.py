@@ -231,6 +231,7 @@ class Chapter:
     return_altitude: int
     rights: tuple[Rights, ...]
     rules: tuple[RuleTold, ...]
+    rules_left_out: tuple[str, ...]
     airspace: str
     contingency: tuple[str, ...]
     evidence: str

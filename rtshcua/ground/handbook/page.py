@@ -38,7 +38,7 @@ _HIDDEN = re.compile(
 #: what fits at the foot of a page of A4: margins of 14 and 16 mm, letters of 6 pt that are 1.3 mm wide
 FOOT_LINES, FOOT_COLUMNS = 4, 116
 #: a number and its unit stay on one line
-_UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|%|s|ms|us|min|h|deg|N|S|E|W)\b|%)")
+_UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|mV|V|%|s|ms|us|min|h|deg|N|S|E|W)\b|%)")
 
 
 def page(handbook: Handbook) -> str:

@@ -18,6 +18,7 @@ CANONICAL: dict[Dimension, str] = {
     Dimension.DURATION: "us",
     Dimension.ANGLE: "steps of 1e-7 degree",
     Dimension.RATIO: "hundredths of 1 %",
+    Dimension.VOLTAGE: "mV",
     Dimension.COUNT: "",
 }
 

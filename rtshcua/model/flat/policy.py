@@ -122,9 +122,10 @@ class Vehicle(Flat, frozen=True):
 
 
 class LeftOut(Flat, frozen=True):
-    """A clause `where fitted` that a contract does not have, for the vehicle is without a signal that it reads.
+    """A clause, or a rule, `where fitted` that does not apply, for the vehicle is without a signal that it reads.
 
-    `part` is `require`, `assume` or `maintain`. Nothing is decided by it; it is there to be read.
+    `part` is `require`, `assume` or `maintain` of the contract `skill`; or, and `skill` is -1, a rule: `forbid`,
+    `confirm` or `degrade`. Nothing is decided by it; it is there to be read.
     """
 
     skill: int
@@ -142,8 +143,8 @@ class Policy(Flat, frozen=True):
     derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
     mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
     SHA-256 of each. `without_evidence` is a `WithoutEvidence`. After a silence of the vehicle longer than `silence_us`,
-    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing. `left_out` are the clauses that
-    do not apply to the vehicle.
+    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing. `left_out` are the clauses and
+    rules that do not apply to the vehicle.
     """
 
     name: str

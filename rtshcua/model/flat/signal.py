@@ -6,13 +6,17 @@ NUMBER, ENUMERATION, POSITION = 0, 1, 2
 
 
 class SignalSource(Flat, frozen=True):
-    """One message and its field or fields; a raw value `v` is `v * numerator / denominator` in the canonical unit."""
+    """One message and its field or fields; a raw value `v` is `v * numerator / denominator` in the canonical unit.
+
+    `where` are fields with the raw values that they must have for a message to count, ascending by field.
+    """
 
     message: str
     fields: tuple[str, ...]
     numerator: int
     denominator: int
     unknown: tuple[int, ...]
+    where: tuple[tuple[str, int], ...] = ()
 
 
 class Signal(Flat, frozen=True):

@@ -12,7 +12,7 @@ class Rule(Node):
 
     Empty `skills` is `any`. `roles` empty is `by any`. `through` are the sources that may speak for the role
     (`through agent`); empty means the role's own source, `operator`, except under `by any`, where it means every
-    source.
+    source. `where_fitted` is that of a clause (`ir/skills.py`); a `permit` has none.
     """
 
     kind: Literal["permit", "forbid", "confirm", "degrade"]
@@ -26,6 +26,7 @@ class Rule(Node):
     target: LinkDecl | None  # degrade: `to return_home`
     #: the `use` and `delegate` that brought an elaborated rule about, the outermost first; empty as written
     origin: tuple[Node, ...] = ()
+    where_fitted: bool = False
 
 
 class Delegation(Node):

@@ -21,15 +21,23 @@ class EnumDecl(Node):
     members: tuple[Enumerator, ...]
 
 
+class Selected(Node):
+    """`orientation = 0`: a field of the message, and the raw value, or its name in the dialect, that it must have."""
+
+    field: Name
+    value: Name
+
+
 class SignalSource(Node):
     """One MAVLink message and the field or fields that hold the signal.
 
     Two fields are a pair: latitude and longitude for a `position`, two components for a `speed` (taken as the
-    length of the vector).
+    length of the vector). `where` says which of the messages count: those whose fields have these values.
     """
 
     message: Name
     fields: tuple[Name, ...]
+    where: tuple[Selected, ...] = ()
 
 
 class SignalDecl(Node):

@@ -1,6 +1,7 @@
 """What ArduCopter streams: nothing but the heartbeat, and its own TIMESYNC, until it is asked."""
 
 from collections.abc import Mapping
+from math import atan2, degrees, hypot
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -67,8 +68,11 @@ def _ekf_status_report(a: Autopilot) -> Message | None:
 def _wind(a: Autopilot) -> Message | None:
     if not a.sensors.locates:
         return None
-    # -180 degrees and no speed are what a copter without an estimate of the wind reports; this one has one
-    return _WIND(a.air.from_degrees if a.air.speed else 0.0, a.air.speed, 0.0)
+    wind = a.wind
+    if wind is None:  # as recorded: a copter that estimates none reports none from the south
+        return _WIND(-180.0, 0.0, 0.0)
+    north, east = wind  # the last one of a flight stays
+    return _WIND(degrees(atan2(-east, -north)), hypot(north, east), 0.0)
 
 
 def _timesync(a: Autopilot) -> Message:

@@ -73,11 +73,11 @@ def _estimator_status(a: Autopilot) -> Message | None:
 
 
 def _wind_cov(a: Autopilot) -> Message | None:
-    if not a.sensors.locates:
+    """WIND_COV, whenever the estimator knows the wind: in the air, with drag fusion (EKF2_DRAG_CTRL) alone."""
+    wind = a.wind
+    if wind is None or not a.vehicle.in_air:
         return None
-    return _WIND_COV(
-        a.now_us, a.air.north, a.air.east, 0.0, 0.1, 0.0, a.home.amsl_mm / 1000 + a.vehicle.body.up, 0.5, 0.5
-    )
+    return _WIND_COV(a.now_us, *wind, 0.0, 0.1, 0.0, a.home.amsl_mm / 1000 + a.vehicle.body.up, 0.5, 0.5)
 
 
 def _timesync(a: Autopilot) -> Message:

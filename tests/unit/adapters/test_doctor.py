@@ -12,11 +12,11 @@ from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, di
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
-from rtshcua.model.faults import GpsLoss, LinkLoss
+from rtshcua.model.faults import GpsLoss, LinkLoss, MessageSilence
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
-from rtshcua.simulation.config import SimulationConfig
+from rtshcua.simulation.config import EQUIPPED, Extra, SimulationConfig
 from rtshcua.simulation.place import Home
 from rtshcua.virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 from virtual import case
@@ -28,7 +28,12 @@ Prepare = Callable[[VirtualVehicle], None]
 
 
 def examine(
-    config: SimulationConfig, policy: Policy | None = None, *, prepare: Prepare = lambda _: None, seconds: int = 14
+    config: SimulationConfig,
+    policy: Policy | None = None,
+    *,
+    prepare: Prepare = lambda _: None,
+    seconds: int = 14,
+    utc_error_us: int | None = 1_000,
 ) -> dict[str, VehicleFinding]:
     """The findings after so many seconds, by slug; of several with one slug, the worst."""
     policy = policy or case.policy()
@@ -39,7 +44,7 @@ def examine(
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
     found: dict[str, VehicleFinding] = {}
-    for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, utc_error_us=1_000):
+    for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, utc_error_us=utc_error_us):
         if each.slug not in found or each.verdict is MissionVerdict.STOP:
             found[each.slug] = each
     return found
@@ -197,14 +202,26 @@ def test_a_vehicle_whose_clock_is_not_known(flavour: str) -> None:
 
 
 def test_a_signal_that_nobody_sends() -> None:
-    def without_wind(vehicle: VirtualVehicle) -> None:
-        codec = Codec(0, 0)
-        vehicle.hurt = lambda frame: [] if any(each.name == "WIND_COV" for each in codec.parse(frame)) else [frame]
+    found = examine(case.simulated("px4", extras=EQUIPPED - {Extra.RANGE}))
+    (obstacle,) = [each for slug, each in found.items() if slug.startswith("signal/obstacle")]
+    assert obstacle.verdict in (MissionVerdict.STOP, MissionVerdict.WARN)
+    assert obstacle.found.endswith("no DISTANCE_SENSOR")
 
-    found = examine(case.simulated("px4"), prepare=without_wind)
-    (wind,) = [each for slug, each in found.items() if slug.startswith("signal/wind")]
-    assert wind.verdict in (MissionVerdict.STOP, MissionVerdict.WARN)
-    assert wind.found.endswith("no WIND_COV or WIND")
+
+@FLAVOURS
+def test_where_the_kernel_vouches_for_no_clock_the_vehicles_time_counts(flavour: str) -> None:
+    told = examine(case.simulated(flavour, utc_us=case.flat.ISSUED), utc_error_us=None)["mission/clock"]
+    assert told.verdict is MissionVerdict.OK
+    silent = case.simulated(flavour, faults=(MessageSilence(0, "SYSTEM_TIME"),))
+    assert "mission/clock" in stops(examine(silent, utc_error_us=None))
+    assert "mission/clock" not in stops(examine(silent))
+
+
+@FLAVOURS
+def test_the_wind_is_not_asked_for_on_the_ground(flavour: str) -> None:
+    wind = examine(case.simulated(flavour))["signal/wind.speed"]
+    assert wind.verdict is MissionVerdict.UNKNOWN
+    assert wind.found == "`wind.speed` is known in the air only, so nothing is known of it yet"
 
 
 def test_a_lossy_link() -> None:

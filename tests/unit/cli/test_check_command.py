@@ -77,7 +77,11 @@ def test_missions_of_one_name_in_unrelated_files_do_not_clash(here: Path, capsys
     assert said.err == ""
     lines = said.out.splitlines()
     assert lines[0] == "no errors in 9 files"
-    assert [line.split(":")[0] for line in lines[1:]] == ["look (a/one.rts)", "look (b/two.rts)"]
+    missions = ["look (a/one.rts)", "look (b/two.rts)"]
+    assert [line.split(":")[0] for line in lines[1:]] == [*missions, "meadow_flight on quad"]
+    assert lines[-1].endswith(
+        "`where fitted` left out, without battery.voltage, link.quality, obstacle.distance, wind.speed"
+    )
 
 
 def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -93,7 +97,7 @@ def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest
     assert code == ExitCode.OK
     assert [each["file"] for each in answered["missions"]] == ["b/two.rts", "a/deep/er.rts", "a/one.rts"]
     assert {each["mission"] for each in answered["missions"]} == {"look"}
-    assert set(answered) == {"format", "version", "diagnostics", "exit", "missions", "versions"}
+    assert set(answered) == {"format", "version", "diagnostics", "exit", "missions", "versions", "left_out"}
 
 
 def test_without_a_path_it_is_this_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -225,7 +225,7 @@ def test_the_sensors_that_a_vehicle_lacks_and_the_clauses_left_out() -> None:
     page = Page()
     show_policy(page, replace(policy, vehicle=vehicle, left_out=(clause,)))
     rows = [" ".join(row.split()) for row in str(page).splitlines()]
-    assert "without rain, snow: not fitted; clauses `where fitted` that read it are left out" in rows
+    assert "without rain, snow: not fitted; what reads it `where fitted` is left out" in rows
     assert rows.count("left out assume rain < 3 m/s: the vehicle is without a sensor for it") == 1
     assert not any(row.startswith("left out") for row in _shown(policy))
 

@@ -202,6 +202,7 @@ POLICIES: list[tuple[Policy, str]] = [
     ),
     (lacking("a", left_out=(LeftOut(99, "assume", "x", 0, 0, 1),)), "vehicle: there is no skill 99"),
     (lacking("a", left_out=(LeftOut(0, "permit", "x", 0, 0, 1),)), "vehicle: `x` is left out of `permit`, which no"),
+    (lacking("a", left_out=(LeftOut(0, "degrade", "x", 0, 0, 1),)), "vehicle: `x` is left out of `degrade`, which no"),
     (replace(P, silence_us=0), f"silence 0 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=-1), f"silence -1 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=MAX_SILENCE + 1), f"silence {MAX_SILENCE + 1} is not in 1..{MAX_SILENCE}"),
@@ -221,6 +222,11 @@ def test_a_malformed_policy(policy: Policy, what: str) -> None:
 def test_a_clause_left_out_of_a_part_of_a_contract_is_accepted(part: str) -> None:
     left_out = tuple(LeftOut(skill, part, "x", 0, 0, 1) for skill in range(2))
     assert not isinstance(prepare(lacking("a", left_out=left_out)), Refusal)
+
+
+@pytest.mark.parametrize("part", ["forbid", "confirm", "degrade"])
+def test_a_rule_left_out_is_accepted(part: str) -> None:
+    assert not isinstance(prepare(lacking("a", left_out=(LeftOut(-1, part, "x", 0, 0, 1),))), Refusal)
 
 
 def test_more_combinations_of_skills_and_roles_than_fit() -> None:

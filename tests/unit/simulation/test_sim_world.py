@@ -90,7 +90,6 @@ def test_stream_rates_of_px4(pilot: Callable[..., Any]) -> None:
         "EXTENDED_SYS_STATE": 5,
         "BATTERY_STATUS": 2,
         "ESTIMATOR_STATUS": 2,
-        "WIND_COV": 2,
         "DISTANCE_SENSOR": 10,
         "HOME_POSITION": 0.5,
         "MISSION_CURRENT": 1,

@@ -1,4 +1,4 @@
-"""E0401 to E0412: enumerations and signals against the MAVLink dialect."""
+"""E0401 to E0412, E0415: enumerations and signals against the MAVLink dialect."""
 
 from collections.abc import Mapping
 
@@ -9,11 +9,11 @@ from rtshcua.ground.checker.fields import quantity, size
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
-from rtshcua.mavlink.dialect import DATUM, Field, Message
+from rtshcua.mavlink.dialect import DATUM, Dialect, Field, Message
 from rtshcua.mavlink.quantise import UNITS
 from rtshcua.model.flat.limits import MAX_STALE
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SignalSource
+from rtshcua.model.ir.signals import EnumDecl, Selected, SignalDecl, SignalSource
 from rtshcua.model.quantity import Dimension
 
 MAX_INTEGER = (1 << 63) - 1
@@ -24,6 +24,8 @@ INTEGERS: Mapping[str, tuple[int, int]] = {
     for bits in (8, 16, 32, 64)
 }
 PLACE_UNIT = "degE7"
+#: the field that says into which direction a sensor looks
+_DIRECTION = "orientation"
 
 
 def check(context: Context) -> None:
@@ -126,6 +128,59 @@ def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Ty
         else:
             _field(context, signal, source, name, field, type)
             _sentinels(context, signal, field)
+    _selector(context, source, message)
+
+
+def _selector(context: Context, source: SignalSource, message: Message) -> None:
+    """Each selected field is one whole number that has such a value, and a direction is always selected."""
+    report, seen = context.report, set[str]()
+    for each in source.where:
+        name, value = each.field, each.value.text
+        field = message.fields.get(name.text)
+        if field is None:
+            report.add(
+                codes.UNKNOWN_FIELD,
+                name.span,
+                f"`{source.message.text}` has no field `{name.text}`",
+                help=suggestion(name.text, message.fields, source.message.text) or _fields(message),
+            )
+        elif field.length or field.type not in INTEGERS:
+            report.add(
+                codes.FIELD_TYPE,
+                name.span,
+                f"`{name.text}` is not one whole number",
+                help="a message is chosen by a field that is one whole number, such as `orientation` or `id`",
+            )
+        elif name.text in seen:
+            report.add(codes.UNSELECTED, name.span, f"`{name.text}` is selected twice", help="say it once")
+        elif selected_value(context.dialect, source.message.text, each) is None:
+            members = {} if field.enum is None else context.dialect.enums.get(field.enum, {})
+            low, high = INTEGERS[field.type]
+            report.add(
+                codes.UNKNOWN_AT,
+                each.value.span,
+                f"`{value}` is no value of `{source.message.text}.{name.text}`",
+                help=suggestion(value, members)
+                or (f"its values are {listed(members)}" if members else f"its values go from {low} to {high}"),
+            )
+        seen.add(name.text)
+    field = message.fields.get(_DIRECTION)
+    if field is not None and _DIRECTION not in seen:
+        report.add(
+            codes.UNSELECTED,
+            source.span,
+            f"`{source.message.text}` comes from sensors that look into different directions, and none is selected",
+            help="say which one is meant: `where orientation = MAV_SENSOR_ROTATION_NONE` looks ahead, "
+            "`MAV_SENSOR_ROTATION_PITCH_270` down",
+        )
+
+
+def selected_value(dialect: Dialect, message: str, selected: Selected) -> int | None:
+    """The raw value that a selected field must have; None where it has no such value."""
+    field = dialect.messages[message].fields[selected.field.text]
+    value = sentinel(selected.value.text, {} if field.enum is None else dialect.enums.get(field.enum, {}))
+    low, high = INTEGERS[field.type]
+    return value if value is not None and low <= value <= high else None
 
 
 def _fields(message: Message) -> str:

@@ -39,6 +39,8 @@ def through(sources: Sequence[str]) -> str:
 def told_rule(rule: Rule, names: Vocabulary) -> str:
     """A rule as a sentence of its own; one that a template or a delegation brought about says so."""
     words = _rule(rule, names)
+    if rule.where_fitted:
+        words = f"{words} (where the vehicle has the sensors for it)"
     for origin in reversed(rule.origin):
         words = f"{_origin(origin, names)}, {words}"
     return sentence(words)

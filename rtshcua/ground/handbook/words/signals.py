@@ -14,6 +14,7 @@ _TYPES: Final = {
     "duration": "a duration",
     "ratio": "a part of a whole",
     "angle": "an angle",
+    "voltage": "a voltage",
     "count": "a number",
 }
 
@@ -30,7 +31,9 @@ def told_sources(signal: SignalDecl) -> str:
 
 
 def _source(source: SignalSource) -> str:
-    return f"{name(source.message.text)} field {listed([name(field.text) for field in source.fields])}"
+    where = listed([f"{name(each.field.text)} is {name(each.value.text)}" for each in source.where])
+    words = f"{name(source.message.text)} field {listed([name(field.text) for field in source.fields])}"
+    return f"{words}, where {where}" if where else words
 
 
 def told_unknown(signal: SignalDecl) -> str:

@@ -19,6 +19,7 @@ _TYPES: Final = {
     "duration": "a duration",
     "ratio": "a part of a whole",
     "angle": "an angle",
+    "voltage": "a voltage",
     "count": "a number",
     "role": "a role",
 }

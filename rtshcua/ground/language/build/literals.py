@@ -52,6 +52,7 @@ ASKING = {
         (Dimension.DURATION, "after deadline for last within grace lasts valid duration time"),
         (Dimension.RATIO, "energy battery reserve ratio"),
         (Dimension.ANGLE, "angle heading"),
+        (Dimension.VOLTAGE, "voltage cell"),
     )
     for word in words.split()
 }

@@ -28,33 +28,31 @@ class Policies(Skills):
             approver=None, another=None, within=None, target=None,
         )  # fmt: skip
 
-    def forbid(self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None) -> Rule:
+    def forbid(
+        self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None,
+        fitted: bool | None,
+    ) -> Rule:  # fmt: skip
         """`forbid track_target by any`."""
         return Rule(
             span=span, kind="forbid", skills=skills, roles=roles, through=through or (), when=when,
-            approver=None, another=None, within=None, target=None,
+            approver=None, another=None, within=None, target=None, where_fitted=fitted is True,
         )  # fmt: skip
 
     def confirm(
-        self,
-        span: Span,
-        skills: Names,
-        when: Condition | None,
-        approver: Name,
-        another: Name | None,
-        within: Quantity | None,
-    ) -> Rule:
+        self, span: Span, skills: Names, when: Condition | None, approver: Name, another: Name | None,
+        within: Quantity | None, fitted: bool | None,
+    ) -> Rule:  # fmt: skip
         """`confirm inspect_area when altitude < 10 m by role supervisor and another of role safety within 30 s`."""
         return Rule(
             span=span, kind="confirm", skills=skills, roles=(), through=(), when=when,
-            approver=approver, another=another, within=within, target=None,
+            approver=approver, another=another, within=within, target=None, where_fitted=fitted is True,
         )  # fmt: skip
 
-    def degrade(self, span: Span, skills: Names, when: Condition | None, target: LinkDecl) -> Rule:
-        """`degrade any when battery < 25 % to return_home`."""
+    def degrade(self, span: Span, skills: Names, when: Condition | None, target: LinkDecl, fitted: bool | None) -> Rule:
+        """`degrade any when wind.speed > 6 m/s to return_home where fitted`."""
         return Rule(
             span=span, kind="degrade", skills=skills, roles=(), through=(), when=when,
-            approver=None, another=None, within=None, target=target,
+            approver=None, another=None, within=None, target=target, where_fitted=fitted is True,
         )  # fmt: skip
 
     def airspace(self, span: Span, inside: Names | None, outside: Names | None) -> Part:

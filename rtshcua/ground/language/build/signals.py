@@ -1,5 +1,7 @@
 """Enumerations and signals."""
 
+from typing import Any
+
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
@@ -7,7 +9,7 @@ from rtshcua.ground.language.build.conditions import Conditions
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.signals import EnumDecl, Enumerator, SignalDecl, SignalSource
+from rtshcua.model.ir.signals import EnumDecl, Enumerator, Selected, SignalDecl, SignalSource
 
 
 class Signals(Conditions):
@@ -35,8 +37,19 @@ class Signals(Conditions):
         """Sentinels with commas between them."""
         return names
 
-    def source(self, span: Span, *paths: Name) -> SignalSource:
-        """`GPS_RAW_INT.fix_type`, or two fields of one message."""
+    def selected(self, span: Span, field: Name, value: Name) -> Selected:
+        """`orientation = 0`."""
+        self.undotted(field, "field")
+        return Selected(span=span, field=field, value=value)
+
+    def selector(self, span: Span, *selected: Selected) -> tuple[Selected, ...]:
+        """`where id = 0 and orientation = 0`."""
+        return selected
+
+    def source(self, span: Span, *parts: Any) -> SignalSource:
+        """`GPS_RAW_INT.fix_type`, or two fields of one message; which of the messages count stands last."""
+        paths: tuple[Name, ...] = tuple(part for part in parts if isinstance(part, Name))
+        where = parts[-1] if isinstance(parts[-1], tuple) else ()
         messages, fields = zip(*map(self._field, paths), strict=True)
         for other in messages[1:]:
             if other.text != messages[0].text:
@@ -48,7 +61,7 @@ class Signals(Conditions):
                 )
         if len(fields) > 2:
             self.report(SYNTAX, f"a source has one field or two, not {len(fields)}", span, "write one field, or a pair")
-        return SignalSource(span=span, message=messages[0], fields=fields[:2])
+        return SignalSource(span=span, message=messages[0], fields=fields[:2], where=where)
 
     def unknown(self, span: Span, names: tuple[Name, ...]) -> Part:
         """`unknown at -1, no_fix`."""

@@ -1,5 +1,6 @@
 """Our end of the link: what the boundary does not let out fails the manoeuvre; what comes in is proved first."""
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from hostile.target import KEY, UTC_US, Target, greeting
@@ -83,6 +84,31 @@ def test_an_unsigned_radio_is_heard_at_its_worst() -> None:
     theirs = SignedLink(KEY, State(0, {}), UTC_US, 0)
     signed = theirs.sign(radio.pack(mavlink.MAVLink_radio_status_message(200, 200, 90, 0, 0, 0, 0)), 0)
     assert [received.message.txbuf for received in link.parse(signed, 0)] == [90], "a signed one is believed"
+
+
+@pytest.mark.parametrize(
+    ("system", "component", "name", "named", "heard"),
+    [
+        (51, 68, "RADIO_STATUS", None, True),  # a SiK radio: it is nobody's part
+        (1, 68, "RADIO_STATUS", None, True),
+        (51, 68, "RADIO_STATUS", 1, False),  # several speak here: whose link is it about?
+        (51, 1, "RADIO_STATUS", None, False),
+        (52, 68, "RADIO_STATUS", None, False),
+        (51, 68, "HEARTBEAT", None, False),
+    ],
+)
+def test_a_radio_is_heard_as_who_it_is(system: int, component: int, name: str, named: int | None, heard: bool) -> None:
+    link = VehicleLink(FrameSession(), None, named)
+    link.settle(1)
+    status = mavlink.MAVLink_radio_status_message(200, 200, 80, 0, 0, 0, 0)
+    frame = Codec(system, component).pack(status if name == "RADIO_STATUS" else greeting("px4")[0])
+    assert [each.name for each in link.parse(frame, 0)] == ([name] if heard else [])
+
+
+def test_a_vehicle_may_be_system_51_itself() -> None:
+    link = VehicleLink(FrameSession())
+    link.settle(51)
+    assert [each.name for each in link.parse(Codec(51, 1).pack(greeting("px4")[0]), 0)] == ["HEARTBEAT"]
 
 
 def test_what_is_logged_has_no_signature() -> None:

@@ -97,6 +97,24 @@ def test_a_message_without_a_stamp_is_as_old_as_the_stamp_before_it() -> None:
     assert ear.hear(HEARTBEAT, 11 * S + 99_000) == 11 * S - 5 * DRIFT_US
 
 
+def test_an_estimate_of_the_wind_that_does_not_change_grows_old() -> None:
+    """ArduCopter sends the last one of a flight for ever: it must not count as fresh."""
+    ear = Ear()
+
+    def wind(speed: float, made_us: int) -> int | None:
+        ear.place(made_us, made_us + 10_000)
+        return ear.hear(mavlink.MAVLink_wind_message(10.0, speed, 0.0), made_us + 20_000)
+
+    first = wind(3.0, 10_100_000)
+    assert first is not None
+    assert wind(3.0, 10_600_000) == first
+    assert wind(3.0, 20_600_000) == first
+    later = wind(3.1, 21_000_000)
+    assert later is not None
+    assert later > 20_600_000
+    assert wind(3.0, 21_500_000) > later  # type: ignore[operator]
+
+
 def test_what_comes_in_a_burst_after_a_stall_is_as_old_as_the_stall() -> None:
     ear = Ear()
     before = ear.place(10_100_000, 10_110_000)

@@ -14,7 +14,7 @@ from rtshcua.codec.frames import Received
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import SignalSource
+from rtshcua.model.flat.signal import NUMBER, Signal, SignalSource
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from virtual.policy import BATTERY, FIX, HEIGHT, LINK, POLICY, POSITION_X, PROJECTION, WIND
@@ -121,6 +121,26 @@ def test_of_two_batteries_the_first_counts() -> None:
     assert telemetry.read("BATTERY_STATUS", of(0, 8)) == ((BATTERY, 800),)
     assert telemetry.read("BATTERY_STATUS", of(1, 95)) == ()
     assert telemetry.read("BATTERY_STATUS", of(0, 7)) == ((BATTERY, 700),)
+
+
+def test_of_range_finders_the_one_that_looks_where_the_signal_says() -> None:
+    """Also where the one that looks down has the lower number, and each counts on its own."""
+
+    def sees(instance: int, orientation: int, cm: int) -> Any:
+        return mavlink.MAVLink_distance_sensor_message(0, 20, 4_000, cm, 0, instance, orientation, 0)
+
+    ahead = SignalSource("DISTANCE_SENSOR", ("current_distance",), 10, 1, (), (("orientation", 0),))
+    down = replace(ahead, where=(("orientation", 25),))
+    signals = tuple(
+        Signal(name, 20 + number, NUMBER, "length", 1_000_000, (), (source,))
+        for number, (name, source) in enumerate((("ahead", ahead), ("down", down)))
+    )
+    telemetry = Telemetry(replace(POLICY, signals=(*POLICY.signals, *signals), slots=22))
+    assert telemetry.read("DISTANCE_SENSOR", sees(0, 25, 150)) == ((21, 1_500),)
+    assert telemetry.read("DISTANCE_SENSOR", sees(3, 0, 900)) == ((20, 9_000),)
+    assert telemetry.read("DISTANCE_SENSOR", sees(2, 0, 800)) == ((20, 8_000),)
+    assert telemetry.read("DISTANCE_SENSOR", sees(3, 0, 900)) == (), "the lowest number that looks ahead counts"
+    assert telemetry.read("DISTANCE_SENSOR", sees(1, 12, 100)) == ()
 
 
 @pytest.mark.parametrize("source", ["BATTERY_STATUS.nope", "NO_SUCH.x", "BATTERY_STATUS.voltages", "STATUSTEXT.text"])

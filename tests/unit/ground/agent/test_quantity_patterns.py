@@ -25,7 +25,8 @@ LINEAR = sorted(Dimension, key=lambda one: one.value)
 #: how many canonical units one of the unit has, by hand
 SCALES = {
     Dimension.LENGTH: 1000, Dimension.ALTITUDE: 1000, Dimension.SPEED: 1000, Dimension.DURATION: 10**6,
-    Dimension.ANGLE: 10**7, Dimension.RATIO: 100, Dimension.COUNT: 1,
+    Dimension.ANGLE: 10**7, Dimension.RATIO: 100, Dimension.VOLTAGE: 1000,
+    Dimension.COUNT: 1,
 }  # fmt: skip
 
 

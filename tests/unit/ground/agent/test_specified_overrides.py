@@ -20,8 +20,8 @@ ALL = {
     "lasts_at_most": "110 s",
     "grace": "500 ms",
     "energy_at_most": "13 %",
-    "require": ["battery > 40 % and wind.speed < 8 m/s"],
-    "assume": ["link.quality > 10 %"],
+    "require": ["battery > 40 % and velocity.down < 8 m/s"],
+    "assume": ["velocity.north < 20 m/s"],
     "maintain": ["height <= 30 m", "height <= altitude + 20 m"],
     "record": ["effect"],
 }
@@ -53,8 +53,8 @@ def test_a_step_may_be_held_to_more(good: dict[str, Any], compile_text: Compile,
         )
     ]
     assert own == [
-        ["battery > 40 %", "wind.speed < 8 m/s"],
-        ["link.quality > 10 %"],
+        ["battery > 40 %", "velocity.down < 8 m/s"],
+        ["velocity.north < 20 m/s"],
         ["height <= 30 m", "height <= altitude + 20 m"],
     ]
 

@@ -37,7 +37,7 @@ policy rules version 1 {
   contingency emergency_land
 }
 
-mission m under rules@1 on quad {
+mission m under rules@1 on surveyor {
   proposed by operator x for role operator
   phase a { STEP }
 }

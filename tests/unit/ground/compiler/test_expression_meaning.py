@@ -53,7 +53,7 @@ signal satellites : count = GPS_RAW_INT.satellites_visible  stale after 2 s
 signal battery : ratio = BATTERY_STATUS.battery_remaining  stale after 5 s
 signal link.quality : ratio = RADIO_STATUS.txbuf  stale after 5 s
 signal wind.speed : speed = WIND_COV.wind_x, WIND_COV.wind_y  stale after 10 s
-signal obstacle.distance : length = DISTANCE_SENSOR.current_distance  stale after 2 s
+signal obstacle.distance : length = DISTANCE_SENSOR.current_distance where orientation = 0  stale after 2 s
 zone city = circle(47 N, 8 E, 5 m)
 zone school = circle(47 N, 8 E, 5 m)
 skill probe(

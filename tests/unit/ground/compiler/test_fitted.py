@@ -7,6 +7,7 @@ import pytest
 from rtshcua.decision.decide import decide
 from rtshcua.decision.links import link_admissible
 from rtshcua.decision.prepare import PreparedPolicy, prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
@@ -73,6 +74,34 @@ def test_a_clause_where_fitted_is_left_out_of_the_contract_and_kept_as_text() ->
     assert {name for name, _, _ in left} == {"watch", "goto", "return_home"}
     assert made.mission is not None
     assert all(watch == step.contract for step in made.mission.invocations if step.contract.name == "watch")
+
+
+RULES = {
+    "degrade": "degrade goto, watch when obstacle.distance < 2 m to return_home where fitted",
+    "forbid": "forbid goto by role operator when obstacle.distance < 2 m where fitted",
+    "confirm": "confirm goto when obstacle.distance < 2 m by role operator within 5 s where fitted",
+}
+
+
+@pytest.mark.parametrize("kind", RULES)
+def test_a_rule_where_fitted_is_left_out_and_kept_as_text(kind: str) -> None:
+    without, with_it = compiled(NO_EYES, rule=RULES[kind]), compiled(rule=RULES[kind])
+    assert without.policy is not None, without.diagnostics
+    assert with_it.policy is not None, with_it.diagnostics
+    (left_out,) = (each for each in without.policy.left_out if each.skill == -1)
+    assert (left_out.part, left_out.text) == (kind, RULES[kind])
+    assert len(with_it.policy.rules) == len(without.policy.rules) + 1
+    assert not any(each.skill == -1 for each in with_it.policy.left_out)
+    assert not isinstance(prepare(without.policy), Refusal)
+
+
+def test_a_permit_has_no_where_fitted() -> None:
+    """Left out it would permit less, and without its condition more: neither is what one reads."""
+    made = compiled(NO_EYES, rule="permit goto by role trainee when obstacle.distance > 2 m where fitted")
+    assert codes(made) == ["E0101"]
+    (found,) = compiled(NO_EYES, rule="permit goto by role trainee when obstacle.distance > 2 m").diagnostics
+    assert found.help is not None
+    assert found.help.startswith("leave the signal out of the rule")
 
 
 def test_where_the_sensor_is_fitted_the_clause_counts() -> None:

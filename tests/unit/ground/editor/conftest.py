@@ -58,7 +58,7 @@ policy lake version 1 {
 """
 MISSION = """import "lake.rts"
 
-mission dip(over: zone = pond, up: altitude in 10 m .. 30 m = 20 m) under lake@1 on quad {
+mission dip(over: zone = pond, up: altitude in 10 m .. 30 m = 20 m) under lake@1 on surveyor {
   proposed by agent openclaw for role operator
   phase departure { takeoff(altitude = up) }
   phase survey    { look(over.entry, height_above = up, manner = fast) { require battery > 40 % and sea.mood == calm } }

@@ -22,7 +22,7 @@ import "lib:skills/return_home.rts"
 import "lib:skills/emergency_land.rts"
 """
 CONTRACT = """class tactical deadline 5 s valid for 10 min lasts at most 1 min grace 1 s
-  require battery > 30 % assume wind.speed < 20 m/s fallback return_home, emergency_land energy at most 4 %
+  require battery > 30 % assume gps.accuracy < 20 m fallback return_home, emergency_land energy at most 4 %
 }
 """
 OWN = f"""skill up(high: altitude in 5 m .. 60 m, how: one of fast, slow = fast) {{
@@ -39,7 +39,7 @@ template low(top: altitude in 5 m .. 60 m) { permit up by role chief when high <
 """
 TESTS = """import "s.rts"
 nominal n { under p on quad by role operator through operator at "2026-06-01T10:00:00Z" phase flight
-  given battery = 80 %, gps.fix = fix_3d, position = 47.39774 N, 8.54559 E, height = 10 m, wind.speed = 1 m/s
+  given battery = 80 %, gps.fix = fix_3d, position = 47.39774 N, 8.54559 E, height = 10 m, gps.accuracy = 1 m
   given velocity.north = 0 m/s, velocity.east = 0 m/s, velocity.down = 0 m/s }
 test "up" { when up(30 m) expect deny at "permit up by role operator   when high <= 20 m" }
 test "fly" { when fly(47.39780 N, 8.5456 E, 40 m) expect deny at "permit fly by role operator when high <= ..." }

@@ -31,7 +31,7 @@ def mission(block: str) -> str:
         POLICY
         + f"""
 zone mine = circle(47.398 N, 8.546 E, 10 m)
-mission m under p@1 on quad {{
+mission m under p@1 on surveyor {{
   proposed by agent openclaw for role operator
   phase departure {{ takeoff(altitude = 10 m) }}
   phase inspection {{ hover(5 s) on inadmissible skip {block} }}
@@ -82,7 +82,7 @@ def test_the_policys_bytes_do_not_depend_on_the_mission(compile_text: Compile) -
     for block in ("", "{ maintain height <= 30 m }", "{ require battery > 50 % deadline 1 s }"):
         text = (
             'import "lib:policies/training_field.rts"\n'
-            "mission m under training_field@2 on quad {\n  proposed by agent openclaw for role operator\n"
+            "mission m under training_field@2 on surveyor {\n  proposed by agent openclaw for role operator\n"
             "  phase departure { takeoff(altitude = 10 m) }\n"
             f"  phase inspection {{ hover(5 s) {block} return_home() }}\n}}\n"
         )
@@ -95,7 +95,7 @@ def test_the_policys_bytes_do_not_depend_on_the_mission(compile_text: Compile) -
 def test_a_clause_says_where_it_stands_among_the_policys_files_and_then_the_missions(compile_text: Compile) -> None:
     text = (
         'import "lib:policies/training_field.rts"\n'
-        "mission m under training_field@2 on quad {\n  proposed by agent openclaw for role operator\n"
+        "mission m under training_field@2 on surveyor {\n  proposed by agent openclaw for role operator\n"
         "  phase departure { takeoff(altitude = 10 m) { maintain height <= 30 m }  return_home() }\n}\n"
     )
     compiled = compile_text(text)
@@ -168,7 +168,7 @@ def test_a_looser_override_shows_both_values_and_the_nearest_that_holds(check_te
 def test_a_zone_of_the_mission_alone_is_not_the_policys(compile_text: Compile) -> None:
     text = (
         'import "lib:policies/training_field.rts"\nzone mine = circle(47.398 N, 8.546 E, 10 m)\n'
-        "mission m under training_field@2 on quad {\n  proposed by agent openclaw for role operator\n"
+        "mission m under training_field@2 on surveyor {\n  proposed by agent openclaw for role operator\n"
         "  phase departure { takeoff(altitude = 10 m) { maintain position outside mine }  return_home() }\n}\n"
     )
     assert [each.code.id for each in compile_text(text).diagnostics] == ["E0207"]

@@ -95,11 +95,11 @@ def test_what_flies_instead_is_told_of_others_than_itself() -> None:
 
 
 def test_brackets_of_what_is_flown_instead_are_kept(everything: Handbook) -> None:
-    rule = "degrade goto when (battery < 40 % or wind.speed > 5 m/s) and height > 50 m to return_home"
+    rule = "degrade goto when (battery < 40 % or gps.accuracy > 5 m) and height > 50 m to return_home"
     made = chapter(f"permit goto by role operator\n{rule}")
     text = page(replace(everything, chapters=(made,)))
     section = unescape(text[text.index('id="p1-denied"') : text.index('id="p1-skills"')]).replace("\u00a0", " ")
-    words = "instead of goto, if (battery is below 40 % or wind.speed is above 5 m/s) and height is above 50 m."
+    words = "instead of goto, if (battery is below 40 % or gps.accuracy is above 5 m) and height is above 50 m."
     assert words in re.sub("<[^>]*>", "", section)
 
 

@@ -38,27 +38,30 @@ def test_policy(plain: Plain, unit: Read) -> None:
         "rules": [
             {
                 "kind": "permit",
+                "where_fitted": False,
                 "skills": ["a", "b"],
                 "roles": ["operator", "pilot"],
                 "through": ["agent", "operator"],
                 "when": less | {"right": (3_000, "length")},
             },
-            {"kind": "permit"},
-            {"kind": "forbid", "skills": ["c"], "through": ["agent"]},
+            {"kind": "permit", "where_fitted": False},
+            {"kind": "forbid", "where_fitted": False, "skills": ["c"], "through": ["agent"]},
             {
                 "kind": "confirm",
+                "where_fitted": False,
                 "skills": ["a"],
                 "when": less | {"right": (1_000, "length")},
                 "approver": "supervisor",
                 "within": (30_000_000, "duration"),
             },
-            {"kind": "confirm", "skills": ["b"], "approver": "supervisor"},
+            {"kind": "confirm", "where_fitted": False, "skills": ["b"], "approver": "supervisor"},
             {
                 "kind": "degrade",
+                "where_fitted": False,
                 "when": {"kind": "comparison", "operator": "<", "left": "&battery", "right": (2_500, "ratio")},
                 "target": {"skill": "hover", "limit": (5_000_000, "duration")},
             },
-            {"kind": "degrade", "skills": ["a"], "target": {"skill": "land"}},
+            {"kind": "degrade", "where_fitted": False, "skills": ["a"], "target": {"skill": "land"}},
         ],
         "airspace": {"inside": ["city", "field"], "outside": ["school"]},
         "contingency": [{"skill": "hover", "limit": (10_000_000, "duration")}, {"skill": "land"}],
@@ -90,6 +93,7 @@ def test_template(plain: Plain, unit: Read) -> None:
     assert [rule["kind"] for rule in first["rules"]] == ["permit", "forbid", "confirm", "degrade"]
     assert first["rules"][0] == {
         "kind": "permit",
+        "where_fitted": False,
         "skills": ["goto"],
         "roles": ["who"],
         "through": ["agent"],

@@ -15,6 +15,11 @@ def codes(rules: str, declarations: str = "") -> list[str]:
 # ---------------------------------------------------------------------------------------------------- E1306
 
 WORLD = """
+vehicle equipped {
+  identity "quad-08"  home 47.39774 N, 8.54559 E within 50 m  speed at most 12 m/s  climb at most 3 m/s
+  position error 3 m  energy 100 % = 18 min hover  brakes from 12 m/s in 6 s after 500 ms  return at 30 m  reserve 15 %
+  clock utc +02:00
+}
 zone wide = polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)
 zone world = circle(47.3977 N, 8.5456 E, 100 km) ceiling 2 km above home
 zone near = circle(47.3977 N, 8.5456 E, 12 km)

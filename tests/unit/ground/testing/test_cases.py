@@ -217,7 +217,7 @@ def test_the_shipped_tests_are_met(path: Path) -> None:
     loaded = load([str(path)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
     cases = suite(loaded, dialect.load())
     assert cases.diagnostics == ()
-    assert len(cases.cases) > 30
+    assert len(cases.cases) >= 4
     assert [run_case(case).finding for case in cases.cases if not run_case(case).met] == []
 
 

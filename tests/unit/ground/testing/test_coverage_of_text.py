@@ -35,7 +35,7 @@ policy own version 2 {
   contingency return_home, emergency_land
 }
 nominal day {
-  under own on quad by role operator through agent at "2026-06-01T10:00:00Z" phase flight
+  under own on surveyor by role operator through agent at "2026-06-01T10:00:00Z" phase flight
   given battery = 80 %, gps.fix = fix_3d, position = 47.39774 N, 8.54559 E, height = 10 m
   given wind.speed = 1 m/s, velocity.north = 0 m/s, velocity.east = 0 m/s, velocity.down = 0 m/s
 }

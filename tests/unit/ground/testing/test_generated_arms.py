@@ -15,6 +15,11 @@ import "lib:skills/hover.rts"
 import "lib:skills/goto.rts"
 import "lib:skills/return_home.rts"
 import "lib:skills/emergency_land.rts"
+vehicle equipped {
+  identity "quad-08"  home 47.39774 N, 8.54559 E within 50 m  speed at most 12 m/s  climb at most 3 m/s
+  position error 3 m  energy 100 % = 18 min hover  brakes from 12 m/s in 6 s after 500 ms  return at 30 m  reserve 15 %
+  clock utc +02:00
+}
 """
 #: a ring and a window in one arm, a grown zone in the other; bands for the vehicle; a rule on somebody else
 ARMS = """

@@ -1,0 +1,66 @@
+"""What ships flies on a stock copter: GPS, barometer and battery, and nothing else, booted as recorded."""
+
+from functools import cache
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from rtshcua.cli.sources import compile_sources
+from rtshcua.codec.frames import Codec
+from rtshcua.onboard.ports import Ending
+from rtshcua.simulation.config import STOCK, Boot, Kind
+from rtshcua.virtual.fitting import fitting
+from virtual import case
+from virtual.flight import Flight, Flown
+from virtual.shipped import NAMES, shipped
+
+STARTER = Path(__file__).resolve().parents[2] / "examples/starter/missions/first_look.rts"
+FLAVOURS = ("px4", "ardupilot")
+#: what no stock copter tells
+NEVER = frozenset({"RADIO_STATUS", "DISTANCE_SENSOR", "OBSTACLE_DISTANCE", "WIND_COV"})
+
+
+@cache
+def bundle(name: str) -> bytes:
+    if name != "starter":
+        return shipped(name)
+    compiled, _ = compile_sources([STARTER], mission=None, issued_at_us=case.flat.ISSUED)
+    assert compiled.policy is not None, compiled.diagnostics
+    assert compiled.mission is not None
+    return case.seal(compiled.mission, compiled.policy)
+
+
+def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
+    """A flight on the stock vehicle, and the names of all that it said."""
+    flight = Flight(
+        bundle(name), lambda policy: fitting(policy, flavour=Kind(flavour), extras=STOCK, boot=Boot.RECORDED),
+    )  # fmt: skip
+    said = set[str]()
+    codec = Codec(0, 0)
+
+    def listen(datagram: bytes) -> list[bytes]:
+        said.update(frame.name for frame in codec.parse(datagram))
+        return [datagram]
+
+    flight.vehicle.hurt = listen
+    return flight.fly(), said
+
+
+#: the long ones fly on one autopilot each in `make test`, on both in soak
+LONG = {("extended", "px4"), ("one_bridge", "ardupilot"), ("standard", "ardupilot")}
+
+
+@pytest.mark.parametrize(
+    ("name", "flavour"),
+    [
+        pytest.param(*each, marks=[pytest.mark.soak] if each in LONG else [])
+        for each in product(("starter", *NAMES), FLAVOURS)
+    ],
+)
+def test_what_ships_flies_on_a_stock_copter(name: str, flavour: str) -> None:
+    flight, said = flown(name, flavour)
+    assert flight.ending is Ending.COMPLETED, flight.decisions()
+    assert {outcome for _, outcome, _ in flight.decisions()} == {"allow"}
+    assert not said & NEVER
+    assert not flight.vehicle.simulation.truth().in_air

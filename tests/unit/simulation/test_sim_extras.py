@@ -1,0 +1,77 @@
+"""What is fitted beside GPS, barometer and battery, and what a stock vehicle does not tell."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtshcua.model.faults import Mode
+from rtshcua.simulation.config import EQUIPPED, STOCK, Extra
+from rtshcua.simulation.surroundings import Wind
+
+NOT_STOCK = {"RADIO_STATUS", "DISTANCE_SENSOR", "OBSTACLE_DISTANCE", "WIND_COV"}
+ASKED = (1, 132, 147, 168, 330)
+"""The streams that ArduCopter is asked for: SYS_STATUS, DISTANCE_SENSOR, BATTERY_STATUS, WIND, OBSTACLE_DISTANCE."""
+
+
+def ask(p: Any) -> Any:
+    for number in ASKED:
+        p.long(511, number, 200_000)
+    return p
+
+
+def names(p: Any) -> set[str]:
+    return {frame.name for frame in p.seen}
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_stock_vehicle_tells_none_of_it_in_a_flight_either(pilot: Callable[..., Any], flavour: str) -> None:
+    p = pilot(flavour, extras=STOCK, wind=Wind(5_000, 270))
+    p.take_off(5)
+    ask(p).wait(2)
+    assert not NOT_STOCK & names(p)
+    assert p.last("SYS_STATUS").voltage_battery == 65_535
+    assert p.last("BATTERY_STATUS").voltages[0] == 65_535
+    assert p.last("BATTERY_STATUS").battery_remaining > 90
+    if flavour == "ardupilot":
+        assert {(f.message.speed, f.message.direction) for f in p.seen if f.name == "WIND"} == {(0, -180)}
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_the_wind_is_known_in_the_air_and_what_is_told_after_it_is_old(pilot: Callable[..., Any], flavour: str) -> None:
+    """Seen on the real ones: PX4 sends no WIND_COV on the ground, ArduCopter goes on sending the last of the flight."""
+    p = pilot(flavour, wind=Wind(5_000, 270))
+    ask(p.ready()).wait(1)
+    name = "WIND_COV" if p.px4 else "WIND"
+    before = {(f.message.speed, f.message.direction) for f in p.seen if f.name == "WIND"}
+    assert before == (set() if p.px4 else {(0, -180)})
+    assert p.px4 != (name in names(p))
+    p.take_off(5)
+    p.wait(1)
+    told = p.last(name)
+    speed = (told.wind_x**2 + told.wind_y**2) ** 0.5 if p.px4 else told.speed
+    assert speed == pytest.approx(5, abs=0.1)
+    assert len({str(f.message) for f in p.seen if f.name == name}) > 4, "no estimate is twice the same"
+    p.mode(Mode.LAND)
+    p.until(lambda: not p.truth.in_air)
+    p.wait(1)
+    p.seen.clear()
+    p.wait(5)
+    after = {str(f.message) for f in p.seen if f.name == name}
+    assert len(after) == (0 if p.px4 else 1)
+
+
+def test_two_range_finders_tell_in_turn_where_they_look(pilot: Callable[..., Any]) -> None:
+    p = pilot("px4", extras=EQUIPPED | {Extra.ALTIMETER})
+    p.take_off(5)
+    p.seen.clear()
+    p.wait(2)
+    told = {(f.message.orientation, f.message.current_distance // 100) for f in p.seen if f.name == "DISTANCE_SENSOR"}
+    assert {orientation for orientation, _ in told} == {0, 25}
+    assert {distance for orientation, distance in told if orientation == 0} == {40}
+    assert all(3 <= distance <= 6 for orientation, distance in told if orientation == 25)
+
+
+def test_one_that_looks_down_is_all_that_there_may_be(pilot: Callable[..., Any]) -> None:
+    p = pilot("px4", extras=frozenset({Extra.ALTIMETER})).ready()
+    assert {f.message.orientation for f in p.seen if f.name == "DISTANCE_SENSOR"} == {25}

@@ -44,6 +44,8 @@ def test_a_pipe_is_refused_and_not_waited_for(commands: Forked, words: list[str]
     for name in ("pipe.rts", "pipe", "pipe.json"):
         os.mkfifo(tmp_path / name)
     (tmp_path / "imports.rts").write_text('import "pipe.rts"\n')
+    if words[0] == "approve":  # it asks for keys first
+        assert commands.run(["keys", "init"], tmp_path, PATIENCE_S).code == ExitCode.OK
     done = commands.run(words, tmp_path, PATIENCE_S)
     assert done.code == ExitCode.INPUT, done
     assert "no regular file" in done.out + done.err

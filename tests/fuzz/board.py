@@ -22,7 +22,7 @@ ROOT = TrustRoot(
     keys=(
         world.POLICY_KEY.verification(vehicles=(ANY,)),
         world.MISSION_KEY.verification(
-            roles=(ANY,), sources=("agent", "operator", "onboard", "reflex"), vehicles=(ANY,)
+            roles=(ANY,), sources=("agent", "operator", "onboard", "reflex"), vehicles=(ANY,), policies=(ANY,)
         ),
         world.LOG_KEY.verification(vehicles=(ANY,)),
         world.ROOT_KEY.verification(),

@@ -24,10 +24,10 @@ scenario "a dropout on the way" {
   expect never emergency_land
 }
 
-scenario "too much wind" {
+scenario "too little charge" {
   flies  short
   aboard ardupilot
-  after hover wind(speed = 14 m/s, from = 270 deg)
+  after hover battery(level = 25 %)
   expect ends completed
   expect fallback return_home
 }
@@ -51,11 +51,11 @@ def test_scenarios_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     code, out, err = run(capsys, "--coverage", "--junit", "report.xml", "-v")
     assert code == ExitCode.TESTS
     assert "  ok    a dropout on the way (1 flight)\n      1 completed\n" in out
-    assert "  FAIL  too much wind (1 of 1 flight)\n      1 aborted\n" in out
+    assert "  FAIL  too little charge (1 of 1 flight)\n      1 aborted\n" in out
     assert "2 scenarios, 2 flights: 1 failed\n" in out
     assert err.startswith("error[E1610]: on ardupilot with seed 1: ")
     assert "  = help: before it ended as `aborted`: " in err
-    assert "wind(speed = 14 m/s, from = 270 deg)" in err
+    assert "battery(level = 25 %)" in err
     assert "17 |   expect ends completed\n" in err.replace("\x1b", "")
     assert "coverage of training_field@2 on quad: " in out
     suite = ElementTree.parse("report.xml").getroot()

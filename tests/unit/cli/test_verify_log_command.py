@@ -18,6 +18,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.wire.keys import Duty
+from rtshcua.wire.names import LOG
 from virtual import case
 from virtual.rows import rows
 
@@ -148,7 +149,7 @@ def test_an_empty_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_later_format_is_not_trusted(run: Path) -> None:
-    rewrite(run, [edit(flight()[0], version=3), *flight()[1:]])
+    rewrite(run, [edit(flight()[0], version=LOG.version + 1), *flight()[1:]])
     assert verify(run) == ExitCode.UNTRUSTED
 
 

@@ -32,6 +32,7 @@ skill example() {
   lasts    at most 35 s
   grace    1 s
   require  CONDITION
+           where fitted
   fallback return_home, emergency_land
   energy   at most 4 %
   record   intent, decision, state, authorization, effect

@@ -37,7 +37,7 @@ def shown(desk: Desk, spans: list[Span] | tuple[Span, ...]) -> list[str]:
     ("file", "around", "where"),
     [
         (DIP, "under la|ke", ["lake.rts: policy lake version 1 {"[:34]]),
-        (DIP, "on qu|ad", ["site.rts: vehicle quad {"]),
+        (DIP, "on survey|or", ["site.rts: vehicle surveyor {"]),
         (DIP, "lo|ok(over", ["look.rts: skill look(target: posit"]),
         (DIP, "look(ov|er.entry", ["dip.rts: mission dip(over: zone ="]),
         (DIP, "height|_above = up", ["look.rts: skill look(target: posit"]),

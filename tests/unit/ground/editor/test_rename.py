@@ -40,7 +40,7 @@ def place(desk: Desk, file: str, around: str) -> int:
         (DIP, "mission dip(ov|er", "pond", "already a zone"),
         (LOOK, "one of slo|w", "fast", "already a choice"),
         (SITE, "{ ca|lm", "wild", "already a value"),
-        (DIP, "on qu|ad", "drone", "belongs to the library"),
+        (DIP, "on survey|or", "drone", "belongs to the library"),
         (DIP, "role oper|ator", "boss", "declared nowhere"),
         (DIP, "phase sur|vey", "look_around", "declared nowhere"),
         (DIP, "{ take|off(", "rise", "belongs to the library"),

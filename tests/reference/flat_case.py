@@ -370,5 +370,7 @@ def context(of: Invocation = INVOCATIONS[INSPECTION_STEP], **fields: object) -> 
     return replace(plain, **fields)
 
 
-def approval(granted: int, monotonic_us: int, role: int = SUPERVISOR, rule: int = CONFIRM_RULE) -> Approval:
-    return Approval(rule, role, granted, monotonic_us)
+def approval(
+    granted: int, monotonic_us: int, role: int = SUPERVISOR, rule: int = CONFIRM_RULE, person: int = 0
+) -> Approval:
+    return Approval(rule, role, granted, monotonic_us, person)

@@ -2,6 +2,7 @@
 in force.
 """
 
+from dataclasses import replace as with_fields
 from typing import Any
 
 import pytest
@@ -47,10 +48,15 @@ def later(us: int) -> Now:
     return Now(START.monotonic_us + us, START.utc_us + us, START.utc_error_us)
 
 
+def as_replacement(mission: Mission, kept: int = 2, supersedes: bytes = OF.bundle.mission_digest) -> Mission:
+    """The mission, bound as what replaces another one."""
+    return bind(mission, OF.bundle.policy_digest, after=cbor.encode([FLIGHT, supersedes, kept]))
+
+
 def forged(mission: Mission, kept: int = 2, supersedes: bytes | None = None, *, bound: bool = True) -> bytes:
     """A replacement that an honest compiler would not make, rightly signed."""
     over = OF.bundle.mission_digest if supersedes is None else supersedes
-    whole = bind(mission, OF.bundle.policy_digest, after=cbor.encode([FLIGHT, over, kept])) if bound else mission
+    whole = as_replacement(mission, kept, over) if bound else mission
     return sign_document(names.REPLACEMENT, ReplacementDocument(FLIGHT, over, kept, whole), MISSION_KEY, Duty.MISSION)
 
 
@@ -112,6 +118,10 @@ def test_an_approval_that_expired_may_be_given_again() -> None:
         ({"granted": 2}, "malformed"),
         ({"vehicle": "quad-08"}, "wrong-vehicle"),
         ({"role": "operator"}, "wrong-role"),
+        ({"flight": b""}, "other-flight"),
+        ({"flight": bytes([7]) * 16}, "other-flight"),
+        ({"mission": b""}, "other-mission"),
+        ({"mission": bytes(32)}, "other-mission"),
         ({"invocation_id": bytes(16)}, "unknown-invocation"),
         ({"binding": bytes(32)}, "binding-mismatch"),
         ({"issued_at_us": IN_DOUBT + 1}, "issued-in-future"),
@@ -152,6 +162,7 @@ def test_a_recall_of_all_under_the_policy_is_accepted() -> None:
         ({"mission": b""}, "malformed"),
         ({"policy": OF.bundle.policy_digest}, "malformed"),
         ({"vehicle": "quad-08"}, "wrong-vehicle"),
+        ({"flight": bytes([7]) * 16}, "other-flight"),
         ({"mission": bytes(32)}, "other-mission"),
         ({"flight": b"", "mission": b"", "policy": bytes(32)}, "other-policy"),
         (
@@ -263,6 +274,28 @@ def test_a_new_step_with_the_id_of_one_that_stays_is_refused() -> None:
     twin = replace(twin, binding=binding_of(bound, twin))
     document = forged(replace(bound, invocations=(first, second, twin)), bound=False)
     assert take(flight(), document).slug == "id-mismatch"
+
+
+def test_a_replacement_that_brings_back_an_id_seen_before_is_refused() -> None:
+    """Nobody can choose an id: so this flight's last step has, against all odds, the one that a new step will have."""
+    first, second = shorter(OF), replace(shorter(OF), issued_at_us=shorter(OF).issued_at_us + 1)
+    plain = flight()
+    assert take(plain, forged(first)).accepted
+    replaced = plain.bundle.mission_digest
+    *steps, last = OF.bundle.mission.invocations
+
+    def with_last(id_: bytes) -> InForce:
+        mission = replace(OF.bundle.mission, invocations=(*steps, replace(last, invocation_id=id_)))
+        return InForce(with_fields(OF.bundle, mission=mission), OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT)
+
+    of = with_last(as_replacement(first).invocations[2].invocation_id)
+    before = of.bundle
+    assert take(of, forged(first)).slug == "id-seen", "while that step is in force"
+    assert of.bundle is before
+    of = with_last(as_replacement(second, supersedes=replaced).invocations[2].invocation_id)
+    assert take(of, forged(first)).accepted
+    assert take(of, forged(second, supersedes=replaced)).slug == "id-seen", "after that step was replaced"
+    assert take(plain, forged(second, supersedes=replaced)).accepted, "where no step had it"
 
 
 def test_a_replacement_whose_kept_steps_differ_is_not_signed() -> None:

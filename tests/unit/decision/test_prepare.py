@@ -185,6 +185,11 @@ POLICIES: list[tuple[Policy, str]] = [
     (rule(skills=()), "rule 0: when: instruction 0: an argument is named, but no skill is"),
     (rule(kind=RuleKind.CONFIRM), "rule 0: there is no role -1"),
     (rule(kind=RuleKind.CONFIRM, approver=0), "rule 0: within 0 is not in 1.."),
+    (
+        rule(kind=RuleKind.CONFIRM, approver=0, second=2, within_us=1),
+        "rule 0: role of the second person 2 is not in -1..1",
+    ),
+    (rule(second=0), "rule 0: a rule that confirms nothing asks a second person"),
     (rule(kind=RuleKind.DEGRADE), "rule 0: degrade has no target"),
     (rule(kind=RuleKind.DEGRADE, target=flat.link(9)), "rule 0: target: there is no skill 9"),
     (replace(P, airspace=Airspace((6,), (), "", 0, 0, 1)), "airspace: there is no zone 6"),

@@ -225,6 +225,56 @@ def test_confirmation(approvals: Any, released: int, outcome: Outcome, reason: R
         assert (decision.clause, decision.step) == (flat.RULES[flat.CONFIRM_RULE], 3)
 
 
+ADA, BOB, EVE = range(3)  # people
+
+
+def says(person: int, at: int, role: int = SUPERVISOR, granted: int = 1) -> Any:
+    """A person's answer to the only `confirm` rule of a policy of two rules."""
+    return flat.approval(granted, at, role, rule=1, person=person)
+
+
+@rows(
+    ("second", "answers", "released", "outcome", "reason"),
+    [
+        (SUPERVISOR, [says(ADA, EARLY)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        (SUPERVISOR, [says(ADA, EARLY), says(BOB, AT)], RELEASED, ALLOW, Reason.ADMITTED),
+        (SUPERVISOR, [says(ADA, EARLY), says(ADA, AT)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        (SUPERVISOR, [says(ADA, EARLY), says(BOB, AT, OPERATOR)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        (OPERATOR, [says(ADA, EARLY), says(BOB, AT, OPERATOR)], RELEASED, ALLOW, Reason.ADMITTED),
+        (OPERATOR, [says(ADA, EARLY), says(ADA, AT, OPERATOR)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        (OPERATOR, [says(ADA, EARLY), says(BOB, AT)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        (OPERATOR, [says(BOB, EARLY, OPERATOR)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        (OPERATOR, [says(ADA, AT, OPERATOR), says(BOB, AT, OPERATOR)], RELEASED, DEFER, Reason.AWAITING_APPROVAL),
+        # either of them refuses for both
+        (SUPERVISOR, [says(ADA, EARLY), says(BOB, AT, granted=0)], RELEASED, DENY, Reason.APPROVAL_REFUSED),
+        (OPERATOR, [says(ADA, EARLY), says(BOB, AT, OPERATOR, 0)], RELEASED, DENY, Reason.APPROVAL_REFUSED),
+        (OPERATOR, [says(ADA, EARLY, granted=0), says(BOB, AT, OPERATOR)], RELEASED, DENY, Reason.APPROVAL_REFUSED),
+        # both must come in time
+        (SUPERVISOR, [says(ADA, AT - S), says(BOB, AT)], AT - 30 * S, ALLOW, Reason.ADMITTED),
+        (SUPERVISOR, [says(ADA, AT - S), says(BOB, AT)], AT - 30 * S - 1, DENY, Reason.APPROVAL_TIMED_OUT),
+        # the later of the two moves the release, and a third person does not
+        (SUPERVISOR, [says(ADA, AT - 4 * S), says(BOB, AT - 3 * S)], AT - 20 * S, FALLBACK, Reason.NO_SLACK),
+        (SUPERVISOR, [says(ADA, AT - 3 * S), says(BOB, AT)], AT - 20 * S, ALLOW, Reason.ADMITTED),
+        (OPERATOR, [says(ADA, AT - 3 * S), says(BOB, AT, OPERATOR)], AT - 20 * S, ALLOW, Reason.ADMITTED),
+        (OPERATOR, [says(ADA, AT), says(BOB, AT - 3 * S, OPERATOR)], AT - 20 * S, ALLOW, Reason.ADMITTED),
+        (
+            SUPERVISOR,
+            [says(ADA, AT - 4 * S), says(BOB, AT - 3 * S), says(EVE, AT)],
+            AT - 20 * S,
+            FALLBACK,
+            Reason.NO_SLACK,
+        ),
+    ],
+)
+def test_a_rule_that_asks_two_people_is_answered_by_two_in_whatever_order(
+    second: int, answers: list[Any], released: int, outcome: Outcome, reason: Reason
+) -> None:
+    policy = with_rules(rule(PERMIT), rule(CONFIRM, approver=SUPERVISOR, second=second, within_us=30 * S))
+    for ordered in (answers, answers[::-1]):
+        decision = ask(policy=policy, approvals=tuple(ordered), released_us=released)
+        assert (decision.outcome, decision.reason) == (outcome, reason)
+
+
 def test_an_approval_moves_the_deadline() -> None:
     late = {"released_us": AT - 20 * S, "approvals": (flat.approval(1, AT - S),)}
     assert low(ages=dict.fromkeys(range(flat.SLOTS), 0), **late).valid_until_us == AT + S // 2

@@ -140,6 +140,46 @@ def test_a_root_that_contradicts_itself_is_neither_signed_nor_opened(fields, slu
     assert opening(envelope(root.encode())) == slug
 
 
+def approving(number=6, **fields):
+    """An approval key, of Ada as supervisor if nothing else is said."""
+    usual = {"roles": ("supervisor",), "sources": ("operator",), "vehicles": ("quad-07",), "person": "ada"}
+    return signing_key(number, Duty.APPROVAL).verification(**(usual | fields))
+
+
+@rows(
+    ("key", "slug"),
+    [
+        (signing_key(6, Duty.LOG).verification(person="ada"), "malformed"),
+        (signing_key(6, Duty.MISSION).verification(policies=("field",), person="ada"), "malformed"),
+        (signing_key(6, Duty.POLICY).verification(policies=("field",)), "malformed"),
+        (approving(policies=("field",)), "malformed"),
+        (approving(person=""), "whose-approval"),
+        (approving(person="Ada"), "whose-approval"),
+        (approving(person="ad a"), "whose-approval"),
+        (approving(person="-ada"), "whose-approval"),
+        (approving(person="\u0430da"), "whose-approval"),  # a Cyrillic letter
+        (approving(person="a" * 65), "whose-approval"),
+        (approving(roles=()), "whose-approval"),
+        (approving(roles=(ANY,)), "whose-approval"),
+        (approving(roles=("supervisor", "operator")), "whose-approval"),
+        (approving(sources=()), "whose-approval"),
+        (approving(sources=("agent",)), "whose-approval"),
+        (approving(sources=("agent", "operator")), "whose-approval"),
+    ],
+)
+def test_only_approval_keys_are_of_a_person_and_only_mission_keys_for_policies(key, slug):
+    root = changed(keys=(*KEYS, key))
+    assert refusal(root.sign, ROOT) == slug
+    assert opening(envelope(root.encode())) == slug
+
+
+def test_all_approval_keys_of_a_person_are_of_that_person():
+    ada, again, other = approving(), approving(7, roles=("operator",)), approving(8, person="0.b_-" + "b" * 59)
+    root = changed(keys=(*KEYS, ada, other, again))
+    assert open_root(root.sign(ROOT), pinned=ROOT.public, now_us=200) == root
+    assert root.person(ada) == root.person(again) != root.person(other)
+
+
 WITNESSES = tuple(signing_key(20 + number, Duty.WITNESS) for number in range(2))
 
 

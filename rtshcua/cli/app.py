@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any, cast
 
 from rtshcua import __version__
-from rtshcua.cli.faults import as_json, barrier, fail, say
+from rtshcua.cli.faults import as_json, barrier, fail, say, say_lines
 from rtshcua.cli.streams import mend_streams
 from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.diagnostics.exits import ExitCode
@@ -112,7 +112,7 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
         return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, f"`{path} --help` explains it")
     code = fail(ExitCode.USAGE, words)
     if context is not None:
-        say(f"usage: {context.get_usage().removeprefix('Usage: ')}")
+        say_lines(f"usage: {context.get_usage().removeprefix('Usage: ')}")
     say(f" help: `{path} --help` explains it")
     return code
 

@@ -10,6 +10,7 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
 from rtshcua.cli.faults import fail, refuse, untrusted
+from rtshcua.cli.showing import words
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Invocation
@@ -49,6 +50,8 @@ def approve(
 ) -> ExitCode:  # fmt: skip
     """Answer the `confirm` rules that ask you about one step of one mission: yes, or no.
 
+    What you answer is told from the step's skill and arguments, each zone with its size and its way from home.
+
     The bundle is verified first, so that you sign what it says. The answer is good for that step of that mission alone,
     on its vehicle, and for a bounded time; a step that flies already is not recalled by it.
     """
@@ -84,7 +87,8 @@ def approve(
         document = sign_approval(said, key)
     except Untrusted as error:
         return refuse(untrusted(error))
-    what = f"{'refused' if refused else 'approved'} as {role} for {seconds} s: step {step}, `{steps[step].text}`"
+    told = words.step(flying.policy, steps[step])
+    what = f"{'refused' if refused else 'approved'} as {role} for {seconds} s: step {step}, `{told}`"
     return deliver(document, what, to=to, output=output, as_json=as_json)
 
 

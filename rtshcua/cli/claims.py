@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from textwrap import wrap
 
-from rtshcua.cli.shown import plain
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.evidence.finding import Claim
 
 #: characters in a line
@@ -18,7 +18,7 @@ def listed(title: str, style: str, mark: str, claims: Sequence[Claim]) -> list[t
         return []
     lines = [("", ""), ("bold", title)]
     for claim in claims:
-        head, *more = wrap(plain(claim.text), WIDTH)
+        head, *more = wrap(visible(claim.text), WIDTH)
         lines += [(style, f"  {mark} {head}"), *((style, f"    {line}") for line in more)]
     return lines
 

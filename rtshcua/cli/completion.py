@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.cli.faults import say
+from rtshcua.cli.faults import say, say_lines
 from rtshcua.diagnostics.exits import ExitCode
 
 app = typer.Typer(add_completion=False)
@@ -47,5 +47,5 @@ def completion(shell: Annotated[Shell, typer.Argument(help="which shell the scri
     if sys.stdout.isatty():
         say(f"to install it: rtshcua completion {shell.value} > {PLACES[shell]}")
         if shell is Shell.ZSH:
-            say(_ZSH)
+            say_lines(_ZSH)
     return ExitCode.OK

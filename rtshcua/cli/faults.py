@@ -61,17 +61,17 @@ def fail(code: ExitCode, message: str, help: str | None = None, *, slug: str | N
 
 def misaddressed(option: str, error: "AddressError") -> ExitCode:
     """Fails for an option's address: what is wrong, the address with that part marked below, and what is accepted."""
-    from rtshcua.diagnostics.excerpt import visible  # the door opens without it
+    from rtshcua.diagnostics.excerpt import visible
 
     span: dict[str, str | int] = {"option": option, "value": error.address, "start": error.start, "end": error.end}
     if _json.get():
         _print_object(ExitCode.USAGE, ExitCode.USAGE.slug, error.text, error.help, at=span)
-    say(f"error: {visible(error.text)}")
+    say(f"error: {error.text}")
     say(f"   --> {option}")
-    say(f"    | {visible(error.address)}")
+    say(f"    | {error.address}")
     width = len(visible(error.address[: error.start]))
     say(f"    | {' ' * width}{'^' * max(1, len(visible(error.address[error.start : error.end])))}")
-    say(f" help: {visible(error.help)}")
+    say(f" help: {error.help}")
     return ExitCode.USAGE
 
 
@@ -116,7 +116,26 @@ def _print_object(
 
 
 def say(line: str) -> None:
-    """Prints one line on the standard error; when even that is gone there is nobody left to tell."""
+    """Prints one line on the standard error, harmless whatever is in it; when even that is gone there is nobody left
+    to tell.
+    """
+    from rtshcua.diagnostics.excerpt import visible  # the door opens without it
+
+    _say(visible(line))
+
+
+def say_lines(text: str) -> None:
+    """`say` for each line of a text of our own making."""
+    for line in text.split("\n"):
+        say(line)
+
+
+def say_rendered(text: str) -> None:
+    """Prints on the standard error what is harmless already, and may be coloured by us."""
+    _say(text)
+
+
+def _say(line: str) -> None:
     if sys.stderr is None:
         return  # `print` would take the standard output for it
     try:
@@ -158,7 +177,7 @@ def _fault(error: Exception) -> ExitCode:
     if os.environ.get("RTSHCUA_DEBUG") == "1":
         import traceback
 
-        say("".join(traceback.format_exception(error)).rstrip())
+        say_lines("".join(traceback.format_exception(error)).rstrip())
         return fail(ExitCode.FAULT, message)
     return fail(ExitCode.FAULT, message, "RTSHCUA_DEBUG=1 shows where it happened")
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rtshcua.cli.faults import code_of, fail, say
+from rtshcua.cli.faults import code_of, fail, say, say_rendered
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -36,7 +36,7 @@ class Findings:
             self._object = as_json(found, sources)
         elif found:
             text = render(most_severe(found), sources)
-            say((_coloured(text) if _wants_colour() else text).rstrip("\n"))
+            say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say(_count(found))
             if len(found) > MOST_SHOWN:
                 say(f"{len(found) - MOST_SHOWN:,} of them are not shown, the least severe: `--json` has all")

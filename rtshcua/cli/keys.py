@@ -18,8 +18,9 @@ from rtshcua.adapters.files.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
 from rtshcua.adapters.files.signing import fingerprint, write_link_key
 from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.showing.keys import as_object, speaks
-from rtshcua.cli.shown import plain, utc
+from rtshcua.cli.shown import utc
 from rtshcua.cli.unlock import read_passphrase, unlock
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
@@ -124,7 +125,7 @@ def approver(
     over, and keep it nowhere else. Who pinned the root key trusts the new root too.
     """
     if not _ROLE.fullmatch(role):
-        return fail(ExitCode.USAGE, f"`{plain(role)}` is no role", "accepted: a name, as policies write it")
+        return fail(ExitCode.USAGE, f"`{visible(role)}` is no role", "accepted: a name, as policies write it")
     return _added(
         Duty.APPROVAL,
         lambda key: key.verification(roles=(role,), sources=(HUMAN,), vehicles=tuple(vehicle or (ANY,)), person=name),

@@ -4,7 +4,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
-from rtshcua.cli.shown import plain, shorten
+from rtshcua.cli.shown import shorten
+from rtshcua.diagnostics.excerpt import visible
 
 T = TypeVar("T", bound=tuple[object, ...])
 
@@ -19,7 +20,7 @@ def watched(items: Sequence[T]) -> Iterator[T]:
     try:
         for number, item in enumerate(items, 1):
             if shows:
-                sys.stderr.write(f"{_CLEAR}{number}/{len(items)} {shorten(plain(str(item[0])), 60)}")
+                sys.stderr.write(f"{_CLEAR}{number}/{len(items)} {shorten(visible(str(item[0])), 60)}")
                 sys.stderr.flush()
             yield item
     finally:

@@ -7,7 +7,8 @@ import msgspec
 
 from rtshcua.cli.claims import WIDTH, listed, write
 from rtshcua.cli.pin import Pin
-from rtshcua.cli.shown import many, plain, shorten, utc
+from rtshcua.cli.shown import many, shorten, utc
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Claim, Flaw
 from rtshcua.evidence.proofs.check import Proven
@@ -58,9 +59,9 @@ def as_text(result: Told, path: Path, pinned: Pin, *, kept: bool, first: bool) -
     """The whole, for a person."""
     lines: list[tuple[str, str]] = [] if first else [("", "")]
     if isinstance(result, Flaw):
-        lines += [("bold red", f"REFUSED  {plain(str(path))}"), ("", f"  {plain(result.text)}")]
+        lines += [("bold red", f"REFUSED  {visible(str(path))}"), ("", f"  {visible(result.text)}")]
         lines += [
-            ("", f"  {word}  {shorten(plain(text), _SHOWN)}")
+            ("", f"  {word}  {shorten(visible(text), _SHOWN)}")
             for word, text in (("found   ", result.found), ("expected", result.expected))
             if text
         ]
@@ -69,9 +70,9 @@ def as_text(result: Told, path: Path, pinned: Pin, *, kept: bool, first: bool) -
     else:
         name = _name(result)
         lines += [
-            ("bold green", f"PROVEN  {plain(str(path))}"),
-            ("", f"  vehicle  {plain(name.vehicle)}, boot {name.boot}"),
-            ("", f"  pinned   {plain(pinned.source)}"),
+            ("bold green", f"PROVEN  {visible(str(path))}"),
+            ("", f"  vehicle  {visible(name.vehicle)}, boot {name.boot}"),
+            ("", f"  pinned   {visible(pinned.source)}"),
         ]
         lines += _fields(result)
         proven, unproven = claims(result)
@@ -145,6 +146,6 @@ def _fields(result: Proven | Received) -> list[tuple[str, str]]:
     lines = []
     for key, value in (record or {}).items():
         text = value if isinstance(value, str) else msgspec.json.encode(value).decode()
-        shown = utc(value) if key == "utc_us" and isinstance(value, int) else shorten(plain(text), WIDTH)
+        shown = utc(value) if key == "utc_us" and isinstance(value, int) else shorten(visible(text), WIDTH)
         lines.append(("", f"  {key:<16} {shown}"))
     return [("", ""), ("bold", f"Record {result.number}"), *lines] if lines else []

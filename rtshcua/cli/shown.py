@@ -1,4 +1,4 @@
-"""How commands show times, and text that came from elsewhere, to a person."""
+"""How commands show times and counts to a person."""
 
 from datetime import UTC, datetime
 
@@ -19,11 +19,6 @@ def true_to(error_us: int) -> str:
     if error_us >= UTC_UNKNOWN_US:
         return "and nothing tells how far that is off"
     return f"true to {error_us / 1_000:g} ms" if error_us < 1_000_000 else f"true to {error_us / 1_000_000:g} s"
-
-
-def plain(text: str) -> str:
-    """Text from elsewhere without what could move a terminal's cursor, colour it, or pretend to be another line."""
-    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 
 def many(count: int, what: str) -> str:

@@ -7,7 +7,8 @@ from textwrap import wrap
 from rtshcua.cli.claims import WIDTH, listed, write
 from rtshcua.cli.flown import lasted_us
 from rtshcua.cli.pin import Pin
-from rtshcua.cli.shown import plain, shorten, utc
+from rtshcua.cli.shown import shorten, utc
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import Report, Verdict, cosigned
@@ -102,8 +103,8 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     """Prints the whole for a person."""
     report = audit.report
     lines: list[tuple[str, str]] = [] if first else [("", "")]
-    lines += [("", f"log     {plain(str(path))}"), *_flight(report, path)]
-    lines += [("", f"pinned  {plain(pinned.source)}"), ("", "")]
+    lines += [("", f"log     {visible(str(path))}"), *_flight(report, path)]
+    lines += [("", f"pinned  {visible(pinned.source)}"), ("", "")]
     title, style = _TITLES[report.verdict]
     finding = report.failure or report.shortfall
     if finding is None:
@@ -121,20 +122,20 @@ def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
     if genesis is None:
         return []
     seconds = lasted_us(report, path) / 1_000_000
-    ending = f", {plain(close.ending)}" if close is not None else ""
-    what = f"`{plain(genesis.mission)}` on `{plain(genesis.vehicle)}`, {utc(genesis.utc_us)}, {seconds:.1f} s"
-    return [("", f"flight  {what}, mode {plain(genesis.mode)}{ending}")]
+    ending = f", {visible(close.ending)}" if close is not None else ""
+    what = f"`{visible(genesis.mission)}` on `{visible(genesis.vehicle)}`, {utc(genesis.utc_us)}, {seconds:.1f} s"
+    return [("", f"flight  {what}, mode {visible(genesis.mode)}{ending}")]
 
 
 def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
     kind = finding.slug.partition("/")[0]
-    yield from (("", f"  {line}") for line in wrap(plain(finding.text), WIDTH))
+    yield from (("", f"  {line}") for line in wrap(visible(finding.text), WIDTH))
     if finding.offset >= 0:
         yield "", f"  begins    at byte {finding.offset} of the log"
     if finding.expected:
-        yield "", f"  expected  {shorten(plain(finding.expected), _SHOWN)}"
+        yield "", f"  expected  {shorten(visible(finding.expected), _SHOWN)}"
     if finding.found:
-        yield "", f"  found     {shorten(plain(finding.found), _SHOWN)}"
+        yield "", f"  found     {shorten(visible(finding.found), _SHOWN)}"
     meaning = (MEANINGS if failed else _SHORT)[kind]
     yield from (("", f"  {line}") for line in wrap(meaning, WIDTH))
     if finding.slug in _HELPS:

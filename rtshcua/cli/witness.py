@@ -20,6 +20,7 @@ from rtshcua.cli.faults import distrust, exit_code_of, fail, misaddressed, refus
 from rtshcua.cli.interrupts import terminated_as_interrupted
 from rtshcua.cli.shown import many
 from rtshcua.cli.unlock import unlock
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
 from rtshcua.wire import cose
@@ -188,7 +189,7 @@ class _Desk:
         proof = self._witness.store.contradicted(request.note) if found.contradiction else None
         if found.contradiction or found.size == 0:  # else it asks where we stand, as whoever was away does
             slug = f"witness/{found.status}"
-            self._refused("origin", _plain(origin), slug, _plain(found.text), found.contradiction, proof)
+            self._refused("origin", visible(origin[:200]), slug, visible(found.text[:200]), found.contradiction, proof)
         return found
 
     def _refused(self, what: str, name: str, slug: str, text: str, contradiction: bool, proof: Path | None) -> None:
@@ -209,11 +210,6 @@ def _saying(*, as_json: bool) -> Say:
         print(json.dumps(said, ensure_ascii=False) if as_json else words, flush=True)
 
     return say
-
-
-def _plain(text: str) -> str:
-    """A name that a stranger gave, fit for a terminal."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text[:200])
 
 
 def _now_us() -> int:

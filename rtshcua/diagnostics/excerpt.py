@@ -1,6 +1,7 @@
 """One line of a source as a terminal shows it, with parts of it underlined."""
 
 from collections.abc import Sequence
+from re import compile as pattern
 from unicodedata import category, east_asian_width
 
 from rtshcua.diagnostics.span import Source, Span
@@ -13,6 +14,11 @@ BEFORE = 30
 #: of a long line no more characters than these on either side of what is underlined are looked at
 NEAR = 300
 CUT = "..."
+
+#: letters and marks that Unicode counts as printable and shows as nothing (Default_Ignorable_Code_Point, and the blanks
+#: of Hangul and Braille): words can be kept apart by them, or be written in them
+_BLANK = "\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180d\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef"
+_BLANKS = pattern(f"[{_BLANK}]")
 
 #: a span to underline, with which character, and the words after it
 Mark = tuple[Span, str, str]
@@ -100,7 +106,9 @@ def _cell(character: str) -> tuple[str, int]:
 
 
 def visible(text: str) -> str:
-    """The text with every character that a terminal would obey, or that hides others, written as `<U+202E>`."""
-    if text.isprintable():
+    """The text on one line, with every character that a terminal would obey, or that hides others, written as
+    `<U+202E>`: all that comes from outside passes this before a person sees it.
+    """
+    if text.isprintable() and (text.isascii() or _BLANKS.search(text) is None):
         return text
-    return "".join(each if each.isprintable() or each == " " else f"<U+{ord(each):04X}>" for each in text)
+    return "".join(each if each.isprintable() and not _BLANKS.match(each) else f"<U+{ord(each):04X}>" for each in text)

@@ -8,7 +8,7 @@ import pytest
 
 from reference.forgery import LOG_KEY, ROOT_KEY, edit, expect, flight, read, rewritten
 from reference.seeds import epoch_seeds
-from rtshcua.cli.shown import plain
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.records import LARGEST
 from rtshcua.ground.auditor.audit import Auditor
@@ -74,6 +74,6 @@ def test_memory_does_not_grow_with_the_log(few: int, many: int) -> None:
 
 
 def test_a_hostile_text_does_not_reach_the_terminal() -> None:
-    shown = plain("\x1b[2J\x1b]0;owned\x07\rVERIFIED\u202eDEIFIREV\n")
+    shown = visible("\x1b[2J\x1b]0;owned\x07\rVERIFIED\u202eDEIFIREV\n")
     assert shown.isprintable()
-    assert "\\x1b[2J" in shown
+    assert "<U+001B>[2J" in shown

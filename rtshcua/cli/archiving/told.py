@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 from rtshcua.cli.outcome import exit_code_of
-from rtshcua.cli.shown import plain, shorten, utc
+from rtshcua.cli.shown import shorten, utc
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 
 _TIMES = frozenset(
@@ -51,8 +52,8 @@ def _cell(name: str, value: object) -> str:
     if name in _TIMES and isinstance(value, int):
         return utc(value)
     if name in _NAMES and isinstance(value, str):
-        return plain(value)[:_NAME_SHOWN]
-    text = plain(str(value))
+        return visible(value)[:_NAME_SHOWN]
+    text = visible(str(value))
     return text if name in _WHOLE else shorten(text, _CELL)
 
 

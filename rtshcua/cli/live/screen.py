@@ -14,7 +14,8 @@ from rich.text import Text
 from rtshcua.cli.live.board import Board, line
 from rtshcua.cli.live.chart import chart
 from rtshcua.cli.live.lines import ending
-from rtshcua.cli.live.story import Message, duration, printable
+from rtshcua.cli.live.story import Message, duration
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.onboard.runtime.view import Stage
 
 _FRAME_S = 0.125
@@ -66,17 +67,17 @@ def picture(board: Board) -> RenderableType:
     """The whole view."""
     plan, view = board.plan, board.view
     if plan is None:
-        return Text(board.note or "starting", style="dim")
+        return Text(visible(board.note or "starting"), style="dim")
     head = f"{plan.mission} under {plan.policy} on {plan.vehicle}"
     middle = Table.grid(padding=(0, 3))
     middle.add_row(_steps(board), Group(_signals(board), Text("\n".join(_map(board)), style="cyan")))
-    intent = Text(printable(plan.intent), style="italic")
+    intent = Text(visible(plan.intent), style="italic")
     parts: list[RenderableType] = [intent, Text(), middle, _contract(board), Text(), _latest(board)]
     if board.note:
-        parts.append(Text(printable(board.note), style="yellow"))
+        parts.append(Text(visible(board.note), style="yellow"))
     stage = view.stage if view is not None else "waiting"
     speed = "" if plan.speed == 1 else f", {plan.speed:g} times as fast as life"
-    return Panel(Group(*parts), title=printable(head), subtitle=f"{stage}, mode {plan.mode}{speed}", title_align="left")
+    return Panel(Group(*parts), title=visible(head), subtitle=f"{stage}, mode {plan.mode}{speed}", title_align="left")
 
 
 def _steps(board: Board) -> RenderableType:
@@ -87,9 +88,9 @@ def _steps(board: Board) -> RenderableType:
         if step.phase != phase:
             phase = step.phase
             here = board.view is not None and board.view.phase == board.plan.phases[phase]
-            table.add_row("", Text(f"phase {board.plan.phases[phase]}", style="bold" if here else "dim"))
+            table.add_row("", Text(visible(f"phase {board.plan.phases[phase]}"), style="bold" if here else "dim"))
         mark, style = _MARKS[board.steps.get(number, "")]
-        table.add_row(Text(mark, style=style), Text(printable(step.text), style=style))
+        table.add_row(Text(mark, style=style), Text(visible(step.text), style=style))
     return table
 
 
@@ -99,7 +100,11 @@ def _signals(board: Board) -> RenderableType:
         unknown = None in reading.values
         style = "red" if reading.stale or unknown else ""
         age = "never" if unknown else f"{reading.age_us / 1_000_000:.1f} s old{', stale' if reading.stale else ''}"
-        table.add_row(reading.name, Text(board.value(reading), style=style), Text(age, style=style or "dim green"))
+        table.add_row(
+            Text(visible(reading.name)),
+            Text(visible(board.value(reading)), style=style),
+            Text(age, style=style or "dim green"),
+        )
     return table
 
 
@@ -108,7 +113,7 @@ def _contract(board: Board) -> RenderableType:
     view = board.view
     if view is None or not view.contract:
         return Text()
-    text = Text("\ncontract ").append(printable(view.contract), style="bold")
+    text = Text("\ncontract ").append(visible(view.contract), style="bold")
     if view.left_us is None or not board.longest_us:
         return text
     filled = max(0, min(_BAR, _BAR * view.left_us // board.longest_us))

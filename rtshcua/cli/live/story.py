@@ -96,11 +96,6 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
 Message = Plan | Snapshot | Happened | Note | Summary
 
 
-def printable(text: str) -> str:
-    """Text of the world's own making, without what a terminal would obey."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
-
-
 def duration(us: int) -> str:
     """A time as a person reads it: `4 min 12 s`."""
     minutes, seconds = divmod(us // 1_000_000, 60)

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable
 from textwrap import wrap
 
-from rtshcua.cli.shown import plain
+from rtshcua.diagnostics.excerpt import visible
 
 _WIDTH = 110
 _NAME = 12
@@ -22,13 +22,13 @@ class Page:
         """A heading, after an empty line unless it is the first."""
         if self._lines:
             self._lines.append("")
-        text = plain(title)
+        text = visible(title)
         self._lines.append(f"\033[1m{text}\033[0m" if self._bold else text)
 
     def row(self, name: str, value: str, *, indent: int = 2, width: int = _NAME) -> None:
         """A name and its value, wrapped beneath itself."""
-        start = " " * indent + f"{plain(name):<{width}}  "
-        head, *more = wrap(plain(value), max(_WIDTH - len(start), 40), break_on_hyphens=False) or [""]
+        start = " " * indent + f"{visible(name):<{width}}  "
+        head, *more = wrap(visible(value), max(_WIDTH - len(start), 40), break_on_hyphens=False) or [""]
         self._lines.append((start + head).rstrip())
         self._lines += [" " * len(start) + line for line in more]
 
@@ -40,7 +40,7 @@ class Page:
 
     def text(self, line: str, *, indent: int = 2) -> None:
         """A line as it is, not wrapped."""
-        self._lines.append(" " * indent + plain(line))
+        self._lines.append(" " * indent + visible(line))
 
     def __str__(self) -> str:
         return "\n".join(self._lines)

@@ -1,10 +1,11 @@
 """Canonical integers in the words of the language."""
 
 from collections.abc import Sequence
+from math import atan2, degrees, isqrt
 
 from rtshcua.decision.outline import rings as outline
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
-from rtshcua.model.flat.mission import Plan
+from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, Zone, unproject
 from rtshcua.model.quantity import Dimension, display
@@ -64,6 +65,45 @@ def place(policy: Policy, x: int, y: int) -> str:
 def arguments(policy: Policy, parameters: Sequence[Parameter], cells: Sequence[int]) -> str:
     """Every argument by name, those that the compiler filled in too."""
     return ", ".join(f"{parameter.name} = {_argument(policy, parameter, cells)}" for parameter in parameters)
+
+
+def step(policy: Policy, one: Invocation) -> str:
+    """A step as its skill and arguments are bound, in nobody's words but ours and the policy's; zones by name, size and
+    way from home, places by their way from home.
+    """
+    contract = policy.contracts[one.skill]
+    told = []
+    for each in contract.parameters:
+        where = _where(policy, each, one.arguments)
+        told.append(f"{each.name} = {_argument(policy, each, one.arguments)}{f' [{where}]' if where else ''}")
+    return f"{contract.name}({', '.join(told)})"
+
+
+def _where(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
+    value = cells[parameter.cell]
+    if parameter.kind == PLACE:
+        return _from_home(value, cells[parameter.cell + 1])
+    if parameter.kind != ZONE or not parameter.low <= value <= parameter.high:
+        return ""
+    one = policy.zones[value]
+    if one.shape == CIRCLE:
+        x, y, squared = one.data
+        return f"radius {_metres(isqrt(squared))}, its middle {_from_home(x, y)}"
+    corners = [corner for ring in outline(one) for corner in ring]
+    (west, east), (south, north) = ((min(each), max(each)) for each in zip(*corners, strict=True))
+    size = f"{_metres(east - west)} from west to east by {_metres(north - south)}"
+    return f"{size}, its middle {_from_home((west + east) // 2, (south + north) // 2)}"
+
+
+def _metres(mm: int) -> str:
+    """A length as a person compares it: to 0.1 m."""
+    return f"{mm / 1000:.1f} m"
+
+
+def _from_home(x: int, y: int) -> str:
+    """The way from the declared home to a place in local mm; the bearing in degrees from true north, clockwise."""
+    far = isqrt(x * x + y * y)
+    return f"{_metres(far)} from home, bearing {round(degrees(atan2(x, y))) % 360}°" if far else "at home"
 
 
 def _argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:

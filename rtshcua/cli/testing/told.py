@@ -5,7 +5,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from rtshcua.cli.shown import many, plain, shorten
+from rtshcua.cli.shown import many, shorten
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.testing.coverage.coverage import share
 from rtshcua.ground.testing.coverage.tally import Covered
@@ -29,21 +30,21 @@ class Told:
     def tests(self, ran: Sequence[Ran], *, verbose: bool) -> Iterator[str]:
         """A line a test, below its file; with `verbose` also one for each row."""
         for file, of_file in groupby(ran, lambda each: each.case.span.file):
-            yield self._painted(plain(file), _BOLD)
+            yield self._painted(visible(file), _BOLD)
             for _, group in groupby(of_file, lambda each: each.case.test.span):
                 cases = list(group)
                 yield self._line(cases)
                 if verbose and cases[0].case.row is not None:
-                    yield from (f"      {self._word(each.met)}  {plain(_row(each))}" for each in cases)
+                    yield from (f"      {self._word(each.met)}  {visible(_row(each))}" for each in cases)
 
     def scenarios(self, flown: Sequence[Flown], *, verbose: bool) -> Iterator[str]:
         """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
         for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
-            yield self._painted(plain(file), _BOLD)
+            yield self._painted(visible(file), _BOLD)
             for each in of_file:
                 flights = many(len(each.flights), "flight")
                 counted = f"{each.failed} of {flights}" if each.failed else flights
-                yield f"  {self._word(not each.failed)}  {plain(each.scenario.scenario.name)} ({counted})"
+                yield f"  {self._word(not each.failed)}  {visible(each.scenario.scenario.name)} ({counted})"
                 if verbose:
                     yield "      " + ", ".join(f"{count} {ending}" for ending, count in each.endings.items())
                     excused = sorted({text for flight in each.flights for text in flight.excused})
@@ -74,7 +75,7 @@ class Told:
 
     def _line(self, cases: Sequence[Ran]) -> str:
         failed = sum(not each.met for each in cases)
-        title = plain(cases[0].case.test.name.text)
+        title = visible(cases[0].case.test.name.text)
         rows = "" if cases[0].case.row is None else f" ({many(len(cases), 'row')})"
         if failed and cases[0].case.row is not None:
             rows = f" ({failed} of {many(len(cases), 'row')})"
@@ -87,10 +88,10 @@ class Told:
         found = one.coverage
         head = f"coverage of {named(found.policy)} on {found.policy.vehicle.name}: {share(found.covered, found.total)}"
         counted = f"{found.covered} of {found.total} by {many(found.decisions, 'case')}"
-        yield f"\n{self._painted(plain(head), _BOLD)}, {counted}"
+        yield f"\n{self._painted(visible(head), _BOLD)}, {counted}"
         for line, span in zip(found.lines, one.spans, strict=True):
             if line.missing or verbose:
-                yield f"  {plain(self._place(span))}  {plain(shorten(told(line.item), _WIDTH))}"
+                yield f"  {visible(self._place(span))}  {visible(shorten(told(line.item), _WIDTH))}"
                 missing = ["never decided" if goal is Goal.DECIDED else f"never {goal.value}" for goal in line.missing]
                 yield f"      {', '.join(missing)}" if missing else "      covered"
         if found.undecided:

@@ -32,7 +32,7 @@ def _command(diagnostic: Diagnostic, sources: Mapping[str, Source], folder: str)
     lines += [f"at: {visible(diagnostic.pointer)}"] if diagnostic.pointer is not None else []
     lines += [f"{_place(label.span, sources)}: {visible(label.text)}".rstrip(": ") for label in diagnostic.labels]
     lines += [f"help: {visible(diagnostic.help)}"] if diagnostic.help is not None else []
-    written = ",".join(f"{name}={_property(value)}" for name, value in properties.items())
+    written = ",".join(f"{name}={_property(visible(value))}" for name, value in properties.items())
     return f"::{_COMMANDS[diagnostic.severity]} {written}::{_data(chr(10).join(lines))}"
 
 

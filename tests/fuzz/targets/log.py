@@ -9,7 +9,7 @@ from random import Random
 
 from fuzz.mutation.trees import mutated_json
 from reference import forgery
-from rtshcua.cli.shown import plain
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import encode
@@ -55,7 +55,7 @@ def one(data: bytes) -> None:
         record = read(line)
         assert isinstance(record, Flaw) or encode(record) == line
         if isinstance(record, Flaw):
-            assert plain(record.text).isprintable()
+            assert visible(record.text).isprintable()
     if data[:1] != b"\0":
         try:
             lines = forgery.signed(lines)

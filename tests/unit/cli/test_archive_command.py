@@ -286,7 +286,7 @@ def test_exit_codes_are_those_of_verify_log(status: str, finding: str | None, co
 
 def test_text_of_the_world_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> None:
     told.tell(("detail",), [("\033[2Jgone\n",)], told.Shape.TABLE)
-    assert capsys.readouterr().out == "detail\n\\x1b[2Jgone\\n\n"
+    assert capsys.readouterr().out == "detail\n<U+001B>[2Jgone<U+000A>\n"
 
 
 @pytest.mark.parametrize("again", [(), ("--reindex",)])

@@ -16,7 +16,8 @@ from rtshcua.cli import app
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.showing.policy import show_policy
-from rtshcua.cli.shown import plain, shorten, utc
+from rtshcua.cli.shown import shorten, utc
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
@@ -292,7 +293,7 @@ def test_pages_wrap_beneath_themselves() -> None:
 
 
 def test_text_from_elsewhere() -> None:
-    assert plain("a\tb\x00é°") == "a\\tb\\x00é°"
+    assert visible("a\tb\x00é°") == "a\\tb\\x00é°"
     assert shorten("abcdef", 4) == "abc…"
     assert shorten("abcd", 4) == "abcd"
     assert utc(0) == "1970-01-01 00:00:00Z"

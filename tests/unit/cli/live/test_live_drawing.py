@@ -59,7 +59,10 @@ def test_a_refusal_says_why_and_what_flies_instead() -> None:
 
 def test_what_the_world_says_cannot_steer_a_terminal() -> None:
     nasty = "\x1b[2J\x07\r\nroot"
-    assert sentence(Happening("failed", 1, 0, "takeoff()", detail=nasty)) == "failed       takeoff()  ?[2J???root"
+    assert (
+        sentence(Happening("failed", 1, 0, "takeoff()", detail=nasty))
+        == "failed       takeoff()  <U+001B>[2J<U+0007><U+000D><U+000A>root"
+    )
     assert "\x1b" not in drawn(PLAN, Note(nasty), Happened(Happening("failed", 1, 0, nasty, detail=nasty)))
 
 

@@ -1,0 +1,99 @@
+"""Threats to who signs: words of a proposer, of a bundle or of a file's name that say something else than what is."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.cli.app import main
+from rtshcua.cli.documents import deliver
+from rtshcua.cli.faults import say
+from rtshcua.cli.live.lines import plain
+from rtshcua.cli.live.story import Plan
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.report.github import github
+from rtshcua.diagnostics.span import Source, Span
+
+ESCAPES = "\x1b[2K\r\x9b1mapproved\u202e\u2066\u200b\u00ad\ufe0f\U000e0041\u3164\nerror: none"
+LOW = """import "lib:policies/bridge_inspection.rts"
+
+mission low under bridge_inspection@7 on quad {
+  intent "Low under the bridge, when a supervisor agrees."
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 9 m) }
+  phase inspection {
+    goto(bridge_a.entry, altitude = 9 m)
+    inspect_area(bridge_a, /* only hover(5 s), near home */ altitude = 9 m, pattern = perimeter)
+  }
+  phase recovery { return_home() }
+}
+"""
+
+
+def harmless(text: str) -> bool:
+    return all(line.isprintable() for line in text.splitlines()) and not {*text} & {*"\ufe0f\u3164"}
+
+
+@pytest.fixture
+def low(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
+    monkeypatch.chdir(tmp_path)
+    assert main(["keys", "init"]) == ExitCode.OK
+    assert main(["keys", "approver", "owner", "--role", "supervisor"]) == ExitCode.OK
+    (tmp_path / "low.rts").write_text(LOW)
+    assert main(["compile", "low.rts"]) == ExitCode.OK
+    capsys.readouterr()
+    return tmp_path
+
+
+@pytest.mark.parametrize("answer", [(), ("--refuse",), ("--json",)])
+def test_what_is_approved_is_told_by_us(low: Path, capsys: pytest.CaptureFixture[str], answer: tuple[str, ...]) -> None:
+    """A comment among the arguments is the proposer's, and what is signed is the skill with its arguments."""
+    command = ["approve", "low.bundle", "--step", "2", "-o", "yes", "--flight", bytes(16).hex(), *answer]
+    assert main(command) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "hover" not in out
+    assert "/*" not in out
+    assert "`inspect_area(" in out
+    assert "altitude = 9 m" in out
+    assert "pattern = perimeter" in out
+    assert "area = bridge_a [77.0 m from west to east by 53.4 m, its middle 176.8 m from home, bearing 47°]" in out
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_what_became_of_a_document_is_one_harmless_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], as_json: bool
+) -> None:
+    deliver(b"", f"recalled `{ESCAPES}`", to=None, output=tmp_path / "out", as_json=as_json)
+    out = capsys.readouterr().out
+    assert harmless(out)
+    assert out.count("\n") == 1
+
+
+def test_an_error_is_one_harmless_line(capsys: pytest.CaptureFixture[str]) -> None:
+    say(f"no such file: `{ESCAPES}`")
+    assert main(["show", f"{ESCAPES}.bundle"]) == ExitCode.INPUT
+    err = capsys.readouterr().err
+    assert harmless(err)
+    assert "\nerror: none" not in err
+
+
+def test_the_header_of_a_run_is_one_harmless_line() -> None:
+    fields = dict.fromkeys(Plan.__struct_fields__, ESCAPES)
+    (line,) = plain(Plan(**fields))  # type: ignore[arg-type]
+    assert harmless(line)
+    assert "\n" not in line
+
+
+def test_an_annotation_is_one_harmless_line() -> None:
+    name = f"{ESCAPES}.rts"
+    found = Diagnostic(codes.SYNTAX, ESCAPES, Span(name, 0, 1), ESCAPES, pointer=ESCAPES)
+    for sources in ({}, {name: Source(name, ESCAPES)}):
+        (line,) = github([found], sources).splitlines()
+        assert harmless(line)
+
+
+def test_what_is_made_harmless_is_told_apart() -> None:
+    assert visible("a b\u00e9\u6f22") == "a b\u00e9\u6f22"
+    assert visible("a\u202eb\ufe0fc\u2800\n") == "a<U+202E>b<U+FE0F>c<U+2800><U+000A>"

@@ -19,6 +19,11 @@ CUT = "..."
 #: of Hangul and Braille): words can be kept apart by them, or be written in them
 _BLANK = "\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180d\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef"
 _BLANKS = pattern(f"[{_BLANK}]")
+#: controls other than white space, a carriage return that ends no line, what reorders text, and what is not seen
+_HIDING = pattern(
+    "[\x00-\x08\x0b\x0e-\x1f\x7f-\x9f\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
+    f"\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff{_BLANK}]|\r(?!\n)"
+)
 
 #: a span to underline, with which character, and the words after it
 Mark = tuple[Span, str, str]
@@ -103,6 +108,12 @@ def _cell(character: str) -> tuple[str, int]:
     if category(character) in ("Mn", "Me"):
         return character, 0
     return character, 2 if east_asian_width(character) in ("W", "F") else 1
+
+
+def hiding(text: str, start: int = 0) -> int | None:
+    """Where in a text, from `start` on, the first character stands that hides or reorders what a person reads."""
+    found = _HIDING.search(text, start)
+    return None if found is None else found.start()
 
 
 def visible(text: str) -> str:

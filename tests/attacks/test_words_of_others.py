@@ -1,5 +1,6 @@
 """Threats to who signs: words of a proposer, of a bundle or of a file's name that say something else than what is."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -15,8 +16,12 @@ from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.report.github import github
 from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.agent.specification import parse_specification
+from rtshcua.ground.language.parse import parse
+from rtshcua.library import root
 
 ESCAPES = "\x1b[2K\r\x9b1mapproved\u202e\u2066\u200b\u00ad\ufe0f\U000e0041\u3164\nerror: none"
+PROPOSAL = (root() / "missions" / "proposal.json").read_bytes()
 LOW = """import "lib:policies/bridge_inspection.rts"
 
 mission low under bridge_inspection@7 on quad {
@@ -92,6 +97,39 @@ def test_an_annotation_is_one_harmless_line() -> None:
     for sources in ({}, {name: Source(name, ESCAPES)}):
         (line,) = github([found], sources).splitlines()
         assert harmless(line)
+
+
+@pytest.mark.parametrize("character", [*"\x1b\x9b\u202e\u2066\u200b\u00ad\ufe0f\u2028\u3164\x08\r\ufeff", "\U000e0041"])
+def test_a_source_that_reads_as_something_else_is_refused(character: str) -> None:
+    """Also in a comment and in a text, where the grammar takes everything."""
+    for source in (LOW.replace("only", character), LOW.replace("Low", character), f"x{character}"):
+        found = parse(Source("low.rts", source)).diagnostics
+        assert [each.code for each in found] == [codes.HIDDEN_CHARACTER]
+        assert found[0].span is not None
+        assert source[found[0].span.start] == character
+
+
+def test_a_source_with_white_space_and_other_scripts_is_read() -> None:
+    source = "\ufeff" + LOW.replace("only", "nur \u00fcber \u0627\u0644\u062c\u0633\u0631 \t\f").replace("\n", "\r\n")
+    assert parse(Source("low.rts", source)).diagnostics == ()
+
+
+@pytest.mark.parametrize("character", [*ESCAPES.removesuffix("error: none"), "\t"])
+def test_a_specification_holds_no_control_character(character: str) -> None:
+    if character.isascii() and character.isprintable():
+        return
+    for written in (json.dumps(character), f'"{character}"'):
+        data = PROPOSAL.replace(b'"intent": "', b'"intent": "' + written[1:-1].encode(), 1)
+        codes_found = {each.code for each in parse_specification("p.json", data).diagnostics}
+        assert codes_found & {codes.HIDDEN_CHARACTER, codes.NOT_JSON}, written
+
+
+@pytest.mark.parametrize("comment", ["// only 2 m", "/* only 2 m */"])
+def test_a_specification_holds_no_comment(comment: str) -> None:
+    value = PROPOSAL.replace(b'"altitude": "', f'"altitude": "{comment[:2]} only 2 m {comment[12:]}'.encode(), 1)
+    assert value != PROPOSAL
+    (found, *_) = parse_specification("p.json", value).diagnostics
+    assert "comment" in found.message
 
 
 def test_what_is_made_harmless_is_told_apart() -> None:

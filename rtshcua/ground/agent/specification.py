@@ -4,13 +4,16 @@ Spans are places in the JSON text itself. A specification comes from an agent, s
 only: the policy's own sources are named by whoever runs the compiler, never by the agent that is bound by them.
 """
 
-from collections.abc import Iterable, Sequence
+import json
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
 
-from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE
+from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, IMPORT_PATH, NO_SUCH_FILE
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.excerpt import hiding, visible
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.json_tree import Tree, read_json
 from rtshcua.ground.agent.mission import mission_of
@@ -22,6 +25,8 @@ from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.program import Import, Unit
+
+_CONTROL = re.compile(r"[\t\n\f\r]")  # white space in sources, and in no text of a specification
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,9 @@ def parse_specification(file: str, data: bytes) -> Specification:
     source, tree, found = read_json(file, data)
     if tree is None or found:
         return _specification(source, tree, None, found)
+    found = tuple(_hiding(source, tree))
+    if found:
+        return _specification(source, tree, None, found)
     try:
         shape = SpecificationShape.model_validate(tree.value)
     except ValidationError as error:
@@ -58,6 +66,20 @@ def parse_specification(file: str, data: bytes) -> Specification:
     imports = tuple(Import(span=tree.spans["imports", number], path=path) for number, path in enumerate(shape.imports))
     unit = _unit(Span(file, 0, len(source.text)), imports, () if mission is None else (mission,))
     return _specification(source, tree, unit, found)
+
+
+def _hiding(source: Source, tree: Tree) -> Iterator[Diagnostic]:
+    """The texts that hold a control character, or one that hides or reorders what a person reads."""
+    for span in (*tree.keys.values(), *tree.spans.values()):
+        written = source.text[span.start : span.end]
+        if written.startswith('"'):
+            text = json.loads(written)
+            control = _CONTROL.search(text)
+            at = hiding(text) if control is None else control.start()
+            if at is not None:
+                message = f"`{visible(text[at])}` hides or reorders what a person reads"
+                help = "a specification has no control characters and nothing invisible in its texts"
+                yield Diagnostic(HIDDEN_CHARACTER, message, span, help)
 
 
 def load_specification(

@@ -15,7 +15,7 @@ from rtshcua.model.ir.skills import Clause
 
 N = TypeVar("N", bound=Node)
 
-#: what a value stands in while it is parsed; a comment in it cannot hide what follows, which is on its own line
+#: what a value stands in while it is parsed
 _VALUE = "mission m under p@1 on v { phase a { s(x = "
 _AFTER_VALUE = "\n) } }"
 _OVERRIDE = "mission m under p@1 on v { phase a { s() { "
@@ -79,6 +79,9 @@ class _Given(NamedTuple):
 
     def step(self) -> tuple[Step | None, Found]:
         """The one step that was parsed, or the first finding."""
+        if "//" in self.text or "/*" in self.text:
+            message = "a value holds a comment, which is no part of what is asked for"
+            return None, (Diagnostic(codes.SPECIFICATION_SHAPE, message, self.span, "leave the comment out"),)
         parsed = parse(Source(self.span.file, self.before + self.text + self.after))
         found = tuple(self._finding(diagnostic) for diagnostic in parsed.diagnostics)
         if found:

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import TypeVar
 
-from rtshcua.diagnostics.codes import NOT_TEXT, TOO_MANY_FINDINGS
+from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, NOT_TEXT, TOO_MANY_FINDINGS
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.excerpt import hiding, visible
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
@@ -73,6 +74,11 @@ def refused(source: Source) -> Diagnostic | None:
         help = "is this a compiled bundle? sources are plain text in UTF-8"
         span = Span(source.file, nul, nul + 1)
         return Diagnostic(NOT_TEXT, "the file holds a NUL character, so it is not text", span, help)
+    at = hiding(source.text, beginning(source))
+    if at is not None:
+        message = f"`{visible(source.text[at])}` hides or reorders what a person reads"
+        span = Span(source.file, at, at + 1)
+        return Diagnostic(HIDDEN_CHARACTER, message, span, "remove it, from comments and texts too")
     return None
 
 

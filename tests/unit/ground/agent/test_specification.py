@@ -167,13 +167,9 @@ def test_a_value_cannot_break_out_of_its_place(good: dict[str, Any], compile_tex
         "hover()",
     ):
         good["phases"][0]["steps"][0]["arguments"]["altitude"] = hostile
-        compiled, found = compile_text(dumped(good))
-        if hostile == "20 m // and more":  # a comment changes nothing
-            assert compiled.mission is not None
-            assert compiled.mission.invocations[0].arguments == (20_000,)
-        else:
-            assert found, hostile
-            assert {each.pointer for each in found} == {"/phases/0/steps/0/arguments/altitude"}, found
+        _, found = compile_text(dumped(good))
+        assert found, hostile
+        assert {each.pointer for each in found} == {"/phases/0/steps/0/arguments/altitude"}, found
 
 
 def test_an_escaped_text_keeps_its_places(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:

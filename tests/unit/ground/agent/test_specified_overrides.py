@@ -78,7 +78,8 @@ def test_none_is_none(good: dict[str, Any], compile_text: Compile, dumped: Dump)
         ({"deadline": 2}, "E0902", "/deadline", "2"),
         ({"deadline": "2 s grace 1 s"}, "E0902", "/deadline", "2 s grace 1 s"),
         ({"deadline": "2 s } hover() {"}, "E0902", "/deadline", None),
-        ({"deadline": "2 s // }"}, None, "", None),
+        ({"deadline": "2 s // }"}, "E0902", "/deadline", "2 s // }"),
+        ({"require": ["battery > 20 % /* x */"]}, "E0902", "/require/0", None),
         ({"dedline": "2 s"}, "E0902", "/dedline", '"dedline"'),
         ({"energy_at_most": "1 %"}, "E0617", "/energy_at_most", "1 %"),
         ({"during": ["recovery"]}, "E0617", "/during/0", '"recovery"'),
@@ -97,15 +98,14 @@ def test_findings_point_at_what_is_wrong(
     compile_text: Compile,
     dumped: Dump,
     overrides: dict[str, Any],
-    code: str | None,
+    code: str,
     at: str,
     under: str | None,
 ) -> None:
     text = dumped(with_overrides(good, overrides))
     _, found = compile_text(text)
-    assert [each.code.id for each in found] == ([] if code is None else [code])
-    if code is not None:
-        assert found[0].pointer == AT + at
-        assert found[0].span is not None
-        if under is not None:
-            assert text[found[0].span.start : found[0].span.end] == under
+    assert [each.code.id for each in found] == [code]
+    assert found[0].pointer == AT + at
+    assert found[0].span is not None
+    if under is not None:
+        assert text[found[0].span.start : found[0].span.end] == under

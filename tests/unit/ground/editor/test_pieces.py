@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtshcua.diagnostics.excerpt import hiding
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.editor import pieces
 from rtshcua.ground.editor.pieces import Cut, cut, cut_again
@@ -15,12 +16,13 @@ from rtshcua.library import root
 LIBRARY = sorted(path for shelf in ("skills", "policies", "missions") for path in (root() / shelf).glob("*.rts"))
 REJECTED = sorted((Path(__file__).parents[3] / "rejected").glob("e01*.rts"))
 TEXT = "".join(path.read_text(encoding="utf-8") for path in LIBRARY)
-TWIN = "".join(path.read_text(encoding="utf-8") for path in REJECTED if "\0" not in path.read_text(encoding="utf-8"))
+TWINS = [path.read_text(encoding="utf-8") for path in REJECTED]
+TWIN = "".join(text for text in TWINS if "\0" not in text and hiding(text) is None)
 PARTS = (
     "", " ", "\n", "}", "{", "/*", "*/", "//", '"', ",", "1", "1e5", " 2e\n", ".", "zone", "zone ", "\nzone a = b\n",
     "import", "\nimport <x\n", "signal x : y = A.b stale after 2", "\nenum e { a = 1 }", "x", ";", "-", "when", "𝄞",
     "\nskill", "\nskill f()", "skill f() { }", "\nimport \"lib:skills/goto.rts\"", "policy p version 1 {", "18:00",
-    "\nmission m", "\r\n", "\t", "@7", "test \"t\" { }", "\nnominal n { }\n", "permit any by any\n",
+    "\nmission m", "\r\n", "\r", "\u202e", "\t", "@7", "test \"t\" { }", "\nnominal n { }\n", "permit any by any\n",
 )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from rtshcua.onboard.ports import Event, Opening
 #: How long word of whether the vehicle is in the air is waited for, in seconds.
 AIR_S: Final = 5.0
 _POLL_S: Final = 0.05
+_MEND: Final = "put `replay/` of the state folder right; without it, each bundle that has not expired opens again"
 
 
 def flown_before(state: Path, loaded: Loaded) -> str | None:
@@ -32,6 +33,9 @@ def _looked_up(state: Path, loaded: Loaded) -> Opening:
 
 def _not_opened(loaded: Loaded, opening: Opening) -> Refusal:
     policy, vehicle = loaded.bundle.policy, loaded.vehicle
+    if opening is Opening.DAMAGED:
+        text = f"what is kept about the bundles that `{vehicle}` opened is damaged: this one may have flown"
+        return Refusal(opening, text, _MEND)
     if opening is Opening.OLD_POLICY:
         text = f"a later version of `{policy.name}` than {policy.version} was in force on `{vehicle}`"
         help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
@@ -45,9 +49,14 @@ def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: Lin
     yet.
 
     Then a run of it broke off up there, or had just told it to take off: nothing of the mission is flown again, but it
-    is brought down.
+    is brought down. So it is where nobody can tell, for the state folder is damaged or cannot be read: what flies must
+    come down whatever that says.
     """
-    opening = _looked_up(state, loaded)
+    unread: OSError | None = None
+    try:
+        opening = _looked_up(state, loaded)
+    except OSError as error:
+        opening, unread = Opening.DAMAGED, error
     if opening is Opening.OPENED:
         return False
     if opening is Opening.OLD_POLICY:
@@ -58,6 +67,8 @@ def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: Lin
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if seen.airborne or seen.armed:
         return True
+    if unread is not None:
+        raise unread
     raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
 
 

@@ -360,6 +360,7 @@ class Opening(StrEnum):
     OPENED = "opened"
     REPLAYED = "replayed"  # opened before, also by a run that crashed; or it might have been
     OLD_POLICY = "old-policy"  # a higher version of its policy was in force there
+    DAMAGED = "damaged"  # what was kept about it is there, and says nothing: nobody knows
 
 
 class ReplayStore(Protocol):

@@ -6,10 +6,14 @@
 
 One process at a time looks and writes. Markers of expired missions are pruned; a mission that expires no later than one
 that was pruned is refused, so setting the clock back opens nothing again. Policy versions only rise.
+
+A file that is there and does not say what we write is damage, and opens nothing; one that is not there is as if nothing
+had been kept. Nothing here tells that the whole folder was put back to what it was earlier, or removed.
 """
 
 import fcntl
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +25,7 @@ from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
 _POLICIES = "floor-policies"
+_EXPIRY = re.compile(rb"[0-9]{1,20}\n")
 _LARGEST = 16 << 20  # octets of a file here
 
 
@@ -34,8 +39,8 @@ class FileReplayStore:
     def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
         """`OPENED` once for a mission, after that and its policy's version are on the disk.
 
-        `expires_us` is when nothing of the mission is valid any more. Raises OSError when the disk cannot take it: the
-        mission must not fly then.
+        `expires_us` is when nothing of the mission is valid any more. `DAMAGED` leaves all as it is.
+        Raises OSError when the disk cannot take it: the mission must not fly then.
         """
         marker = self.folder / digest.hex()
         with _alone(self.folder):
@@ -78,19 +83,39 @@ def _folder(state: Path, vehicle: str) -> Path:
 
 
 def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version: int) -> Opening | None:
-    if (folder / digest.hex()).exists() or expires_us <= _floor(folder):
+    if (folder / digest.hex()).exists():
         return Opening.REPLAYED
-    return Opening.OLD_POLICY if version < _versions(folder).get(policy, version) else None
+    try:
+        floor, versions = _floor(folder), _versions(folder)
+    except _Damaged:
+        return Opening.DAMAGED
+    if expires_us <= floor:
+        return Opening.REPLAYED
+    return Opening.OLD_POLICY if version < versions.get(policy, version) else None
+
+
+class _Damaged(Exception):
+    """A file that is there does not say what we write into it."""
 
 
 def _floor(folder: Path) -> int:
     data = read_if_there(folder / _FLOOR, _LARGEST)
+    if data is not None and _EXPIRY.fullmatch(data) is None:
+        raise _Damaged
     return -1 if data is None else int(data)
 
 
 def _versions(folder: Path) -> dict[str, int]:
     data = read_if_there(folder / _POLICIES, _LARGEST)
-    return {} if data is None else dict(json.loads(data))
+    if data is None:
+        return {}
+    try:
+        said = json.loads(data)
+    except (ValueError, RecursionError):
+        raise _Damaged from None
+    if not isinstance(said, dict) or not said or any(type(version) is not int for version in said.values()):
+        raise _Damaged
+    return said
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """What `run` refuses between loading a bundle and flying it."""
 
+import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -45,6 +46,38 @@ def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_abou
     with pytest.raises(launch.Refused) as refused:
         opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "replayed")
+
+
+@pytest.mark.parametrize("damage", ["empty", "no-versions", "pipe", "no-folder"])
+@pytest.mark.parametrize("armed", [False, True])
+def test_whatever_the_state_folder_says_what_flies_comes_down(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str, armed: bool
+) -> None:
+    monkeypatch.setattr(opening, "AIR_S", 0.01)
+    folder = FileReplayStore(tmp_path, VEHICLE).folder
+    if damage == "empty":
+        (folder / "floor").touch()
+    elif damage == "no-versions":
+        (folder / "floor-policies").write_bytes(b"[]")
+    elif damage == "pipe":
+        os.mkfifo(folder / "floor")
+    else:
+        folder.rmdir()
+        folder.touch()
+    seen = ObservedVehicle(armed=armed, landed_state=2 if armed else 1)
+    vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
+    if armed:
+        assert opening.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+        return
+    with pytest.raises((launch.Refused, OSError)) as refused:
+        opening.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+    if damage in ("empty", "no-versions"):
+        assert isinstance(refused.value, launch.Refused)
+        assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "damaged")
+        flight = Grounded()
+        with pytest.raises(launch.Refused, match="damaged"):
+            opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+        assert flight.refused
 
 
 class Grounded:

@@ -141,3 +141,26 @@ def test_the_version_is_on_disk_before_the_mission_opens(tmp_path: Path, monkeyp
             store.open_once(ONE, 1000, 10, "bridge", 8)
     assert store.open_once(TWO, 1000, 10, "bridge", 7) is OLD_POLICY
     assert store.open_once(ONE, 1000, 10, "bridge", 8) is OPENED
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        *(("floor", data) for data in (b"", b"\n", b"1000", b"x\n", b"1_0\n", b"9" * 5000 + b"\n", b"\xff\n")),
+        *(("floor-policies", data) for data in (b"", b"[]", b"{}", b"null", b"7", b'[["bridge", 6]]', b"[" * 99_999)),
+        *(("floor-policies", data) for data in (b'{"bridge": "7"}', b'{"bridge": true}', b'{"bridge": null}', b"\xff")),
+    ],
+)
+def test_damage_is_told_from_absence_and_opens_nothing(tmp_path: Path, name: str, data: bytes) -> None:
+    store = FileReplayStore(tmp_path, "quad-07")
+    assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
+    assert store.open_once(TWO, 9000, 2000, *POLICY) is OPENED
+    (store.folder / name).write_bytes(data)
+    before = sorted(path.name for path in store.folder.iterdir())
+    assert store.open_once(THREE, 9000, 2000, *POLICY) is Opening.DAMAGED
+    assert replay.looked_up(tmp_path, "quad-07", THREE, 9000, *POLICY) is Opening.DAMAGED
+    assert store.open_once(TWO, 9000, 2000, *POLICY) is REPLAYED, "its own marker says so"
+    assert (store.folder / name).read_bytes() == data
+    assert sorted(path.name for path in store.folder.iterdir()) == before
+    (store.folder / name).unlink()
+    assert store.open_once(THREE, 9000, 2000, *POLICY) is OPENED, "absence is not told from a folder put back"

@@ -158,6 +158,11 @@ class Flight:
         """Close the log of a flight that is not to be."""
         self._close(Ending.REFUSED)
 
+    @property
+    def used_up(self) -> bool:
+        """Whether the bundle may not fly any more, after the flight."""
+        return self._runtime.used_up
+
     def _plan(self) -> Plan:
         bundle = self._loaded.bundle
         return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._speed)

@@ -30,7 +30,7 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
-from rtshcua.cli.opening import broke_off, flown_before, mark_opened
+from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened
 from rtshcua.cli.past import Past
 from rtshcua.cli.refused import Refused as Refused
 from rtshcua.cli.showing.document import HANDED_IN, kind_of_document
@@ -155,6 +155,8 @@ def launch(order: Launch) -> ExitCode:
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
             code, summary = flight.fly()
+            if not resumed and (kept := give_back(order.state, loaded, flight)) is not None:
+                feed.post(Note(kept))
             if order.incidents is not None:
                 with open_regular(run.path / LOG) as log:
                     code = _hold(order.incidents, Ending(summary.ending), code, log, feed)

@@ -1,4 +1,6 @@
-"""That a bundle flies once: looked up before anything is written, and marked before anything is sent."""
+"""That a bundle flies once: looked up before anything is written, and marked before anything is sent. The mark is taken
+back after a run that sent nothing.
+"""
 
 import time
 from pathlib import Path
@@ -88,3 +90,17 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -
     if opening is not Opening.OPENED:
         flight.refuse()
         raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
+
+
+def give_back(state: Path, loaded: Loaded, flight: Flight) -> str | None:
+    """After a run that ended with nothing sent: its bundle may be handed in again; that, in words. None if it was used.
+
+    A run that was killed, or ended by a fault, gives nothing back: what it sent is not known.
+    """
+    if flight.used_up:
+        return None
+    try:
+        FileReplayStore(state, loaded.vehicle).give_back(loaded.bundle.mission_digest)
+    except OSError as error:
+        return f"nothing was sent, but the bundle counts as flown: {error.strerror or error}"
+    return "nothing was sent: the bundle may be handed in again"

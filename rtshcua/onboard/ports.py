@@ -369,3 +369,7 @@ class ReplayStore(Protocol):
     def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
         """Open the mission of this digest, under a version of a policy."""
         ...
+
+    def give_back(self, digest: bytes) -> None:
+        """Nothing of the mission was sent: it may be opened again."""
+        ...

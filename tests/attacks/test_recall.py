@@ -65,9 +65,11 @@ def test_in_the_air_the_contingency_flies(skill: str) -> None:
 
 def test_on_the_ground_nothing_begins() -> None:
     run = Run(fresh(), ready=False)
+    assert not run.runtime.used_up
     assert hand(run, recall(run.loaded)) == "accepted"
     assert run.ending is Ending.RECALLED
     assert run.flown == []
+    assert run.runtime.used_up, "what an operator called back does not fly later"
 
 
 def test_what_is_on_its_way_home_goes_on() -> None:

@@ -72,11 +72,18 @@ def test_a_low_battery_turns_it_home(ground: Any) -> None:
     assert "violated" in run.effects()
 
 
-def test_a_low_battery_on_the_ground_is_refused(ground: Any) -> None:
-    run = ground.run(ground.bundle(), "--battery", "20").end()
+def test_a_low_battery_on_the_ground_is_refused_and_the_bundle_is_not_used_up(ground: Any) -> None:
+    bundle = ground.bundle()
+    run = ground.run(bundle, "--battery", "20").end()
     assert run.code == 5
     closed(run, "refused")
     assert run.dispatched() == []
+    assert "nothing was sent: the bundle may be handed in again" in [e.get("text") for e in run.events]
+    charged = ground.run(bundle)
+    charged.until("dispatched", step=0)
+    charged.signal(signal.SIGINT)
+    assert charged.end().code == 130
+    assert ground.run(bundle).end().events[-1]["slug"] == "replayed", "it was told to take off"
 
 
 @pytest.mark.soak

@@ -5,7 +5,8 @@
     <state folder>/replay/vehicle-<identity>/floor-policies   JSON: the highest version of each policy, by name
 
 One process at a time looks and writes. Markers of expired missions are pruned; a mission that expires no later than one
-that was pruned is refused, so setting the clock back opens nothing again. Policy versions only rise.
+that was pruned is refused, so setting the clock back opens nothing again. Policy versions only rise. The marker of a
+mission of which nothing was sent is taken back when its run ends; after a crash it stays.
 
 A file that is there and does not say what we write is damage, and opens nothing; one that is not there is as if nothing
 had been kept. Nothing here tells that the whole folder was put back to what it was earlier, or removed.
@@ -54,6 +55,14 @@ class FileReplayStore:
                 replace(self.folder / _POLICIES, raised, mode=PRIVATE_FILE)
             write_new(marker, b"%d\n" % expires_us, mode=PRIVATE_FILE)
         return Opening.OPENED
+
+    def give_back(self, digest: bytes) -> None:
+        """Of a mission that was opened, nothing was sent: it opens again, once that is on the disk. Its policy's
+        version stays. Raises OSError, and then it may stay used up.
+        """
+        with _alone(self.folder):
+            (self.folder / digest.hex()).unlink(missing_ok=True)
+            sync_folder(self.folder)
 
     def _prune(self, now_utc_us: int) -> None:
         expired = {}

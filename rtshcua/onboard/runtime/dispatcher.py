@@ -59,7 +59,8 @@ class Dispatcher:
         self._journal = journal
         self._remaining = remaining
         self.active: Active | None = None
-        self.dispatched = False  # something was sent in this flight
+        self.dispatched = False  # something was sent in this flight,
+        self.used = False  # and in this run, as its log tells: it stays after a landing
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
 
     def fly(self, now: Now, permit: bytes, ref: Ref, lasting_us: int | None) -> bool:
@@ -87,7 +88,7 @@ class Dispatcher:
         self.end(now, "replaced")
         self._journal.add(dispatch)
         self.active = Active(ref, command, at_us, None if lasting_us is None else at_us + lasting_us)
-        self.dispatched = True
+        self.dispatched = self.used = True
         token, skill = command.token, command.skill
         self._journal.effect(now, "dispatched", ref, token=token, detail=skill)
         return True

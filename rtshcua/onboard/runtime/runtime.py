@@ -100,6 +100,13 @@ class Runtime:
         return self._controller.aloft
 
     @property
+    def used_up(self) -> bool:
+        """Whether the bundle may not fly any more: a command of it was dispatched, or an operator recalled it. One that
+        was refused, deferred or interrupted on the ground was not used.
+        """
+        return self._controller.dispatcher.used or self.ending is Ending.RECALLED
+
+    @property
     def linked(self) -> bool:
         """Whether the vehicle is heard."""
         return not self._controller.link.down

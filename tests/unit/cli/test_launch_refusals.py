@@ -116,3 +116,31 @@ def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
     with pytest.raises(launch.Refused, match=r"`BATTERY_STATUS\.nope`") as refused:
         launch._driver(order, loaded(replace(POLICY, signals=signals), MISSION), 1, signing)
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "unknown-source")
+
+
+class Over:
+    """A flight that ended."""
+
+    def __init__(self, used_up: bool) -> None:
+        self.used_up = used_up
+
+
+def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Path) -> None:
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)))
+    assert told == "nothing was sent: the bundle may be handed in again"
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True))) is None
+    assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+
+    def fails(store: FileReplayStore, digest: bytes) -> None:
+        raise OSError(30, "read-only file system")
+
+    monkeypatch.setattr(FileReplayStore, "give_back", fails)
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)))
+    assert told == "nothing was sent, but the bundle counts as flown: read-only file system"
+    assert opening.flown_before(tmp_path, loaded()) is not None

@@ -332,3 +332,12 @@ def test_the_boundary_fails_while_a_chain_is_flown() -> None:
 @rows("situation", GROUND + AIR)
 def test_whether_it_has_to_be_brought_down_can_be_told(situation: Situation) -> None:
     assert situation().runtime.aloft is (situation in AIR)
+
+
+@rows("situation", GROUND + AIR)
+def test_a_bundle_is_used_up_by_what_is_dispatched_and_its_log_says_so(situation: Situation) -> None:
+    run = situation()
+    run.tick(Interrupted(0))
+    run.until_over()
+    assert run.runtime.used_up == (situation in AIR)
+    assert run.runtime.used_up == ("dispatched" in run.events)

@@ -24,6 +24,25 @@ def test_once_and_never_again(tmp_path: Path) -> None:
     assert FileReplayStore(tmp_path, "quad-07").open_once(ONE, 2000, 20, *POLICY) is REPLAYED
 
 
+def test_what_is_given_back_opens_again_and_its_policy_does_not_go_back(tmp_path: Path) -> None:
+    store = FileReplayStore(tmp_path, "quad-07")
+    assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
+    assert store.open_once(TWO, 1000, 10, *POLICY) is OPENED
+    store.give_back(ONE)
+    store.give_back(ONE)
+    assert store.open_once(TWO, 1000, 10, *POLICY) is REPLAYED
+    assert store.open_once(ONE, 1000, 10, "bridge", 6) is OLD_POLICY
+    assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
+
+
+def test_one_that_expired_is_not_opened_again_by_giving_it_back(tmp_path: Path) -> None:
+    store = FileReplayStore(tmp_path, "quad-07")
+    assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
+    assert store.open_once(TWO, 9000, 1001, *POLICY) is OPENED
+    store.give_back(ONE)
+    assert store.open_once(ONE, 1000, 10, *POLICY) is REPLAYED
+
+
 def test_each_vehicle_has_its_own(tmp_path: Path) -> None:
     for vehicle in ("quad-07", "quad-08", "..", "", "a/b", "quad 07"):
         assert FileReplayStore(tmp_path, vehicle).open_once(ONE, 1000, 10, *POLICY) is OPENED, vehicle

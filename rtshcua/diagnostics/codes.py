@@ -212,6 +212,7 @@ SLOW_REACTION = _code(
 MISSION_TIME = _code("E0809", "mission-time", "a mission may last longer than it says")
 MISSION_STEPS = _code("E0810", "mission-steps", "a mission has more steps than it says, or than fit on board")
 MISSION_ENERGY = _code("E0811", "mission-energy", "a mission may need more energy than it says")
+OVER_CHARGE = _code("E0812", "over-charge", "a mission may need more energy than a full charge")
 
 # E09: mission specifications (structured input of an agent)
 NOT_JSON = _code("E0901", "not-json", "the specification is not JSON")

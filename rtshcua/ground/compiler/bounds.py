@@ -1,9 +1,9 @@
-"""E0809 to E0811: what a mission takes at most, in steps, time and energy, and whether that is within what it says.
+"""E0809 to E0812: what a mission takes at most, in steps, time and energy, and whether that is within what it says.
 
 Time runs from the issue to the end: the start window, each step's approval, deadline and duration, and the longest
-chain that may follow one of them. Energy is what the contracts of all steps may take, the most that a chain takes, and
-the way home from the farthest planned place. It is a sum of bounds, so it may exceed a full charge where a flight would
-not; then what is skipped or degraded on board for want of charge is what keeps the flight within one.
+chain that may follow one of them. Energy is what the contracts of the steps may take up to one that is given up, and of
+the chain that is then flown, whichever step that is; a return takes no less than the way home from the farthest planned
+place. A mission whose bound exceeds a full charge is refused: no battery that is put in would be enough.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -18,7 +18,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US
-from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
@@ -26,6 +26,9 @@ from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.quantity import Dimension, display
 
 SECOND_US = 1_000_000
+
+#: what brings the vehicle down is not given up for the contingency: only its own chain follows
+_HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 
 #: so many of the largest contributions are shown
 SHOWN = 3
@@ -54,7 +57,7 @@ def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission) -> Bounds
     found = Bounds(
         len(mission.invocations),
         START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains),
-        sum(energies) + max(_chain_energy(chain, policy) for chain in chains) + _way_home(mission, policy),
+        _energy(mission, policy),
     )
     _count(ground, declared, found.invocations)
     _within(ground, declared, found, steps, times, energies)
@@ -83,8 +86,27 @@ def _chain_time(chain: Iterable[Link], policy: Policy) -> int:
     return sum(longest(policy.contracts[link.skill], policy.vehicle, link.limit_us) for link in chain)
 
 
-def _chain_energy(chain: Iterable[Link], policy: Policy) -> int:
-    return sum(policy.contracts[link.skill].energy for link in chain)
+def _taken(contract: Contract, way_home: int) -> int:
+    """What a contract takes; one that flies home no less than the way there."""
+    return max(contract.energy, way_home) if contract.motion.kind == MotionKind.HOME else contract.energy
+
+
+def _energy(mission: Mission, policy: Policy) -> int:
+    """What the steps take up to the one that a chain follows, and that chain: after it no step is flown."""
+    way_home = _way_home(mission, policy)
+
+    def chain_energy(chain: Iterable[Link]) -> int:
+        return sum(_taken(policy.contracts[link.skill], way_home) for link in chain)
+
+    contingency = chain_energy(policy.contingency)
+    spent = largest = 0
+    for invocation in mission.invocations:
+        denied = spent + contingency
+        spent += _taken(invocation.contract, way_home)
+        own = chain_energy(invocation.contract.fallback)
+        given_up = own if invocation.contract.motion.kind in _HOMEWARD else max(own, contingency)
+        largest = max(largest, denied, spent + given_up)
+    return largest
 
 
 def _way_home(mission: Mission, policy: Policy) -> int:
@@ -131,16 +153,37 @@ def _within(
             "steps shorter times of their own, or the mission more",
             labels=_largest(steps, times, rounded_time),
         )
-    if declared.most_energy is not None and found.energy > declared.most_energy.value:
+    limit = declared.most_energy
+    over = found.energy > FULL and not _told(ground, steps)
+    if not over and (limit is None or found.energy <= limit.value):
+        return
+    needs = f"the mission may need {rounded_energy(found.energy)} of a full charge"
+    rest = found.energy - sum(energies)
+    split = f"{rounded_energy(sum(energies))} for all steps, as their contracts allow"
+    if over:
         report.add(
-            codes.MISSION_ENERGY,
-            declared.most_energy.span,
-            f"the mission may need {rounded_energy(found.energy)} of a full charge, and says that it needs at most "
-            f"{display(declared.most_energy.value, Dimension.RATIO)}",
-            help=f"{rounded_energy(sum(energies))} for all steps, as their contracts allow, and "
-            f"{rounded_energy(found.energy - sum(energies))} for the chain that needs most and the way home",
+            codes.OVER_CHARGE,
+            declared.name.span,
+            f"{needs}, and a battery has 100 %",
+            help=f"{split}, and {rounded_energy(rest)} more where one of them is given up and a chain flies; "
+            "leave steps out, or make two missions of it",
             labels=_largest(steps, energies, rounded_energy),
         )
+    else:
+        assert limit is not None
+        report.add(
+            codes.MISSION_ENERGY,
+            limit.span,
+            f"{needs}, and says that it needs at most {display(limit.value, Dimension.RATIO)}",
+            help=f"{split}, and {rounded_energy(rest)} more where one of them is given up and a chain flies",
+            labels=_largest(steps, energies, rounded_energy),
+        )
+
+
+def _told(ground: Ground, steps: Sequence[Step]) -> bool:
+    """Whether one of the steps was found to lack charge: that says more."""
+    spans = {step.span for step in steps}
+    return any(each.code is codes.SHORT_OF_ENERGY and each.span in spans for each in ground.context.report.found)
 
 
 def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int], str]) -> list[tuple[Span, str]]:

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 
 import pytest
+from msgspec.structs import replace
 
 from rtshcua.cli.bounds import bounds_told
-from rtshcua.ground.compiler.bounds import Bounds, most, rounded_energy, rounded_time
+from rtshcua.ground.compiler.bounds import Bounds, _taken, most, rounded_energy, rounded_time
 from rtshcua.ground.compiler.program import Checked, Compiled
 
 Compile = Callable[..., Compiled]
@@ -54,9 +55,17 @@ def test_they_are_the_sums_of_all_that_may_be(compile_text: Compile, site: str, 
     assert compiled.bounds is not None
     assert compiled.bounds.invocations == 3
     assert compiled.bounds.time_us == time + chain_us(compiled)
-    # from 3 m of position error, and 1 mm of rounding, at 12 m/s with 18 min of charge: 2.4, rounded up
-    way = -(-3_001 * SECOND * 10_000 // (12_000 * 18 * 60 * SECOND))
-    assert compiled.bounds.energy == sum(step.energy for step in steps) + chain_energy(compiled) + way
+    # `takeoff`, `hover` and the contingency: more than all steps and what follows a return that fails
+    assert compiled.bounds.energy == sum(step.energy for step in steps[:2]) + chain_energy(compiled)
+
+
+def test_a_return_takes_no_less_than_the_way_home(compile_text: Compile, site: str) -> None:
+    """What its contract allows, or the way from the farthest planned place, whichever is more: not both."""
+    compiled = compile_text(site + mission())
+    assert compiled.mission is not None
+    taken = [_taken(replace(step.contract, energy=300), 309) for step in compiled.mission.invocations]
+    assert taken == [300, 300, 309]
+    assert _taken(compiled.mission.invocations[-1].contract, 309) == 1200
 
 
 def test_a_step_of_its_own_counts_with_what_it_says(compile_text: Compile, site: str) -> None:

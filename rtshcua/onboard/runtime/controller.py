@@ -421,6 +421,7 @@ class MissionController:
 
     def _end(self, now: Now, ending: Ending) -> None:
         self.admission.flush(now)
+        self._journal.tell_counted(now, ended=True)
         self.stage = _ENDED
         self.ending = ending
         self._loaded.executor.release()

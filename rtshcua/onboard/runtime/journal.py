@@ -2,12 +2,18 @@
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Final
 
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Dispatch
 from rtshcua.wire.request import NOTHING, Ref
+
+#: how often a note of the same text leaves a record, in us: those between are counted
+REPEATED_EVERY_US: Final = 30_000_000
+#: so many texts are looked for; of more, each note is recorded
+_MOST_TEXTS = 64
 
 #: makes what tells of something: its line, and what is announced of it
 Telling = Callable[[], Iterable[Action]]
@@ -24,6 +30,8 @@ class Journal:
         self.recorder = recorder
         self._entries: list[Action | Telling] = []
         self._first: Action | None = None  # of what is done, and not only told
+        self._noted: dict[str, int] = {}  # when a text was last recorded as a note,
+        self._again: dict[str, int] = {}  # and how often it was noted since
 
     @property
     def reflex(self) -> Dispatch | None:
@@ -53,6 +61,24 @@ class Journal:
         """Record something that happened. `detail` may be the world's own text."""
         line = partial(self.recorder.effect, now, event, ref, token=token, detail=detail)
         self._entries.append(partial(self.record, line, now, WRITTEN, awaited=False))
+
+    def note(self, now: Now, text: str) -> None:
+        """Record a note, unless one of the same text was recorded a short while ago: then it is counted."""
+        before_us = self._noted.get(text)
+        if text in self._again or (before_us is not None and now.monotonic_us - before_us < REPEATED_EVERY_US):
+            self._again[text] = self._again.get(text, 0) + 1
+            return
+        if len(self._noted) < _MOST_TEXTS:
+            self._noted[text] = now.monotonic_us
+        self.effect(now, "noted", detail=text)
+
+    def tell_counted(self, now: Now, *, ended: bool = False) -> None:
+        """Record how often notes were repeated, once their time is over or the run is."""
+        due = [text for text in self._again if ended or now.monotonic_us - self._noted[text] >= REPEATED_EVERY_US]
+        for text in due:
+            count = self._again.pop(text)
+            self._noted[text] = now.monotonic_us
+            self.effect(now, "noted", detail=f"{text} ({count} more {'time' if count == 1 else 'times'})")
 
     def take(self, now: Now, *, ended: bool) -> list[Action]:
         """What was collected since the last call. An epoch that is over is sealed, unless something is sent; after the

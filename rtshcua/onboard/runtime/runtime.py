@@ -78,6 +78,8 @@ class Runtime:
         monitor.observe(now)
         while controller.turn(now):
             pass
+        if controller.stage is not _ENDED:
+            self._journal.tell_counted(now)
         return self._journal.reflex
 
     def actions(self, now: Now) -> list[Action]:
@@ -197,7 +199,7 @@ class EventHandler:
             case ports.Said():
                 self._journal.effect(now, "said", detail=f"{event.severity}: {event.text[:MOST_SAID]}")
             case ports.Noted():
-                self._journal.effect(now, "noted", detail=event.text)
+                self._journal.note(now, event.text)
             case ports.Anchored():
                 self._journal.effect(now, ANCHORED, detail=event.note)
 

@@ -1,5 +1,6 @@
 """What may come between: the pilot, the operator, a lost link, a full disk, a boundary that does not answer."""
 
+import json
 from collections.abc import Callable
 
 import pytest
@@ -17,8 +18,10 @@ from rtshcua.onboard.ports import (
     Interrupted,
     LinkBack,
     LinkLost,
+    Noted,
     TakenOver,
 )
+from rtshcua.onboard.runtime.journal import REPEATED_EVERY_US
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
 from rtshcua.wire.response import Status, encode_refusal
@@ -341,3 +344,33 @@ def test_a_bundle_is_used_up_by_what_is_dispatched_and_its_log_says_so(situation
     run.until_over()
     assert run.runtime.used_up == (situation in AIR)
     assert run.runtime.used_up == ("dispatched" in run.events)
+
+
+def test_repeated_notes_are_counted_and_told_in_time_or_at_the_end() -> None:
+    run = waiting()
+
+    def noted() -> list[str]:
+        told = [json.loads(line) for line in run.lines]
+        return [each["detail"] for each in told if each.get("event") == "noted"]
+
+    for _ in range(3):
+        run.tick(Noted(0, "the cable is loose"))
+    run.tick(Noted(0, "another"))
+    assert noted() == ["the cable is loose", "another"], "the first at once"
+    for _ in range(REPEATED_EVERY_US // TICK):
+        run.tick()
+    assert noted()[2:] == ["the cable is loose (2 more times)"], "those that were counted, once"
+    run.tick(Noted(0, "another"))
+    run.tick(Noted(0, "the cable is loose"))
+    assert noted()[3:] == ["another"], "its time is over"
+    run.tick(Interrupted(0))
+    run.until_over()
+    assert noted()[4:] == ["the cable is loose (1 more time)"]
+    assert_audited(run)
+
+
+def test_of_more_texts_than_are_looked_for_each_is_recorded() -> None:
+    run = waiting()
+    for number in (*range(70), 69, 0):
+        run.tick(Noted(0, f"{number}"))
+    assert run.events.count("noted") == 71

@@ -1,6 +1,7 @@
 """The dispatcher: hands permits to the executor, keeps the one command that flies, and measures how long that takes."""
 
 from collections import deque
+from typing import Final
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
@@ -14,6 +15,9 @@ from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 CONSERVATIVE_US = 20_000
 WINDOW = 128
 _ENOUGH = 8
+#: what is recorded of a fallback that was sent home or down, and ended without word of a landing
+UNCONFIRMED: Final = "it was sent, and not confirmed: no landing was seen"
+_UNCONFIRMED = ("time-over", "released")
 
 
 class RemainingLatency:
@@ -113,6 +117,8 @@ class Dispatcher:
         active = self.active
         if active is None:
             return
+        if active.homeward and active.ref.kind != STEP and event in _UNCONFIRMED:
+            detail = UNCONFIRMED
         self._journal.effect(now, event, active.ref, token=active.command.token, detail=detail)
         self._executor.ended(active.command.token)
         self.active = None

@@ -21,6 +21,7 @@ from rtshcua.onboard.ports import (
     Noted,
     TakenOver,
 )
+from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 from rtshcua.onboard.runtime.journal import REPEATED_EVERY_US
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
@@ -374,3 +375,18 @@ def test_of_more_texts_than_are_looked_for_each_is_recorded() -> None:
     for number in (*range(70), 69, 0):
         run.tick(Noted(0, f"{number}"))
     assert run.events.count("noted") == 71
+
+
+def ended_links(run: Run) -> list[tuple[str, str]]:
+    told = [json.loads(line) for line in run.lines]
+    return [(each["event"], each["detail"]) for each in told if each.get("event") in ("time-over", "released")]
+
+
+def test_a_fallback_of_which_no_landing_was_seen_is_said_so() -> None:
+    run = returning()
+    assert ended_links(run) == [("time-over", "")], "a hold is over when its time is"
+    run.tick(TakenOver(0, "POSCTL"))
+    assert ended_links(run)[1:] == [("released", UNCONFIRMED)]
+    step = running()
+    step.tick(TakenOver(0, "POSCTL"))
+    assert ended_links(step) == [("released", "")], "a step is no fallback"

@@ -46,6 +46,8 @@ class Folder:
 
     def identity(self) -> Identity | Refusal | None:
         """What was begun here; None: nothing yet."""
+        if self.path.exists() and not self.path.is_dir():
+            return Refusal("usage", f"`{self.path}` is no folder", "`-o` names a campaign's folder")
         kept = read_if_there(self.path / "campaign.json", _LARGEST)
         if kept is None:
             return None

@@ -23,6 +23,7 @@ from rtshcua.campaign.shrinking import shrink
 from rtshcua.campaign.summary import Summary, as_json, summarise
 from rtshcua.campaign.workers import Cluster, Here, Processes, Workers, cores
 from rtshcua.campaign.written import scenario_text
+from rtshcua.cli.faults import say, words_of
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.sources import compile_sources
@@ -100,6 +101,8 @@ def campaign(
     )  # fmt: skip
     if begun is not None and begun != identity:
         return findings.end(_other(folder, begun, identity))
+    if not as_json_:
+        say(f"without faults first, on {' and '.join(flavours)}")
     space = _space(field, compiled.policy, compiled.mission, flavours, kinds)
     if isinstance(space, Refusal):
         return findings.end(space)
@@ -110,19 +113,26 @@ def campaign(
         return findings.refuse(ExitCode.USAGE, "usage", "`--cluster` needs Dask, which is not installed", help)
     with closing(workers):
         if begun is None:
-            folder.begin(identity)
+            try:
+                folder.begin(identity)
+            except OSError as error:
+                return findings.refuse(ExitCode.FULL, "io", f"cannot write to `{folder.path}`: {words_of(error)}")
         order = Order(seed, flights, space)
         past = folder.past()
         progress = _Progress(flights, sum(number < flights for number in past), quiet=as_json_)
         try:
             flying.fly(order, field, workers, past, lambda result: progress.flown(result, folder))
+        except KeyboardInterrupt:
+            progress.clear()
+            say(f"{len(past)} of {flights} flights are kept in `{folder.path}`: the same command again goes on")
+            raise
         finally:
             progress.clear()
-            folder.tell(_summary(identity, past, flights, folder))
+            folder.tell(_summary(identity, past, folder))
     wanted = {number: past[number] for number in range(flights)}
     if not quickly:
         _shrink(order, field, wanted, past, folder, identity, _imported(source, folder), progress)
-    summary = _summary(identity, past, flights, folder)
+    summary = _summary(identity, past, folder)
     folder.tell(summary)
     if not as_json_:
         print("\n".join(_told(summary, folder)))
@@ -161,6 +171,7 @@ def _space(
 ) -> Space | Refusal:
     """What is drawn from: how long the mission takes where nothing goes wrong, on each kind of autopilot."""
     lasts = {}
+    roles = sorted({policy.roles[rule.approver] for rule in policy.rules if rule.approver >= 0})
     for each in flavours:
         calm = field.fly(Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), (), ())))
         wrong = f"fails even if nothing goes wrong: {calm.failures[0].text}" if calm.failures else None
@@ -168,10 +179,11 @@ def _space(
             wrong = f"ends as `{calm.ending}` even if nothing goes wrong"
         if wrong is not None:
             help = "see it with `rtshcua run`; a campaign looks for what faults do to a flight that is good without"
-            return Refusal("usage", f"on {each} the mission {wrong}", help)
+            if roles:
+                help += ". Nobody approves anything in it: a step that a `confirm` rule holds up cannot be flown so"
+            return Refusal("not-flown", f"on {each} the mission {wrong}", help)
         lasts[each] = calm.flown_us
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
-    roles = sorted({policy.roles[rule.approver] for rule in policy.rules if rule.approver >= 0})
     read = sorted({source.message for signal in policy.signals for source in signal.sources})
     return Space(skills, lasts, tuple(roles), flavours, kinds, tuple(read))
 
@@ -211,11 +223,11 @@ def _shrink(
     progress.clear()
 
 
-def _summary(identity: Identity, past: Mapping[int, Result], flights: int, folder: Folder) -> Summary:
-    flown = {number: result for number, result in past.items() if number < flights}
-    slugs = {failed.slug for result in flown.values() for failed in result.failures}
+def _summary(identity: Identity, past: Mapping[int, Result], folder: Folder) -> Summary:
+    """Of all that the folder has, also where fewer are asked for this time."""
+    slugs = {failed.slug for result in past.values() for failed in result.failures}
     kept = {slug: f"failures/{slug}.rts" for slug in slugs if folder.scenario(slug).exists()}
-    return summarise(identity.mission, identity.seed, flown, kept)
+    return summarise(identity.mission, identity.seed, past, kept)
 
 
 def _told(summary: Summary, folder: Folder) -> list[str]:

@@ -37,6 +37,7 @@ _NO_KEYS = "`rtshcua keys init` makes a development root"
 #: of what is refused for another reason than that it is not to be trusted, by slug
 _CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
 _CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "since"), ExitCode.INPUT)
+_CODES |= {"not-flown": ExitCode.TESTS}
 
 
 @contextmanager

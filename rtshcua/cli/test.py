@@ -80,7 +80,8 @@ def run_tests(
     refused = None if junit_file is None else refusal(junit_file, files, _REPORT)
     if refused is not None:
         return findings.end(refused)
-    least = fail_under if fail_under is not None else _least(paths or [Path()], projects)
+    whole = not chosen and all(path.is_dir() for path in paths or [Path()])  # of a part, nobody asked for a share
+    least = fail_under if fail_under is not None or not whole else _least(paths or [Path()], projects)
     results = run_all(files, chosen, with_coverage=coverage or least is not None, quiet=as_json)
     return _finish(results, findings, least, junit_file, verbose=verbose, quiet=as_json)
 
@@ -138,7 +139,7 @@ def _finish(
             print(line)
         print(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
         if short:
-            print(f"less than {least} % is covered")
+            print(f"less than {least} % is covered (`--fail-under`, or `fail-under` of the configuration)")
     shares = None if covered is None else coverage_json(covered, results.sources)
     return findings.finish(
         code,

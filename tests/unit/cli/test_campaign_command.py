@@ -204,7 +204,7 @@ def test_a_mission_that_does_not_fly_without_faults_is_refused(
 ) -> None:
     flies(lambda _, flight: replace(told(flight), ending="refused"))
     code, _, err = run(capsys)
-    assert code == ExitCode.USAGE
+    assert code == ExitCode.TESTS
     assert "on px4 the mission ends as `refused` even if nothing goes wrong" in err
     assert not Path("runs").exists()
 
@@ -214,8 +214,25 @@ def test_a_mission_that_fails_without_faults_is_refused(
 ) -> None:
     flies(lambda _, flight: told(flight, Failed("collision", "flew into the ground")))
     code, _, err = run(capsys)
-    assert code == ExitCode.USAGE
+    assert code == ExitCode.TESTS
     assert "on px4 the mission fails even if nothing goes wrong: flew into the ground" in err
+
+
+def test_fewer_flights_than_were_flown_are_reported_with_all_that_were(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(lambda _, flight: told(flight, *[Failed("late", "came late")] * (flight.number == 3)))
+    assert run(capsys, "--flights", "5", "-o", "made", "--no-shrink")[0] == ExitCode.TESTS
+    code, out, _ = run(capsys, "--flights", "2", "-o", "made", "--no-shrink")
+    assert code == ExitCode.TESTS
+    assert "5 flights, 1 failed" in out
+
+
+def test_a_file_is_no_folder_of_a_campaign(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("made").write_text("mine")
+    code, _, err = run(capsys, "-o", "made")
+    assert (code, Path("made").read_text()) == (ExitCode.USAGE, "mine")
+    assert "`made` is no folder" in err
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rtshcua.cli.faults import code_of, fail, say, say_rendered
+from rtshcua.cli.faults import code_of, fail, say, say_lines, say_rendered
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -37,7 +37,7 @@ class Findings:
         elif found:
             text = render(most_severe(found), sources)
             say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
-            say(_count(found))
+            say_lines(f"\n{_count(found)}")
             if len(found) > MOST_SHOWN:
                 say(f"{len(found) - MOST_SHOWN:,} of them are not shown, the least severe: `--json` has all")
         forbidding = {Severity.ERROR, Severity.WARNING} if self._deny_warnings else {Severity.ERROR}
@@ -70,7 +70,7 @@ def _count(found: tuple[Diagnostic, ...]) -> str:
     numbers = ((severity.value, sum(each.severity is severity for each in found)) for severity in Severity)
     parts = [f"{number} {word}{'s' * (number > 1)}" for word, number in numbers if number]
     first = next((each.code.id for each in found if each.severity is not Severity.NOTE), found[0].code.id)
-    return f"\n{', '.join(parts)}; `rtshcua explain {first}` tells more"
+    return f"{', '.join(parts)}; `rtshcua explain {first}` tells more"
 
 
 def _wants_colour() -> bool:

@@ -40,9 +40,9 @@ def test_syntax_errors_fixes_and_code_actions(editor: Editor, folder: Path) -> N
     editor.close(uri)
 
 
-def test_columns_are_utf_16_and_lines_end_in_three_ways(editor: Editor, folder: Path) -> None:
+def test_columns_are_utf_16_and_lines_end_in_two_ways(editor: Editor, folder: Path) -> None:
     uri = uri_of(str(folder / "clef.rts"))
-    text = "/* 𝄞 */ zone a = union(nothing_1)\r\n/* é */ zone b = union(nothing_2)\r// 𝄞\nzone c = union(nothing_3)\n"
+    text = "/* 𝄞 */ zone a = union(nothing_1)\r\n/* é */ zone b = union(nothing_2)\n// 𝄞\nzone c = union(nothing_3)\n"
     found = editor.open(uri, text)
     assert [(each.range.start.line, each.range.start.character) for each in found] == [(0, 24), (1, 23), (3, 15)]
     found = editor.change(uri, 2, (0, 3, 0, 5, "ab𝄞"), (0, 26, 0, 35, "b"))

@@ -25,6 +25,7 @@ PAGES = CHECKOUT / "docs" / "codes"
 #: what a source alone cannot show: bytes that are no text, size, depth, other files, other formats, command lines
 TOLD = {
     codes.NOT_TEXT,
+    codes.HIDDEN_CHARACTER,
     codes.TOO_LARGE,
     codes.TOO_DEEP,
     codes.TOO_MANY_FINDINGS,

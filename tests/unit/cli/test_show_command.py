@@ -293,7 +293,7 @@ def test_pages_wrap_beneath_themselves() -> None:
 
 
 def test_text_from_elsewhere() -> None:
-    assert visible("a\tb\x00é°") == "a\\tb\\x00é°"
+    assert visible("a\tb\x00é°") == "a<U+0009>b<U+0000>é°"
     assert shorten("abcdef", 4) == "abc…"
     assert shorten("abcd", 4) == "abcd"
     assert utc(0) == "1970-01-01 00:00:00Z"

@@ -128,7 +128,7 @@ def test_several_fixes_of_a_text(findings: list[Diagnostic], expected: str | Non
 
 
 def test_only_a_line_feed_ends_a_line_of_a_difference(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    odd = WITHOUT.replace("\n", "  // a\u2028b\x85c\rd\n", 1) + IDLE
+    odd = WITHOUT.replace("\n", "  // a\fb\n", 1) + IDLE
     Path("policy.rts").write_bytes(b"\xef\xbb\xbf" + odd.encode())
     assert main(["lint", ".", "--diff"]) == ExitCode.DIAGNOSTICS
     said = capsys.readouterr().out.split("\n")

@@ -1,7 +1,7 @@
 # Everything runs in .venv, which any target that needs it makes first: Python 3.11 or later and make are enough.
-#   make PYTHON=/path/to/python3.12 ...   choose the Python        make JOBS=8 test   test processes (3)
+#   make PYTHON=/path/to/python3.12 ...   choose the Python        make JOBS=8 test   test processes (4)
 
-JOBS ?= 3
+JOBS ?= 4
 BIN := .venv/bin
 
 export PYTHON

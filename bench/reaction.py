@@ -34,6 +34,7 @@ from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import RunLoop
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.live.telling import Teller
@@ -117,6 +118,9 @@ class Going:
         """Microseconds."""
         return int(seconds * 1e6)
 
+    def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
+        """The flight's stays as it is."""
+
 
 def under_way() -> Flight:
     """A flight whose second step flies."""
@@ -172,7 +176,8 @@ def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
     if feed is not None:
         frames._file = Slowly(frames._file)
     sink = EvidenceWriter((SlowFile if feed else EvidenceFile)(folder / "log.jsonl"))
-    vehicle = ConnectedVehicle(("127.0.0.1", 0), flight.vehicle.driver, clock, frames.write)
+    transport = UdpTransport("127.0.0.1", 0, begins=False)
+    vehicle = ConnectedVehicle(transport, flight.vehicle.driver, clock, frames.write)
     watch: Callable[..., None] = unwatched
     if feed is not None:
         policy, mission = flight.loaded.bundle.policy, flight.loaded.bundle.mission
@@ -181,7 +186,7 @@ def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
     loop = RunLoop(flight.runtime, vehicle, sink, clock, watch)
     gc.collect()
     gc.freeze()  # as `rtshcua run` does
-    print(vehicle.port, flush=True)
+    print(transport.port, flush=True)
     while not select.select([sys.stdin], [], [], 0)[0]:
         loop.turn()
     sys.stdin.readline()

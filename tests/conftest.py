@@ -4,6 +4,7 @@ import gc
 import gzip
 import json
 import os
+import signal
 import stat
 import sys
 import sysconfig
@@ -88,6 +89,8 @@ def pytest_configure(config: pytest.Config) -> None:
         same_examples()
     if hasattr(config, "workerinput"):
         return
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell starts what runs in the background
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # else commands would inherit it
     shared = TemporaryDirectory(prefix="rtshcua_once_")
     config.add_cleanup(shared.cleanup)
     os.environ[once.FOLDER] = shared.name

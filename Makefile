@@ -30,6 +30,7 @@ lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	MYPYPATH=tests $(BIN)/mypy bench
 	$(BIN)/lint-imports
 	$(BIN)/rtshcua fmt --check skills policies missions examples
 	$(BIN)/rtshcua lint skills policies missions examples

@@ -25,9 +25,9 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Plan
+from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
-from rtshcua.model.flat.zone import POLYGON
+from rtshcua.model.flat.zone import POLYGON, Zone
 from rtshcua.model.outcome import Outcome
 
 DECIDE_MEDIAN, DECIDE_P99, AUTHORITY_MEDIAN, MANY_RULES = 30.0, 100.0, 5.0, 2.0  # us, us, us, ratio
@@ -141,7 +141,7 @@ def asked_of_authority(policy: PreparedPolicy, keys: list[Key]) -> Callable[[], 
     return lambda: authority(next(turn))
 
 
-def prepared(invocation: flat.Invocation, policy: PreparedPolicy) -> PreparedInvocation:
+def prepared(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation:
     """An invocation that is known to be well-formed."""
     found = prepare_invocation(invocation, policy, flat.MISSION.phases)
     assert not isinstance(found, Refusal), found
@@ -166,7 +166,7 @@ def ring(west: int, south: int, east: int, north: int) -> tuple[int, ...]:
     return tuple(coordinate for corner in corners for coordinate in corner)
 
 
-def sixteen(zone: flat.Zone) -> flat.Zone:
+def sixteen(zone: Zone) -> Zone:
     """The zone with 16 vertices, where it is a polygon."""
     return replace(zone, data=ring(*zone.data[:2], *zone.data[4:6])) if zone.shape == POLYGON else zone
 

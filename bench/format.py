@@ -84,7 +84,7 @@ def against(bare: Lark, name: str, texts: list[str]) -> bool:
         f"format: the whole takes {everything / peer:.2f} times a bare Lark parse, limit {WHOLE_RATIO:g} "
         f"({everything:.0f} ms against {peer:.0f} ms, {name})"
     )
-    return layout <= LAYOUT_RATIO * own and everything <= WHOLE_RATIO * peer
+    return bool(layout <= LAYOUT_RATIO * own and everything <= WHOLE_RATIO * peer)
 
 
 def in_proportion() -> bool:

@@ -151,7 +151,7 @@ def main() -> int:
         }
         for words, folder in asked.values():
             seconds(words, place / folder, environment)  # byte code is written, the cache is warm
-        taken = {name: [] for name in asked}
+        taken: dict[str, list[Time]] = {name: [] for name in asked}
         for _ in range(ROUNDS):
             for name, (words, folder) in asked.items():
                 taken[name].append(seconds(words, place / folder, environment))

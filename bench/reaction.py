@@ -23,13 +23,13 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from random import Random
 from statistics import median
-from typing import Any
+from typing import Any, cast
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.files.evidence import EvidenceFile
+from rtshcua.adapters.files.evidence import EvidenceFile, LogFile
 from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import RunLoop
@@ -174,7 +174,7 @@ def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
     clock = Going(flight.clock.now())
     frames = TelemetryFile(folder / "telemetry.tlog")
     if feed is not None:
-        frames._file = Slowly(frames._file)
+        frames._file = cast(LogFile, Slowly(frames._file))
     sink = EvidenceWriter((SlowFile if feed else EvidenceFile)(folder / "log.jsonl"))
     transport = UdpTransport("127.0.0.1", 0, begins=False)
     vehicle = ConnectedVehicle(transport, flight.vehicle.driver, clock, frames.write)
@@ -214,7 +214,8 @@ def reactions(
         words = [sys.executable, __file__, "--fly", "slowly" if slowly else "quickly"]
         with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as flying:
             found.append([one(flying, frames, chance) for _ in range(count)])
-            flying.stdin.close()
+            if flying.stdin is not None:
+                flying.stdin.close()
             flying.kill()  # its files are slow
     return found
 
@@ -260,6 +261,7 @@ def bare(count: int) -> list[float]:
         subprocess.Popen(words, stdout=subprocess.PIPE) as echo,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
     ):
+        assert echo.stdout is not None
         address, times = ("127.0.0.1", int(echo.stdout.readline())), []
         link.settimeout(PATIENCE_S)
         for _ in range(count):

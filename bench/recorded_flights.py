@@ -90,8 +90,8 @@ def main() -> int:
         ("somebody else's return too", 107.0, taken[1]),
         ("landed and disarmed", 158.0, copter.of(AirState)[-1][0]),
     ])  # fmt: skip
-    done = {event.token: at for at, event in px4.of(Succeeded)}
-    unanswered = [event.reason for _, event in px4.of(Failed)]
+    done = {event.token: at for at, event in px4.of(Succeeded) if isinstance(event, Succeeded)}
+    unanswered = [event.reason for _, event in px4.of(Failed) if isinstance(event, Failed)]
     wrong += moments(px4, [
         ("ready", 5.6, px4.first(Ready)),
         ("takeoff done, when the recorded client went on", 26.9, done[1]),

@@ -26,7 +26,7 @@ from reference import flat_case as flat
 from rtshcua.adapters.files.verification import Asked, verify_carefully, verify_quickly
 from rtshcua.decision.decide import decide
 from rtshcua.decision.durability import durability_of
-from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Audit
@@ -66,7 +66,9 @@ def lines(records: int) -> Iterator[bytes]:
     )  # fmt: skip
     bundle = open_bundle(BUNDLE, root=root[0], vehicle="quad-07", now_us=start)
     policy = prepare(bundle.policy)
+    assert isinstance(policy, PreparedPolicy)
     invocation = prepare_mission(bundle.mission, policy)[0]
+    assert isinstance(invocation, PreparedInvocation)
     flat_invocation = invocation.invocation
     state = State((9_900, 23, None, 10_000, 3, 52, 22, 40_000), (500_000, 0, 0, 480_000, 0, 0, 0, 0))
     asked = Context(flat_invocation.binding, "quad-07", 7, 0, now(0).monotonic_us - 1_000, 0, 12_000, ())

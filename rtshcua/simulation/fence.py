@@ -149,8 +149,8 @@ class FenceRules:
     """What of the fence is violated there."""
     every: bool
     """Whether every included area must be kept to."""
-    critical: bool
-    """Whether HEARTBEAT tells of a breach (MAV_STATE_CRITICAL)."""
+    critical: Callable[[Callable[[str], float]], bool]
+    """From the parameters (by name): whether HEARTBEAT tells of a breach (MAV_STATE_CRITICAL)."""
 
 
 class FenceWatch:
@@ -197,7 +197,7 @@ class FenceWatch:
     @property
     def critical(self) -> bool:
         """Whether HEARTBEAT tells of a breach now."""
-        return self.breach is not None and self._rules.critical
+        return self.breach is not None and self._rules.critical(self._value)
 
     def allows(self, point: Point) -> bool:
         """Whether the fence that is in force now has nothing against a target there."""

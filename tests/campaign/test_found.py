@@ -43,3 +43,13 @@ def test_motors_that_stop_low_in_a_takeoff_are_no_landing_before_it_lies_there()
     """Below 3 m it counted as landed as soon as it was slow, which what rises is before it falls."""
     for kills_s in (6.3, 6.68, 7.3):
         assert slugs(flown(of("ardupilot", at(kills_s, faults.Kill(0))))) == set()
+
+
+def test_a_failsafe_of_px4_in_the_mode_that_we_fly_in_is_a_takeover() -> None:
+    """Its fence holds it where it breaks it: in Hold, which our stop had chosen. That was noted, and flown over."""
+    for lost, jump_s in (
+        (at(22, faults.MessageSilence(0, "GPS_RAW_INT", 8 * S)), 27), (at(30, faults.GpsLoss(0, 4 * S)), 31),
+    ):  # fmt: skip
+        was = flown(of("px4", lost, at(jump_s, faults.GpsJump(0, 60_000, 0))))
+        assert any(each.taken_over_by == "failsafe" for each in was.samples), "nothing took over"
+        assert (was.ending, slugs(was)) == ("stood-down", set())

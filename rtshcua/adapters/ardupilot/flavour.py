@@ -99,6 +99,7 @@ ARDUPILOT = AutopilotFlavour(
     ours=frozenset({CopterMode.GUIDED, CopterMode.BRAKE, CopterMode.RTL}),
     mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
+    critical_acts=False,  # a failsafe that acts changes the mode
     bytewise=False,
     fence=FenceHabits(
         frame=enums.MAV_FRAME_GLOBAL, all_inclusions=True, switches=(("FENCE_TYPE", _POLYGONS), ("FENCE_ENABLE", 1))

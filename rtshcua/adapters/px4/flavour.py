@@ -77,6 +77,7 @@ PX4 = AutopilotFlavour(
     ours=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD, Px4Mode.RETURN}),
     mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
+    critical_acts=True,  # since 1.15 a warning alone does not count (PX4-Autopilot pull request 22879)
     bytewise=True,
     fence=FenceHabits(frame=enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, all_inclusions=False, switches=()),
     own_fence=OwnFence("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),

@@ -116,7 +116,8 @@ class AutopilotFlavour:
     in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay.
     `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
     top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
-    there. `bytewise`: integer parameters travel as their bytes. `fence` says how it takes a geofence, `own_fence` what
+    there. `critical_acts`: a critical state in the air says that a failsafe of its own acts, also where it stays in the
+    mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes. `fence` says how it takes a geofence, `own_fence` what
     bounds it has besides.
     """
 
@@ -129,6 +130,7 @@ class AutopilotFlavour:
     ours: frozenset[int]
     mode_within_us: int
     returns: tuple[ReturnAltitude, ...]
+    critical_acts: bool
     bytewise: bool
     fence: FenceHabits
     own_fence: OwnFence

@@ -401,7 +401,7 @@ class Manoeuvre:
         return "did-not-hold" if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)) else None
 
     def _taken_over(self, seen: ObservedVehicle) -> str | None:
-        """What shows that somebody else flies: a mode, a landing or a target that nothing of ours asked for.
+        """What shows that somebody else flies: a mode, a landing, a failsafe or a target that nothing of ours asked for.
 
         A mode may belong to this stage or, until its own mode showed, to those before.
         """
@@ -417,6 +417,8 @@ class Manoeuvre:
         self._was_landing = self._was_landing and seen.landing
         if seen.landing and not homeward and not self._was_landing:
             return "landing"
+        if seen.critical and seen.airborne and not homeward and self._flavour.critical_acts:
+            return "failsafe"
         return "another target" if self._aids.targets.is_foreign(seen) else None
 
     def _was_taken_back(self, seen: ObservedVehicle) -> bool:

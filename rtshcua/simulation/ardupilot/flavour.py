@@ -206,7 +206,7 @@ class ArduCopter(Flavour):
         waits_for_start=True,
         text=lambda number, item: f"Mission: {number} {_NAMES.get(item.command, 'Delay')}",
     )
-    fence = FenceRules(limits=_limits, name=_name, every=True, critical=False)
+    fence = FenceRules(limits=_limits, name=_name, every=True, critical=lambda _: False)
 
     def arming(self, a: Autopilot) -> tuple[str, ...]:
         """What stands against arming. A mode that does without a position can be armed in without one."""

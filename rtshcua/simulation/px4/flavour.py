@@ -55,6 +55,11 @@ def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
     return FenceLimits(area, high if high > 0 else inf)
 
 
+def _acts(value: Callable[[str], float]) -> bool:
+    """A breach of which it only warns does not count as a failsafe since 1.15 (PX4-Autopilot pull request 22879)."""
+    return value("GF_ACTION") > _WARN
+
+
 FARTHEST_FIRST_M = 10_000.0
 """MIS_DIST_1WP: farther than this from home the first waypoint may not be."""
 
@@ -168,7 +173,7 @@ class Px4(Flavour):
         after=Mode.LOITER,
         tells_all=True,
     )
-    fence = FenceRules(limits=_limits, name=lambda _limits, _point: "Geofence", every=False, critical=True)
+    fence = FenceRules(limits=_limits, name=lambda _limits, _point: "Geofence", every=False, critical=_acts)
 
     def arming(self, a: Autopilot) -> tuple[str, ...]:
         """What stands against arming PX4."""

@@ -152,6 +152,11 @@ def collected(session: pytest.Session) -> Generator[None, object, object]:
     return (yield)
 
 
+def pytest_unconfigure() -> None:
+    """Let go of what was collected: libraries look at the end whether anything of theirs is left, and print what is."""
+    gc.unfreeze()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
     """With xdist, tell of a test once; what its fixtures came to only if they failed, or if `--durations` asks for it.

@@ -139,7 +139,8 @@ class Asker:
             columns = tuple(column[0] for column in cursor.description or ())
             rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit)
         except duckdb.Error as error:
-            raise Untrusted("malformed", str(error)) from None
+            said = str(error).partition("\n\nLINE ")[0]  # then the question once more, with a caret under it
+            raise Untrusted("malformed", " ".join(said.split())) from None
         return Answer(columns, rows)
 
     def close(self) -> None:

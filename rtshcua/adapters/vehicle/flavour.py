@@ -117,8 +117,8 @@ class AutopilotFlavour:
     `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
     top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
     there. `critical_acts`: a critical state in the air says that a failsafe of its own acts, also where it stays in the
-    mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes. `fence` says how it takes a geofence, `own_fence` what
-    bounds it has besides.
+    mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes. `fence` says how it
+    takes a geofence, `own_fence` what bounds it has besides.
     """
 
     name: str

@@ -401,7 +401,7 @@ class Manoeuvre:
         return "did-not-hold" if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)) else None
 
     def _taken_over(self, seen: ObservedVehicle) -> str | None:
-        """What shows that somebody else flies: a mode, a landing, a failsafe or a target that nothing of ours asked for.
+        """What shows that somebody else flies: a mode, a landing, a failsafe or a target that is not of ours.
 
         A mode may belong to this stage or, until its own mode showed, to those before.
         """

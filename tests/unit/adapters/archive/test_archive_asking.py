@@ -131,6 +131,7 @@ def test_only_one_select_over_the_archive(
     with pytest.raises(Untrusted) as refusal:
         asker.ask(sql)
     assert refusal.value.slug == "malformed"
+    assert str(refusal.value).isprintable(), "it is told on one line"
     assert not list(tmp_path.iterdir())
 
 

@@ -13,15 +13,22 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
-from rtshcua.adapters.files.signing import fingerprint, write_link_key
-from rtshcua.cli.faults import fail, refuse, untrusted
+from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key, write_link_key
+from rtshcua.adapters.link_setup import LinkSetup, after_setup, carry_out
+from rtshcua.adapters.vehicle.address import Address, AddressError
+from rtshcua.adapters.vehicle.address import parse as parse_address
+from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
+from rtshcua.cli.meeting import unopened
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
 from rtshcua.cli.unlock import read_passphrase, unlock
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, TrustRoot, open_root
@@ -195,16 +202,47 @@ def show(
 
 @app.command()
 def link(
-    file: Annotated[Path, typer.Argument(help="the file to make; readable by you alone")],
+    file: Annotated[Path, typer.Argument(help="the file to make; with --connect it may be there")],
     passphrase_file: Annotated[
         Path | None,
         typer.Option(help="make the key of this passphrase, as ground stations do, instead of a random one"),
     ] = None,
+    connect: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="put the key on the vehicle there, and look what comes of it"),
+    ] = None,
+    trusted_link: Annotated[
+        bool,
+        typer.Option("--trusted-link", help="you vouch that nobody else hears this link: the key crosses it in clear"),
+    ] = False,
+    system: Annotated[
+        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
+    ] = None,
 ) -> ExitCode:
     """Make a key for MAVLink 2 signing: `rtshcua run --signing-key FILE`, and the same key in the vehicle.
 
-    A ground station gives it to the vehicle (SETUP_SIGNING), over a cable and disarmed. One key a vehicle.
+    With `--connect` the vehicle gets it too (SETUP_SIGNING), over a link that you vouch for, disarmed, on the ground.
+    It is then seen whether signed frames are answered, and unsigned ones are not; code 0 means that. A vehicle that
+    has the key gets nothing, and is looked at only. One key a vehicle.
     """
+    if connect is None and (trusted_link or system is not None):
+        return fail(ExitCode.USAGE, "`--trusted-link` and `--system` are about the link of `--connect`")
+    if connect is not None:
+        if not trusted_link:
+            help = "a cable, or a network of its own; `--trusted-link` says that you vouch for it"
+            return fail(ExitCode.USAGE, "the key would cross the link in clear: nobody vouches for it", help)
+        try:
+            address = parse_address(connect)
+        except AddressError as error:
+            return misaddressed("--connect", error)
+    if connect is None or passphrase_file is not None or not file.exists():
+        code = _make_link_key(file, passphrase_file)
+        if code is not ExitCode.OK or connect is None:
+            return code
+    return _set_up(file, address, system)
+
+
+def _make_link_key(file: Path, passphrase_file: Path | None) -> ExitCode:
     key = secrets.token_bytes(KEY_OCTETS)
     if passphrase_file is not None:
         passphrase = read_passphrase(passphrase_file)
@@ -217,6 +255,48 @@ def link(
         return fail(ExitCode.REFUSED, f"there is a file `{file}` already", "a key that is in use is not overwritten")
     print(f"{file}: link key {fingerprint(key)}")
     return ExitCode.OK
+
+
+def _set_up(file: Path, address: Address, system: int | None) -> ExitCode:
+    """Put a link key on the vehicle at an address, and say what was seen."""
+    try:
+        key = read_link_key(file)
+    except LinkKeyError as error:
+        return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+    try:
+        transport = open_transport(address)
+    except OSError as error:
+        return refuse(unopened(address, error), ExitCode.LINK)
+    clock = SystemClock()
+    begun = clock.now()
+    try:
+        setup = LinkSetup(key, begun.utc_us, begun.monotonic_us, system, begins=transport.begins)
+        seen = carry_out(setup, transport, lambda: clock.now().monotonic_us)
+    finally:
+        transport.close()
+    if isinstance(seen, Refusal):
+        return refuse(seen, ExitCode.LINK if seen.slug in ("no-vehicle", "no-answer") else ExitCode.REFUSED)
+    release = "of an unknown release" if seen.release is None else ".".join(map(str, seen.release))
+    did = "it has this key, nothing was sent" if seen.already else "disarmed, on the ground: the key was sent"
+    yes = {True: "yes", False: "no"}
+    print(f"{seen.autopilot} {release}, system {seen.system}: {did}")
+    print(f"  signs what it sends           {yes[seen.signs]}")
+    print(f"  answers a signed request      {yes[seen.answers_signed]}")
+    print(f"  answers an unsigned request   {yes[seen.answers_unsigned]}")
+    for text in seen.texts:
+        print(f"  it said                       `{visible(text)}`")
+    print(f"  {after_setup(seen.autopilot, seen.release)}")
+    if seen.insists:
+        return ExitCode.OK
+    if seen.signs and seen.answers_signed:
+        help = "over USB that may be so: the same command on the link that it flies with looks there, and sends nothing"
+        return fail(ExitCode.REFUSED, "it has the key, and obeys on this link without it", help, slug="not-insisted")
+    return fail(
+        ExitCode.REFUSED,
+        "the key has no effect on this link",
+        "it was refused, or is not known there",
+        slug="no-effect",
+    )
 
 
 def _added(

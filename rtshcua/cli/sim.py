@@ -55,8 +55,16 @@ def sim(
         bool, typer.Option("--stock", help="GPS, barometer and battery alone: no radio, range finder, wind or voltage")
     ] = False,
     usb: Annotated[
-        bool, typer.Option("--usb", help="with a key: it takes this link for USB, and obeys anyone")
+        bool, typer.Option("--usb", help="it takes this link for USB: ArduCopter obeys anyone there, key or not")
     ] = False,
+    release: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MAJOR.MINOR",
+            callback=simulated.release,
+            help="what it says it is, and takes keys as: PX4 1.16 (no keys), 1.17 or 1.18",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="say what was started as one JSON object")] = False,
 ) -> ExitCode:
     """Start the simulated vehicle, until Ctrl-C. It sends to a UDP port of this machine and obeys what answers."""
@@ -88,6 +96,7 @@ def sim(
         words.append(f"--signing-key={signing_key}")
     words += ["--usb"] if usb else []
     words += ["--stock"] if stock else []
+    words += [f"--release={release}"] if release is not None else []
     words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
     try:
         vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", "--system", str(system), *words])

@@ -11,12 +11,20 @@ from rtshcua.simulation.faults import OF_VEHICLE, parse_fault
 from rtshcua.virtual.fitting import fitting
 
 _WIND = re.compile(r"\d+(\.\d+)?,\d+(\.\d+)?(,\d+(\.\d+)?)?", re.ASCII)
+_RELEASE = re.compile(r"\d{1,2}\.\d{1,2}", re.ASCII)
 _HOME = re.compile(r"-?\d+(\.\d+)?,-?\d+(\.\d+)?,-?\d+(\.\d+)?", re.ASCII)
 
 
 def _wind(text: str | None) -> str | None:
     if text is not None and not _WIND.fullmatch(text):
         raise typer.BadParameter(f"`{text}` is not SPEED,FROM[,GUST] in m/s and degrees")
+    return text
+
+
+def release(text: str | None) -> str | None:
+    """The callback of an option for a release: it is two numbers."""
+    if text is not None and not _RELEASE.fullmatch(text):
+        raise typer.BadParameter(f"`{text}` is no release, such as 1.18")
     return text
 
 

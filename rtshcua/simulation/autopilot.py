@@ -113,8 +113,12 @@ class Flavour(ABC):
         """What stands against arming, the mode apart; nothing if it would arm."""
 
     @abstractmethod
-    def insists(self, a: "Autopilot") -> bool:
-        """Whether, with a key, frames without a signature are refused."""
+    def release(self, *, keyed: bool) -> tuple[int, int]:
+        """Which release it is where none is chosen; `keyed`: it has a key from the start."""
+
+    @abstractmethod
+    def obeys_unsigned(self, a: "Autopilot", name: str) -> bool:
+        """Whether, with a key, a message of this name is obeyed without a right signature."""
 
     @abstractmethod
     def on_set_mode(self, a: "Autopilot", number: int) -> tuple[int, ...]:
@@ -124,9 +128,9 @@ class Flavour(ABC):
     def on_position_target(self, a: "Autopilot", message: Message) -> None:
         """Obeys SET_POSITION_TARGET_GLOBAL_INT, or does not; there is no answer."""
 
+    @abstractmethod
     def on_setup_signing(self, a: "Autopilot", message: Message) -> None:
-        """Obeys SETUP_SIGNING, or refuses it."""
-        a.signing.set_up(message, a.now_us)
+        """Obeys SETUP_SIGNING, refuses it, or does not know it; there is no answer."""
 
     @abstractmethod
     def on_breach(self, a: "Autopilot", breach: Breach) -> None:
@@ -162,6 +166,8 @@ class Autopilot:
         self.flavour = flavour
         self.home = config.home
         self.system = config.system
+        self.usb = config.usb
+        self.release = config.release or flavour.release(keyed=config.signing_key is not None)
         self.utc_us = config.utc_us
         self.now_us = 0
         self.since_us = 0
@@ -200,7 +206,7 @@ class Autopilot:
         if config.signing_key is not None:
             self.parameters.assign("MAV_SIGN_CFG", 1)
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
-        self.signing = VehicleSigning(config.signing_key, config.usb, config.utc_us, config.speed)
+        self.signing = VehicleSigning(config.signing_key, config.utc_us, config.speed)
         self.plans = Plans()
         self._home_item = flavour.home_item(self.home)
         if self._home_item is not None:

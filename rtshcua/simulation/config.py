@@ -97,7 +97,11 @@ class SimulationConfig:
     signing_key: bytes | None = None
     """The key of the link from the start; else SETUP_SIGNING may bring one."""
     usb: bool = False
-    """Whether the vehicle takes the link for USB, on which it obeys without a signature."""
+    """Whether the vehicle takes the link for USB, on which ArduCopter, and PX4 1.17, obey without a signature."""
+    release: tuple[int, int] | None = None
+    """Which release it says that it is, and takes keys as. If None, the recorded one (PX4 1.16, ArduCopter 4.7); a PX4
+    with a key is 1.18, for 1.16 has none.
+    """
     utc_us: int = 0
     """The time of day at the start, for the time stamps of signing; microseconds since 1970."""
     speed: int = 100
@@ -115,6 +119,11 @@ class SimulationConfig:
             raise ValueError("cruise speed is more than 0 and at most the greatest speed, which is at most 15000 mm/s")
         if self.signing_key is not None and len(self.signing_key) != KEY_OCTETS:
             raise ValueError(f"a key for signing has {KEY_OCTETS} octets")
+        if self.release is not None and not all(0 <= part <= 255 for part in self.release):
+            raise ValueError("a release is two numbers from 0 to 255")
+        keyless = self.flavour is Kind.PX4 and self.release is not None and self.release < (1, 17)
+        if keyless and self.signing_key is not None:
+            raise ValueError("PX4 takes keys from release 1.17 on")
         if self.speed <= 0:
             raise ValueError("speed is more than nothing")
         if not 2_000 <= self.return_mm <= 1_000_000:

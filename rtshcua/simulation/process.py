@@ -55,7 +55,8 @@ def parser() -> argparse.ArgumentParser:
     add("--stock", action="store_true", help="GPS, barometer and battery alone: nothing else is fitted")
     add("--extra", choices=list(Extra), action="append", help="what is fitted instead of the usual; may be repeated")
     add("--signing-key", type=_key, metavar="FILE", help="the link's key: 32 octets, or as many in hexadecimal")
-    add("--usb", action="store_true", help="the vehicle takes the link for USB: it obeys without signatures")
+    add("--usb", action="store_true", help="the vehicle takes the link for USB")
+    add("--release", type=_release, metavar="MAJOR.MINOR", help="what it says it is, and takes keys as")
     add("--fault", type=_fault, action="append", default=[], metavar="KIND,at=TIME,...", help="may be repeated")
     return options
 
@@ -85,6 +86,7 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         faults=tuple(options.fault),
         signing_key=options.signing_key,
         usb=options.usb,
+        release=options.release,
         utc_us=utc_us,
         speed=max(1, round(options.speed * 100)),
     )
@@ -114,6 +116,13 @@ def _listed(shape: str, least: int, most: int) -> Callable[[str], list[float]]:
         return values
 
     return parse
+
+
+def _release(text: str) -> tuple[int, int]:
+    major, _, minor = text.partition(".")
+    if not (text.isascii() and major.isdigit() and minor.isdigit()):
+        raise argparse.ArgumentTypeError(f"`{text}` is no release, such as 1.18")
+    return int(major), int(minor)
 
 
 def _key(text: str) -> bytes:

@@ -1,8 +1,8 @@
 """MAVLink 2 signing, the vehicle's end: https://mavlink.io/en/guide/message_signing.html.
 
 Once a key is set (SETUP_SIGNING, or from the start) all that the autopilot sends is signed, and what is not rightly
-signed has no effect and gets no answer, as recorded from ArduCopter on its second channel. Two things are let in all
-the same: RADIO_STATUS, which radios do not sign, and everything on a link that is taken for USB.
+signed has no effect and gets no answer, as recorded from ArduCopter on its second channel. What is let in all the same
+is the flavour's (`obeys_unsigned`), and so is whether it takes a key at all (`on_setup_signing`).
 """
 
 from typing import Final
@@ -10,17 +10,15 @@ from typing import Final
 from rtshcua.codec.frames import Message, Received
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
 
-_UNSIGNED: Final = frozenset({"RADIO_STATUS", "RADIO"})
 _FULL_SPEED: Final = 100
 _LATEST: Final = 1 << 47
 """No key begins with a later time stamp (in the year 2059): they have 48 bits, and must not run out in flight."""
 
 
 class VehicleSigning:
-    """One vehicle's key, if it has one. `usb`: the link is taken for USB; `speed`: see `SimulationConfig.speed`."""
+    """One vehicle's key, if it has one. `speed`: see `SimulationConfig.speed`."""
 
-    def __init__(self, key: bytes | None, usb: bool, utc_us: int, speed: int) -> None:
-        self._usb = usb
+    def __init__(self, key: bytes | None, utc_us: int, speed: int) -> None:
         self._speed = speed
         self._before_us = 0  # how long it ran before it was started again
         self._link: SignedLink | None = None
@@ -32,12 +30,9 @@ class VehicleSigning:
         """Whether there is a key."""
         return self._link is not None
 
-    def lets_in(self, received: Received, now_us: int, optional: bool) -> bool:
-        """Whether a frame may have an effect; `optional` means that the vehicle does not insist on signatures."""
-        link = self._link
-        if link is None:
-            return True
-        return link.accept(received.frame, self._clock(now_us)) or (optional or self._usb or received.name in _UNSIGNED)
+    def accept(self, received: Received, now_us: int) -> bool:
+        """Whether a frame is rightly signed; without a key every frame is as good."""
+        return self._link is None or self._link.accept(received.frame, self._clock(now_us))
 
     def set_up(self, message: Message, now_us: int) -> None:
         """SETUP_SIGNING: another key and the first time stamp, or none at all if the key is nothing but zeros."""

@@ -257,11 +257,17 @@ def extended_sys_state(vtol: int) -> Builder:
     return lambda a: _EXTENDED_SYS_STATE(vtol, a.vehicle.landed)
 
 
-def autopilot_version(capabilities: int, version: int, numbered: int) -> Builder:
-    """AUTOPILOT_VERSION; `numbered` is its `vendor_id` and `uid`."""
+def autopilot_version(capabilities: int, kind: int, numbered: int) -> Builder:
+    """AUTOPILOT_VERSION; `kind` is FIRMWARE_VERSION_TYPE, `numbered` its `vendor_id` and `uid`."""
     zeros = [0] * 8
-    parts = (_CAPABILITIES | capabilities, version, 0, 0, numbered, zeros, zeros, zeros, 0, 0, numbered)
-    return lambda _: mavlink.MAVLink_autopilot_version_message(*parts)
+    parts = (0, 0, numbered, zeros, zeros, zeros, 0, 0, numbered)
+
+    def build(a: Autopilot) -> Message:
+        major, minor = a.release
+        version = major << 24 | minor << 16 | kind
+        return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES | capabilities, version, *parts)
+
+    return build
 
 
 def system_time(a: Autopilot) -> Message:

@@ -41,6 +41,7 @@ _BASE = (
 _REPOSITION_M_S = 1.25
 """Half of WPNAV_ACCEL, as `land_run_horizontal_control` takes it."""
 
+_UNSIGNED = frozenset({"RADIO_STATUS", "RADIO"})
 _PARAMETERS = frozenset({"PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "PARAM_SET"})
 """What another thread answers (`GCS_MAVLINK::param_io_timer`)."""
 
@@ -228,9 +229,13 @@ class ArduCopter(Flavour):
             found.append("Vehicle breaching fence")
         return tuple(found)
 
-    def insists(self, a: Autopilot) -> bool:
-        """With a key, it always wants signatures."""
-        return True
+    def release(self, *, keyed: bool) -> tuple[int, int]:
+        """What was recorded."""
+        return 4, 7
+
+    def obeys_unsigned(self, a: Autopilot, name: str) -> bool:
+        """Anything on the first channel, taken for USB, as recorded; radios elsewhere."""
+        return a.usb or name in _UNSIGNED
 
     def home_item(self, home: Home) -> Item | None:
         """Slot 0 of every mission."""

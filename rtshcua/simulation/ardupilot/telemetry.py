@@ -84,9 +84,7 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state(mavlink.MAV_VTOL_STATE_MC),
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status_report,
     mavlink.MAVLINK_MSG_ID_WIND: _wind,
-    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version(
-        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT, 4 << 24 | 7 << 16, 0
-    ),
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version(mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT, 0, 0),
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _position_target,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,
 }

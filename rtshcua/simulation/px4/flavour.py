@@ -35,6 +35,12 @@ _BY_PILOT = _ORBITS | enums.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 _BY_ITSELF = _ORBITS | enums.MAV_MODE_FLAG_AUTO_ENABLED | enums.MAV_MODE_FLAG_GUIDED_ENABLED
 _AUTOMATIC = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND, Mode.ORBIT})
 
+_RECORDED = 1, 16
+_SIGNS_BY_PARAMETER = 1, 17
+"""The first release with signing (https://github.com/PX4/PX4-Autopilot/pull/25284),"""
+_SIGNS_BY_KEY = 1, 18
+"""and the one that did away with MAV_SIGN_CFG (https://github.com/PX4/PX4-Autopilot/pull/26894)."""
+_UNSIGNED = frozenset({"RADIO_STATUS", "ADSB_VEHICLE", "COLLISION"})
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
 _BY_RECEIVER = frozenset({mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL})
 """The commands that the receiver of messages answers itself; the others it hands to the commander (`Mavlink::send`)."""
@@ -192,9 +198,31 @@ class Px4(Flavour):
             found.append("vehicle outside geofence")
         return tuple(found)
 
-    def insists(self, a: Autopilot) -> bool:
-        """MAV_SIGN_CFG: 0, the default, signs what it sends and takes what is not signed; 1 and 2 want signatures."""
-        return a.parameters.value("MAV_SIGN_CFG") > 0
+    def release(self, *, keyed: bool) -> tuple[int, int]:
+        """What was recorded; that release takes no key."""
+        return _SIGNS_BY_KEY if keyed else _RECORDED
+
+    def obeys_unsigned(self, a: Autopilot, name: str) -> bool:
+        """1.17 asks MAV_SIGN_CFG: 0, the default, obeys anyone, 1 on USB alone, 2 nobody. 1.18 obeys nobody.
+
+        Some messages count unsigned all the same (`mavlink_sign_control.cpp`, `unsigned_messages`).
+        """
+        if a.release >= _SIGNS_BY_KEY:
+            return name in _UNSIGNED or name == "HEARTBEAT"
+        wanted = a.parameters.value("MAV_SIGN_CFG")
+        return wanted == 0 or (wanted == 1 and a.usb) or name in _UNSIGNED
+
+    def on_setup_signing(self, a: Autopilot, message: Message) -> None:
+        """1.16 does not know it. 1.17 takes it over USB alone; from 1.18 any link does, disarmed."""
+        if a.release < _SIGNS_BY_PARAMETER:
+            return
+        if a.release < _SIGNS_BY_KEY:
+            if a.usb:
+                a.signing.set_up(message, a.now_us)
+        elif a.vehicle.armed:
+            a.say(_CRITICAL, "MAVLink signing: rejected while armed\t")
+        else:
+            a.signing.set_up(message, a.now_us)
 
     def on_set_mode(self, a: Autopilot, number: int) -> tuple[int, ...]:
         """Obeyed, if it can be, and never acknowledged."""

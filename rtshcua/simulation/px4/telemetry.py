@@ -90,7 +90,7 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _estimator_status,
     mavlink.MAVLINK_MSG_ID_WIND_COV: _wind_cov,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version(
-        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE, 1 << 24 | 16 << 16 | 0xFF, 1
+        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE, 0xFF, 1
     ),
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _position_target,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,

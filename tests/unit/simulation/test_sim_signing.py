@@ -42,8 +42,6 @@ def setup(key: bytes, timestamp: int = START) -> Any:
 
 def keyed(a: Any) -> Signer:
     """A vehicle that insists on this key from now on."""
-    if a.px4:
-        a.send(mavlink.MAVLink_param_set_message(1, 1, b"MAV_SIGN_CFG", 1e-45, 6))
     a.send(setup(KEY))
     return Signer(a)
 
@@ -73,8 +71,13 @@ def test_as_recorded_on_the_first_channel(pilot: Pilots) -> None:
     assert a.arm() == [0]
 
 
+def signing(pilot: Pilots, flavour: str, **config: Any) -> Any:
+    """A vehicle that takes a key, and is ready."""
+    return pilot(flavour, release=(1, 18) if flavour == "px4" else None, **config).ready()
+
+
 def test_what_it_sends_is_signed_and_rises(pilot: Pilots, flavour: str) -> None:
-    a = pilot(flavour).ready()
+    a = signing(pilot, flavour)
     keyed(a)
     seen = [f for f in a.wait(5) if f.component == 1]
     ground = SignedLink(KEY, State(START, {}), EPOCH_US, 0)
@@ -88,7 +91,7 @@ def test_what_it_sends_is_signed_and_rises(pilot: Pilots, flavour: str) -> None:
 
 
 def test_replayed_forged_and_old_frames_have_no_effect(pilot: Pilots, flavour: str) -> None:
-    a = pilot(flavour).ready()
+    a = signing(pilot, flavour)
     s = keyed(a)
     good = s.frame(mavlink.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
     assert [f.name for f in s.put(good) if f.name == "COMMAND_ACK"] == ["COMMAND_ACK"]
@@ -102,17 +105,56 @@ def test_replayed_forged_and_old_frames_have_no_effect(pilot: Pilots, flavour: s
 
 
 def test_a_radio_need_not_sign(pilot: Pilots, flavour: str) -> None:
-    a = pilot(flavour).ready()
+    a = signing(pilot, flavour)
     keyed(a)
-    (received,) = a.codec.parse(a.codec.pack(mavlink.MAVLink_radio_status_message(1, 1, 1, 1, 1, 0, 0)))
-    assert a.simulation._autopilot.signing.lets_in(received, 0, optional=False)
+    autopilot = a.simulation._autopilot
+    assert autopilot.flavour.obeys_unsigned(autopilot, "RADIO_STATUS")
+    assert not autopilot.flavour.obeys_unsigned(autopilot, "COMMAND_LONG")
+    assert autopilot.flavour.obeys_unsigned(autopilot, "HEARTBEAT") is a.px4
 
 
-def test_px4_does_not_insist_by_default(pilot: Pilots) -> None:
-    a = pilot("px4").ready()
-    a.send(setup(KEY))
+def version(a: Any) -> tuple[int, ...]:
+    a.long(512, 148)
+    told = next(f.message.flight_sw_version for f in reversed(a.seen) if f.name == "AUTOPILOT_VERSION")
+    return tuple(told.to_bytes(4)[:2])
+
+
+def test_px4_1_16_knows_no_key(pilot: Pilots) -> None:
+    a = pilot("px4", usb=True).ready()
+    assert version(a) == (1, 16)
+    s = keyed(a)
     assert a.long(512, 148) == [0]
+    assert s.long(512, 148) == [0], "it does not look at signatures"
+    assert not any(f.signed for f in a.wait(1))
+
+
+def test_px4_1_17_takes_a_key_over_usb_and_insists_as_its_parameter_says(pilot: Pilots) -> None:
+    a = pilot("px4", release=(1, 17)).ready()
+    a.send(setup(KEY))
+    assert not any(f.signed for f in a.wait(1))
+    a = pilot("px4", release=(1, 17), usb=True).ready()
+    assert version(a) == (1, 17)
+    s = keyed(a)
     assert all(f.signed for f in a.wait(1) if f.component == 1)
+    for value, obeyed in ((0, [0]), (1, [0]), (2, [])):  # 1: but for USB
+        s.put(s.frame(mavlink.MAVLink_param_set_message(1, 1, b"MAV_SIGN_CFG", value * 1.5e-45, 6)))
+        assert a.long(512, 148) == obeyed
+    assert s.long(512, 148) == [0]
+
+
+def test_px4_1_18_takes_a_key_over_any_link_disarmed_and_insists_over_usb_too(pilot: Pilots) -> None:
+    a = signing(pilot, "px4", usb=True)
+    assert version(a) == (1, 18)
+    s = keyed(a)
+    assert a.long(512, 148) == []
+    a.send(setup(OFF, 0))
+    assert a.long(512, 148) == [], "another key comes signed with the one that it has"
+    assert s.long(400, 1) == [0]
+    s.put(s.frame(setup(OFF, 0)))
+    assert "MAVLink signing: rejected while armed" in [text.strip() for text in a.texts()]
+    assert s.long(400, 0) == [0]
+    s.put(s.frame(setup(OFF, 0)))
+    assert a.long(512, 148) == [0]
 
 
 def test_a_key_from_the_start(pilot: Pilots, flavour: str) -> None:
@@ -121,8 +163,13 @@ def test_a_key_from_the_start(pilot: Pilots, flavour: str) -> None:
     assert Signer(a).long(512, 148) == [0]
     stamps = [int.from_bytes(f.frame[-12:-6], "little") for f in a.wait(40) if f.component == 1]
     assert stamps[-1] - stamps[0] == pytest.approx(1_000_000, rel=0.05)  # ten seconds outside
-    for wrong in ({"signing_key": b"short"}, {"speed": 0}):
-        with pytest.raises(ValueError, match=r"octets|speed"):
+    for wrong in (
+        {"signing_key": b"short"},
+        {"speed": 0},
+        {"release": (1, 16), "signing_key": KEY},
+        {"release": (1, 300)},
+    ):
+        with pytest.raises(ValueError, match=r"octets|speed|1\.17|from 0 to 255"):
             SimulationConfig(**wrong)
 
 

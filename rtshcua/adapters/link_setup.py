@@ -1,0 +1,327 @@
+"""SETUP_SIGNING: a link key is put on the vehicle, on the ground, and what that does is observed, not assumed.
+
+https://mavlink.io/en/guide/message_signing.html ("Secret Key Management"): the key crosses the link as it is, so
+somebody has to vouch for the link, and there is no acknowledgement. So the effect is asked for: requests with and
+without a signature go out in turn, and what is answered is reported. Silence counts only between two answers.
+
+This is no part of a flight: it has no permit, and the frames below are all that it ever sends. What it learns of an
+autopilot by its release is in `after_setup`, with the sources.
+"""
+
+import select
+from collections.abc import Callable, Generator, Hashable
+from functools import partial
+from typing import Any, Final, NamedTuple, TypeVar
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.transport import Transport
+from rtshcua.codec.frames import Codec, Received
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink import enums
+from rtshcua.mavlink.modes import ARDUPILOT, KNOWN, PX4
+from rtshcua.mavlink.signing import SignedLink, State
+
+_AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
+_OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
+_NAMES: Final = {PX4: "px4", ARDUPILOT: "ardupilot"}
+
+#: us: how long a heartbeat is waited for, then another vehicle's, then what it says of itself
+_HEARTBEAT_US: Final = 10_000_000
+_ANOTHER_US: Final = 1_500_000
+_TELL_US: Final = 6_000_000
+#: how old a report of the motors or the ground may be when the key is sent
+_FRESH_US: Final = 2_500_000
+#: how long a key may take to show, and how often it is sent
+_SHOW_US: Final = 1_500_000
+_TRIES: Final = 3
+#: how long an answer may take, at least; as many round trips as this, where they are long
+_ANSWER_US: Final = 1_000_000
+_ROUND_TRIPS: Final = 4
+#: requests of each kind
+_ROUNDS: Final = 2
+_AGAIN_US: Final = 500_000
+_GREET_US: Final = 1_000_000
+_MOST_TEXTS: Final = 8
+_WAIT_S: Final = 0.02
+
+_T = TypeVar("_T")
+#: a part of the course: gives nothing whenever there is something to wait for, and a value in the end
+_Part = Generator[None, None, _T]
+
+
+class SetUp(NamedTuple):
+    """What was seen. `release` is what AUTOPILOT_VERSION says; `already`: it had the key, and nothing was sent."""
+
+    autopilot: str
+    system: int
+    release: tuple[int, int, int] | None
+    already: bool
+    signs: bool
+    answers_signed: bool
+    answers_unsigned: bool
+    texts: tuple[str, ...]
+    """What it said meanwhile (STATUSTEXT); as it came, to be shown as what others say."""
+
+    @property
+    def insists(self) -> bool:
+        """Whether the key holds on this link: signed frames are answered, and no others."""
+        return self.signs and self.answers_signed and not self.answers_unsigned
+
+
+def after_setup(autopilot: str, release: tuple[int, int, int] | None) -> str:
+    """What an autopilot of this release does with a key, in words.
+
+    Sources: ArduPilot `GCS_Signing.cpp`, pull requests 10311 (not while armed) and 29546 (MAVn_OPTIONS), and
+    `tests/recorded` (both channels); PX4 pull requests 25284 (1.17) and 26894 (1.18), its guide's page "MAVLink Message
+    Signing", and the release notes of 1.18.
+    """
+    if autopilot == "ardupilot":
+        also = ", nor where MAVn_OPTIONS switches signing off" if release is None or release >= (4, 7) else ""
+        return (
+            "ArduPilot keeps the key in its storage over restarts, signs on every port, and obeys nothing unsigned but "
+            f"RADIO_STATUS; this does not hold on its first port (SERIAL0, usually USB){also}"
+        )
+    if release is None:
+        return "PX4 takes a key from 1.17 on; this one does not say which release it is"
+    if release < (1, 17):
+        return "PX4 before 1.17 does not know SETUP_SIGNING: it signs nothing, and obeys anyone"
+    if release < (1, 18):
+        return (
+            "PX4 1.17 takes a key over USB alone and keeps it on the SD card; it obeys nothing unsigned only with "
+            "MAV_SIGN_CFG 1 (but over USB) or 2"
+        )
+    return (
+        "PX4 from 1.18 on keeps the key on the SD card, signs on every link, and obeys nothing unsigned on any, "
+        "USB included; another key must come signed with this one, or after the card's "
+        "mavlink/mavlink-signing-key.bin was removed"
+    )
+
+
+class LinkSetup:
+    """One set-up, in explicit time (us, monotonic). It is over when `result` is there."""
+
+    def __init__(
+        self, key: bytes, utc_us: int, now_us: int, system: int | None = None, *, begins: bool = False
+    ) -> None:
+        """`system` names one of several vehicles; `begins`: the transport may be spoken to first."""
+        self.result: SetUp | Refusal | None = None
+        self._key = key
+        self._link = SignedLink(key, State(0, {}), utc_us, now_us)
+        self._wanted = system
+        self._begins = begins
+        self._codec = Codec(0, 0)
+        self._sender = Codec(system or 1, _OURS)
+        self._steps = self._course()
+        self._outbox: list[bytes] = []
+        self._now_us = now_us
+        self._greeted_us: int | None = None
+        self._system = 0
+        self._autopilot = 0
+        self._other: int | None = None
+        self._armed: tuple[bool, int] | None = None  # and when it said so
+        self._landed: tuple[int, int] | None = None
+        self._version: tuple[int, int, int] | None = None
+        self._verified = self._answers = 0
+        self._texts: list[str] = []
+
+    @property
+    def met(self) -> bool:
+        """Whether a vehicle was heard."""
+        return bool(self._system)
+
+    def receive(self, octets: bytes, now_us: int) -> None:
+        """Take in what came."""
+        self._now_us = now_us
+        for frame in self._codec.parse(octets):
+            self._hear(frame)
+
+    def tick(self, now_us: int) -> list[bytes]:
+        """Go on; the frames to send."""
+        self._now_us = now_us
+        if self.result is None:
+            next(self._steps, None)
+        if self._begins and not self.met and self._due(self._greeted_us, _GREET_US):
+            self._greeted_us = now_us
+            self._outbox.append(self._sender.pack(messages.heartbeat()))
+        frames, self._outbox = self._outbox, []
+        return frames
+
+    # ---------------------------------------------------------------- what is heard
+
+    def _hear(self, frame: Received) -> None:
+        message = frame.message
+        if frame.name == "HEARTBEAT" and frame.component == _AUTOPILOT and message.autopilot in KNOWN:
+            self._meet(frame)
+        if frame.system != self._system or frame.component != _AUTOPILOT:
+            return
+        if frame.signed:
+            self._verified += self._link.accept(frame.frame, self._now_us)
+        match frame.name:
+            case "HEARTBEAT":
+                self._armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED), self._now_us
+            case "EXTENDED_SYS_STATE":
+                self._landed = message.landed_state, self._now_us
+            case "AUTOPILOT_VERSION":
+                major, minor, patch, _ = message.flight_sw_version.to_bytes(4)
+                self._version = major, minor, patch
+                self._answers += 1
+            case "COMMAND_ACK" if message.command == enums.MAV_CMD_REQUEST_MESSAGE:
+                self._answers += 1
+            case "STATUSTEXT" if len(self._texts) < _MOST_TEXTS and message.text not in self._texts:
+                self._texts.append(message.text)
+
+    def _meet(self, frame: Received) -> None:
+        if self._wanted is not None and frame.system != self._wanted:
+            return
+        if not self._system:
+            self._system, self._autopilot = frame.system, frame.message.autopilot
+            self._sender = Codec(frame.system, _OURS)
+        elif frame.system != self._system:
+            self._other = frame.system
+
+    # ---------------------------------------------------------------- what is done
+
+    def _course(self) -> _Part[None]:
+        """From the first heartbeat to what was seen."""
+        if not (yield from self._until(lambda: self.met, _HEARTBEAT_US)):
+            self.result = Refusal(
+                "no-vehicle", "no heartbeat of a vehicle within 10 s", "is it on, and does it send there?"
+            )
+            return
+        yield from self._until(lambda: self._other is not None, _ANOTHER_US if self._wanted is None else 0)
+        if self._other is not None:
+            text = f"there are several vehicles: systems {self._system} and {self._other}"
+            self.result = Refusal("two-vehicles", text, "`--system` names the one that is meant")
+            return
+        already = self._verified > 0
+        if self._link.counts.forged and not already:
+            self.result = Refusal(
+                "other-key", "it signs with another key", "a key that is in use is changed with that key: by the "
+                "ground station that has it, or by removing the old one as the autopilot's own pages say",
+            )  # fmt: skip
+            return
+        answer_us = max(_ANSWER_US, _ROUND_TRIPS * (yield from self._ask(signed=already)))
+        if self.result is None and not already:
+            yield from self._send_key()
+        if self.result is None:
+            yield from self._probe(answer_us, already=already)
+
+    def _ask(self, *, signed: bool) -> _Part[int]:
+        """Which release it is, and whether it stands on the ground; gives how long the first answer took, in us."""
+        begun_us = self._now_us
+        asked_us: int | None = None
+        took_us: int | None = None
+        while self._now_us - begun_us < _TELL_US and not (self._version and self._is_fresh(self._landed)):
+            if self._due(asked_us, _AGAIN_US):
+                asked_us = self._now_us
+                for name in ("AUTOPILOT_VERSION", "EXTENDED_SYS_STATE"):
+                    self._request(name, signed=signed)
+            yield
+            if took_us is None and self._answers:
+                took_us = self._now_us - begun_us
+        if took_us is None:
+            self.result = Refusal(
+                "no-answer", "it is heard, and answers nothing", "does what is sent reach it? one that wants "
+                "signatures of another key answers nobody else",
+            )  # fmt: skip
+        return took_us or 0
+
+    def _send_key(self) -> _Part[None]:
+        self.result = self._unfit()
+        for _ in range(_TRIES):
+            if self._unfit() is not None:  # of a key that was sent before, what comes of it is looked at all the same
+                return
+            stamp = self._link.state.timestamp
+            setup = mavlink.MAVLink_setup_signing_message(self._system, _AUTOPILOT, list(self._key), stamp)
+            self._outbox.append(self._sender.pack(setup))
+            if (yield from self._until(lambda: self._verified > 0, _SHOW_US)):
+                return
+            self._landed = None
+            self._request("EXTENDED_SYS_STATE", signed=False)
+            yield from self._until(lambda: self._landed is not None, _ANSWER_US)
+
+    def _unfit(self) -> Refusal | None:
+        """Why no key is sent now; None where it may be."""
+        if not self._is_fresh(self._armed) or not self._is_fresh(self._landed):
+            help = "ask again when it stands on the ground; a vehicle that does not tell is set up by a ground station"
+            return Refusal("not-landed", "it does not tell whether it is disarmed and on the ground", help)
+        assert self._armed is not None
+        assert self._landed is not None
+        if self._armed[0]:
+            return Refusal("armed", "its motors are armed", "a key is put on a vehicle that is disarmed, on the ground")
+        if self._landed[0] != enums.MAV_LANDED_STATE_ON_GROUND:
+            return Refusal(
+                "not-landed", "it is not on the ground", "a key is put on a vehicle that is disarmed, on the ground"
+            )
+        return None
+
+    def _probe(self, wait_us: int, *, already: bool) -> _Part[None]:
+        """Unsigned and signed requests in turn, and what is answered."""
+        answered = {False: False, True: True}
+        verified = self._verified
+        for _ in range(_ROUNDS):
+            answered[False] |= yield from self._answered(wait_us, signed=False)
+            # silence before it tells something only if this is answered
+            answered[True] &= yield from self._answered(wait_us, signed=True)
+        if not answered[True] and not answered[False]:
+            text = (
+                "the key was sent, and it answers nothing since, signed or not" if not already else "it answers nothing"
+            )
+            self.result = Refusal(
+                "no-answer", text, "is the link still up? the same command again looks, and sends no key twice"
+            )
+            return
+        name = _NAMES[self._autopilot]
+        signs = self._verified > verified
+        self.result = SetUp(
+            name, self._system, self._version, already, signs, answered[True], answered[False], tuple(self._texts)
+        )
+
+    def _answered(self, wait_us: int, *, signed: bool) -> _Part[bool]:
+        for _ in range(_TRIES if signed else 1):
+            answered_since = partial(self._has_answered, self._answers)
+            self._request("AUTOPILOT_VERSION", signed=signed)
+            if (yield from self._until(answered_since, wait_us)):
+                yield from self._until(lambda: False, _AGAIN_US)  # the rest of the answer is none to the next request
+                return True
+        return False
+
+    # ---------------------------------------------------------------- small things
+
+    def _has_answered(self, before: int) -> bool:
+        return self._answers > before
+
+    def _until(self, reached: Callable[[], bool], time_us: int) -> _Part[bool]:
+        """Wait for something, at most so long; whether it came."""
+        end_us = self._now_us + time_us
+        while not reached() and self._now_us < end_us:
+            yield
+        return reached()
+
+    def _request(self, name: str, *, signed: bool) -> None:
+        frame = self._sender.pack(messages.request(self._system, name))
+        self._outbox.append(self._link.sign(frame, self._now_us) if signed else frame)
+
+    def _due(self, last_us: int | None, each_us: int) -> bool:
+        return last_us is None or self._now_us - last_us >= each_us
+
+    def _is_fresh(self, told: tuple[Any, int] | None) -> bool:
+        return told is not None and self._now_us - told[1] <= _FRESH_US
+
+
+def carry_out(setup: LinkSetup, transport: Transport, now_us: Callable[[], int]) -> SetUp | Refusal:
+    """Run a set-up over a transport, in real time."""
+    peer: Hashable | None = None
+    while setup.result is None:
+        transport.tend(now_us())
+        select.select(transport.readable(), [], [], _WAIT_S)
+        while (received := transport.receive()) is not None:
+            octets, sender = received
+            setup.receive(octets, now_us())
+            peer = sender if setup.met and peer is None else peer
+        for frame in setup.tick(now_us()):
+            if peer is not None or transport.begins:
+                transport.send(frame, peer)
+    return setup.result

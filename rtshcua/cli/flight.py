@@ -276,6 +276,7 @@ class Flight:
             records=self._recorder.count,
             whole=not missing,
             missing=missing,
+            unconfirmed=tuple(self._teller.unconfirmed),
             folder=str(self._run.path),
             log=log,
             next=f"rtshcua verify-log {shlex.quote(log)}",

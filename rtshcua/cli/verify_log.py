@@ -16,6 +16,7 @@ from rtshcua.cli.faults import distrust, fail, of_each
 from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.simulation import with_simulated
+from rtshcua.cli.unconfirmed import UnconfirmedFallbacks
 from rtshcua.cli.verdict import as_object, as_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
@@ -105,10 +106,13 @@ def _verify(
         return fail(ExitCode.INPUT, f"`{given}` is not a log of this program", NO_LOG_HELP)
     asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     raw = raw_frames(path)
+    unconfirmed = UnconfirmedFallbacks()
     with _progress(path.stat().st_size) as told:
         if wanted.audit:
             frames = raw.frames if raw is not None and wanted.derive else None
-            audit = verify_carefully(path, asked, derive=wanted.derive, frames=frames, progress=told)
+            audit = verify_carefully(
+                path, asked, derive=wanted.derive, frames=frames, each=unconfirmed.take, progress=told
+            )
         else:
             audit = verify_quickly(path, asked, fast=wanted.fast, jobs=wanted.jobs, progress=told)
     report = audit.report
@@ -116,7 +120,7 @@ def _verify(
         report = raw.unread(report) if wanted.fast else raw.judged(report, followed=wanted.audit and wanted.derive)
     report = disclosed(report, path, audited=wanted.audit)
     report = with_summary(_required(report) if wanted.anchored else report, path)
-    report = with_unread(with_simulated(report, path), path)
+    report = unconfirmed.told(with_unread(with_simulated(report, path), path))
     audit = audit._replace(report=report)
     code = exit_code(audit.report)
     if as_json:

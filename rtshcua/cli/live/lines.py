@@ -7,6 +7,7 @@ import msgspec
 from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.cli.shown import many
 from rtshcua.diagnostics.excerpt import visible
+from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 
 
 def plain(message: Message) -> Iterable[str]:
@@ -53,6 +54,7 @@ def _ending(summary: Summary) -> Iterable[str]:
     whole = "whole" if summary.whole else "evidence NOT whole"
     yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
     yield f"  decided  {counts}"
+    yield from (f"  unseen   {what}: {UNCONFIRMED}" for what in summary.unconfirmed)
     yield f"  log      {summary.log} ({many(summary.records, 'record')}, {whole})"
     yield from (f"  missing  {what}" for what in summary.missing)
     yield f"  next     {summary.next}"

@@ -71,7 +71,8 @@ class Note(msgspec.Struct, frozen=True, tag="note", tag_field="event"):
 class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     """How the run ended; also `summary.json` of the run folder. The log proves it, this only says it.
 
-    `whole`: all evidence is on the disk; else `missing` says what is not.
+    `whole`: all evidence is on the disk; else `missing` says what is not. `unconfirmed`: the fallbacks that were sent,
+    and ended without a landing being seen.
     """
 
     mission: str
@@ -91,6 +92,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     log: str
     next: str
     missing: tuple[str, ...] = ()
+    unconfirmed: tuple[str, ...] = ()
 
 
 Message = Plan | Snapshot | Happened | Note | Summary

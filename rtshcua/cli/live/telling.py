@@ -4,6 +4,7 @@ import msgspec
 
 from rtshcua.cli.live.story import Happening, Plan, Signal, Step
 from rtshcua.cli.showing.log import detail_of
+from rtshcua.cli.unconfirmed import is_unconfirmed
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -58,6 +59,7 @@ class Teller:
     """Reads each evidence line once, counts, and says what happened.
 
     `outcomes` counts every decision of the log, on steps and on links alike: as `rtshcua verify-log` does.
+    `unconfirmed` names the fallbacks of which no landing was seen.
     """
 
     def __init__(self, policy: Policy, mission: Mission, start_us: int) -> None:
@@ -67,6 +69,7 @@ class Teller:
         self._flown = False  # something was sent that may have lifted it off
         self.outcomes = dict.fromkeys(_OUTCOMES, 0)
         self.done: set[int] = set()
+        self.unconfirmed: list[str] = []
 
     def replace(self, mission: Mission) -> None:
         """From now on this is the mission."""
@@ -91,6 +94,8 @@ class Teller:
         self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
         if record.event == "succeeded" and record.kind == STEP:
             self.done.add(record.step)
+        if is_unconfirmed(record.kind, record.detail):
+            self.unconfirmed.append(subject)
         if record.event == REPLACED:
             return Happening(record.event, t_us, record.step, detail=f"from step {record.step} on")
         detail = detail_of(record.event, record.detail)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,13 +11,15 @@ from reference.documents import approval, hand, low, recall, replacement
 from reference.flat_case import BATTERY, WIND, S
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
 from rtshcua.cli.app import main
+from rtshcua.cli.live.lines import ending
+from rtshcua.cli.live.story import Summary
 from rtshcua.cli.live.telling import NOTHING_FLIES, Teller
 from rtshcua.cli.showing.log import Names
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Interrupted
+from rtshcua.onboard.ports import Interrupted, TakenOver
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.request import STEP
 
@@ -116,6 +119,41 @@ def test_the_summary_counts_every_decision_as_the_log_does() -> None:
             assert what.detail.startswith("granted as supervisor")
     assert teller.outcomes == counts
     assert counts["allow"] > 2, "both steps, and the links of what flew then"
+
+
+def test_a_fallback_of_which_no_landing_was_seen_is_in_the_summary_of_run_and_audit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = Run(low()).until_flies("goto")
+    assert hand(run, recall(run.loaded, now=run.clock.now())) == "accepted"
+    run.until_flies("return_home")
+    run.tick(TakenOver(run.clock.now().monotonic_us, "POSCTL"))
+    run.until_over()
+    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
+    for line in run.lines:
+        teller.tell(line)
+    (what,) = teller.unconfirmed
+    assert what.startswith(("contingency: ", "fallback: "))
+    summary = SUMMARY | {"unconfirmed": (what,)}
+    (said,) = [line for line in ending(Summary(**summary)) if "unseen" in line]
+    assert said == f"  unseen   {what}: it was sent, and not confirmed: no landing was seen"
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(b"".join([*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]))
+    words = ["verify-log", "--root", ROOT_KEY.public.hex(), str(path)]
+    assert main([*words, "--audit"]) == ExitCode.OK
+    out = " ".join(capsys.readouterr().out.split())
+    (number,) = [record["seq"] for record in run.records if record.get("event") == "released"]
+    assert f"that the fallback that ended at record {number} brought the vehicle down: it was sent, and not" in out
+    assert main(words) == ExitCode.OK
+    assert "not confirmed" not in capsys.readouterr().out, "without an audit no record is read"
+
+
+SUMMARY: dict[str, Any] = {
+    **dict.fromkeys(("mission", "policy", "vehicle", "flavour", "mode", "ending", "folder", "log", "next"), ""),
+    **dict.fromkeys(("exit_code", "steps", "steps_done", "flight_us", "records"), 0),
+    "outcomes": {},
+    "whole": True,
+}
 
 
 @pytest.fixture

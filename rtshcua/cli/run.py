@@ -120,7 +120,8 @@ def run(
     except AddressError as error:
         return misaddressed("--witness", error)
     if link is not None and speed != 1 and not link.is_loopback:
-        return fail(ExitCode.USAGE, "`--speed` is for a simulated vehicle; a real one lives as fast as we do")
+        text = f"`--speed` requires a simulated vehicle on this machine: at `{link}` a second is a second"
+        return fail(ExitCode.USAGE, text, "`rtshcua sim --speed N`, and `--connect udpin:127.0.0.1:14550`")
     with ExitStack() as stack:
         state = state_dir or state_folder()
         if fresh_state:

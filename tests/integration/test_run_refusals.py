@@ -132,6 +132,7 @@ def test_options_that_do_not_go_together(ground: Any, capfd: Any) -> None:
         ["--connect", "udpin:127.0.0.1:14550", *IDENTITY, "--battery", "50"],
         ["--connect", "udpin:127.0.0.1:14550", *IDENTITY, "--fresh-state"],
         ["--connect", "udpin:0.0.0.0:14550", *IDENTITY, "--speed", "2"],
+        ["--connect", "serial:/dev/ttyAMA0:57600", *IDENTITY, "--speed", "2"],
         ["--state-dir", "state", "--fresh-state"],
         ["--battery", "101"],
         ["--fault", "meteor,at=3s"],

@@ -16,7 +16,7 @@ NAMES = ("short", "standard", "extended", "one_bridge")
 @cache
 def shipped(name: str, issued_at_us: int = case.flat.ISSUED) -> bytes:
     """The bundle of `missions/<name>.rts`, issued at a UTC time: for a stock copter."""
-    return _bundle(library.root() / "missions" / f"{name}.rts", issued_at_us)
+    return sealed(library.root() / "missions" / f"{name}.rts", issued_at_us)
 
 
 @cache
@@ -26,10 +26,11 @@ def equipped(name: str) -> bytes:
     with TemporaryDirectory() as folder:
         source = Path(folder) / f"{name}.rts"
         source.write_text(text.replace(" on quad ", " on surveyor "), encoding="utf-8")
-        return _bundle(source, case.flat.ISSUED)
+        return sealed(source)
 
 
-def _bundle(source: Path, issued_at_us: int) -> bytes:
+def sealed(source: Path, issued_at_us: int = case.flat.ISSUED) -> bytes:
+    """The bundle of the mission in a file."""
     compiled, _ = compile_sources([source], mission=None, issued_at_us=issued_at_us)
     assert compiled.policy is not None, compiled.diagnostics
     assert compiled.mission is not None

@@ -1,6 +1,7 @@
 """E1410: the clause that a test expects to decide, one of those that can."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from difflib import SequenceMatcher
 from typing import NamedTuple
 
 from rtshcua.decision.prepare import PreparedInvocation
@@ -63,8 +64,7 @@ def _unknown(
 ) -> None:
     quoted = expected.clause
     assert quoted is not None
-    texts = list(dict.fromkeys(shortened(each.text) for each in every))
-    near = nearest(quoted.text, texts)
+    near, help = clause_meant(quoted.text, dict.fromkeys(shortened(each.text) for each in every))
     message = "nothing of a clause is quoted"
     if quoted.text.strip(". "):
         skill = invocation.invocation.contract.name
@@ -73,9 +73,38 @@ def _unknown(
         codes.UNKNOWN_CLAUSE,
         quoted.span,
         message,
-        help=f"did you mean `{near}`?" if near is not None else f"there are {_shown(texts)}",
+        help=help,
         fix=None if near is None or '"' in near else (quoted.span, f'"{near}"', "quote this clause"),
     )
+
+
+def clause_meant(quoted: str, texts: Iterable[str]) -> tuple[str | None, str]:
+    """What a quotation of none of these clauses was probably to be, if anything, and the help that says so."""
+    every = list(texts)
+    near = _nearest(_spaced(quoted), every)
+    if near is not None:
+        return near, f"did you mean `{near}`?"
+    likely = sorted(every, key=lambda text: -SequenceMatcher(None, _spaced(quoted), text).ratio())
+    return None, f"there are {_shown(likely)}" if likely else "no clause decides here"
+
+
+def _nearest(words: str, texts: Sequence[str]) -> str | None:
+    """The clause, or the beginning of one, that is nearest to a quotation. A beginning is held against beginnings."""
+    begun = words.endswith(REST)
+    start = words.removesuffix(REST).rstrip()
+    if not start:
+        return None
+    length = len(start.split())
+    begins = {text: " ".join(text.split()[:length]) for text in texts}
+    if not begun:
+        if sum(begin == start for begin in begins.values()) == 1:
+            return f"{start} {REST}"
+        return nearest(words, texts)
+    near = nearest(start, begins.values())
+    if near is None:
+        return None
+    fitting = [text for text, begin in begins.items() if begin == near]
+    return f"{near} {REST}" if len(fitting) == 1 else fitting[0]
 
 
 def _ambiguous(context: Context, expected: Expectation, fitting: Sequence[_Candidate]) -> None:

@@ -10,7 +10,6 @@ from typing import NamedTuple, TypeVar
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.checks.scenarios import OBSTACLE
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.faults import fault_of
@@ -19,7 +18,7 @@ from rtshcua.ground.compiler.conditions import Place
 from rtshcua.ground.compiler.files import Files, Joint, shortened
 from rtshcua.ground.compiler.trial import Lacking, Trial, knows_zone
 from rtshcua.ground.testing.case import Tested
-from rtshcua.ground.testing.clauses import quotes
+from rtshcua.ground.testing.clauses import clause_meant, quotes
 from rtshcua.model.faults import Approval, Disapproval, Fault, WindStep
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
@@ -279,19 +278,14 @@ class _Lowering:
         fitting = list(dict.fromkeys(carried for text, carried in texts.items() if quotes(quoted.text, text)))
         if len(fitting) == 1:
             return fitting[0]
-        shown = [shortened(text) for text in texts]
-        near = None if fitting else nearest(quoted.text, shown)
+        near, help = (None, "") if fitting else clause_meant(quoted.text, map(shortened, texts))
         several = f"`{shortened(quoted.text)}` quotes the beginning of several clauses"
         none = f"no decision on this mission is made by a clause `{shortened(quoted.text)}`"
         self._context.report.add(
             codes.UNKNOWN_CLAUSE,
             quoted.span,
             several if fitting else none,
-            help=f"quote more of one: {_listed(fitting)}"
-            if fitting
-            else f"did you mean `{near}`?"
-            if near
-            else f"there are {_listed(shown)}",
+            help=f"quote more of one: {_listed(fitting)}" if fitting else help,
             fix=None if near is None or '"' in near else (quoted.span, f'"{near}"', "quote this clause"),
         )
         return None

@@ -203,8 +203,23 @@ def test_a_clause_is_quoted_whole_or_up_to_what_is_left_out() -> None:
         "no decision on `inspect_area` here is made by a clause `battery > 34 %`",
         "did you mean `battery > 35 %`?",
     )
-    (other,) = quoting("permit goto ...")
+    for clause, meant in (
+        ("permit inspct_area ...", "permit inspect_area ..."),
+        ("permit inspect_area", "permit inspect_area ..."),
+        ("permit inspect_area by agent", None),
+        ("airspace inside citty ...", "airspace inside city ..."),
+    ):
+        (told,) = quoting(clause)
+        whole = "permit inspect_area by role operator through agent, operator when "
+        help = told[2] or ""
+        assert help.startswith(f"did you mean `{meant or whole}")
+        if meant is not None:
+            assert quoting(meant) == []
+    (other,) = quoting("forbid anything ...")
     assert other[0] == "E1410"
+    assert (other[2] or "").startswith("there are `")
+    (likely,) = quoting("degrade nothing when wind")
+    assert (likely[2] or "").startswith("there are `degrade "), "the most alike first"
 
 
 def test_hostile_tables_end_at_a_limit() -> None:

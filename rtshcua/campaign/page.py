@@ -11,11 +11,10 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from rtshcua.campaign.summary import Summary
+from rtshcua.campaign.words import margin_told
 
 _HEIGHT: Final = 48
 _WIDTH: Final = 10
-#: how a margin's name ends says its unit
-_UNITS: Final = (("_us", "s", 1_000_000), ("_mm_s", "m/s", 1_000), ("_mm", "m", 1_000))
 
 
 def page(summary: Summary) -> str:
@@ -36,14 +35,6 @@ def page(summary: Summary) -> str:
         width=_WIDTH,
         height=_HEIGHT,
     )
-
-
-def margin_told(name: str, value: int) -> str:
-    """A margin with its unit, as a person reads it: to three digits."""
-    for suffix, unit, parts in _UNITS:
-        if name.endswith(suffix):
-            return f"{value / parts:.3g} {unit}"
-    return str(value)
 
 
 def _bars(counts: Sequence[int]) -> list[tuple[int, int, int]]:

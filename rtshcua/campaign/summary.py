@@ -7,6 +7,7 @@ from typing import Any, Final
 import msgspec
 
 from rtshcua.campaign.results import Failed, Result
+from rtshcua.campaign.words import FAULTS, MARGINS
 
 #: bars of a histogram
 _BARS: Final = 24
@@ -25,9 +26,13 @@ class Found(msgspec.Struct, frozen=True):
 
 
 class Margin(msgspec.Struct, frozen=True):
-    """One of the judge's numbers over all flights: the least and the greatest, in which flight, and the spread."""
+    """One of the judge's numbers over all flights: the least and the greatest, in which flight, and the spread.
+
+    `name` ends in its unit (us, mm); `title` is for people.
+    """
 
     name: str
+    title: str
     flights: int
     least: int
     least_in: int
@@ -39,7 +44,7 @@ class Margin(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True):
-    """What `report.json` holds. Times in us; `endings` by kind of autopilot, `kinds` by kind of fault."""
+    """What `report.json` holds. Times in us; `endings` by kind of autopilot, `kinds` by kind of fault as in sources."""
 
     mission: str
     campaign: int
@@ -65,10 +70,10 @@ def summarise(mission: str, campaign: int, results: Mapping[int, Result], scenar
     for result in ordered:
         endings[result.flavour][result.ending] += 1
         for kind in sorted({kind for kind, _ in result.tries}):
-            kinds[kind][result.ending] += 1
-            kinds[kind]["failed"] += bool(result.failures)
+            kinds[FAULTS[kind]][result.ending] += 1
+            kinds[FAULTS[kind]]["failed"] += bool(result.failures)
         for kind, label in result.tries:
-            near[kind][label] += 1
+            near[FAULTS[kind]][label] += 1
     return Summary(
         mission,
         campaign,
@@ -120,7 +125,9 @@ def _margins(results: Sequence[Result]) -> Iterable[Margin]:
         for value, _ in values:
             bars[min(_BARS - 1, (value - least) * _BARS // max(greatest - least, 1))] += 1
         middle = values[len(values) // 2][0]
-        yield Margin(name, len(values), least, least_in, middle, greatest, greatest_in, tuple(bars))
+        yield Margin(
+            name, MARGINS[name].title, len(values), least, least_in, middle, greatest, greatest_in, tuple(bars)
+        )
 
 
 def as_json(summary: Summary) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """`rtshcua campaign`: thousands of flights of a mission, with faults that chance draws, in virtual time."""
 
 import os
+import re
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from typing import Annotated, Final
 import typer
 
 from rtshcua import __version__, library
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.campaign import campaign as flying
 from rtshcua.campaign.campaign import Order
 from rtshcua.campaign.drawing import FLAVOURS, Space
@@ -36,11 +38,14 @@ from rtshcua.model.scenario import Scenario, Start
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import Kind
 from rtshcua.virtual.flight import LATER_US
+from rtshcua.wire.names import BUNDLE
 
 app = typer.Typer(add_completion=False)
 
 #: of so many different failures the smallest flight is looked for
 _SHRUNK: Final = 8
+#: as Dask writes them; without a scheme it is `tcp`
+_SCHEDULER: Final = re.compile(r"([a-z]+://)?[^\s/:]+:\d{1,5}", re.ASCII)
 _CLEAR: Final = "\r\033[K"
 
 
@@ -83,8 +88,9 @@ def campaign(
     asked_us = None if at is None else moment(at)
     if at is not None and asked_us is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    if cluster is not None and jobs is not None:
-        return findings.refuse(ExitCode.USAGE, "usage", "`--jobs` is for this machine, and `--cluster` for others")
+    misused = _misused(source, cluster, jobs)
+    if misused is not None:
+        return findings.end(misused)
     flavours = tuple(dict.fromkeys(str(each) for each in flavour or ())) or FLAVOURS
     folder = Folder(output or Path("runs") / f"campaign-{mission or source.stem}-{seed}")
     begun = folder.identity()
@@ -139,6 +145,27 @@ def campaign(
     return findings.finish(
         ExitCode.TESTS if summary.failures else ExitCode.OK, campaign=as_json(summary), folder=str(folder.path)
     )
+
+
+def _misused(source: Path, cluster: str | None, jobs: int | None) -> Refusal | None:
+    """What makes no sense of what was asked for, before anything is read or flown."""
+    if cluster is not None and jobs is not None:
+        return Refusal("usage", "`--jobs` is for this machine, and `--cluster` for others")
+    if cluster is not None and not _SCHEDULER.fullmatch(cluster):
+        return Refusal("usage", f"`{cluster}` is no address of a Dask scheduler", "write it as `tcp://10.0.0.1:8786`")
+    if _is_bundle(source):
+        help = "give the source that it was compiled from (.rts), or the specification (.json)"
+        return Refusal("usage", f"`{source}` is a bundle, and no source", help)
+    return None
+
+
+def _is_bundle(path: Path) -> bool:
+    """Whether a file is a compiled bundle, of whatever version; one that cannot be read is told of where it is read."""
+    try:
+        with open_regular(path) as file:
+            return BUNDLE.name.encode() in file.read(2 * len(BUNDLE.name))
+    except OSError:
+        return False
 
 
 def _here(jobs: int) -> Workers:

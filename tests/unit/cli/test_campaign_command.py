@@ -17,6 +17,7 @@ from rtshcua.cli.testing import flying
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.testing.flown import Tried, Wrong
 from rtshcua.model.faults import GpsLoss
+from virtual import case
 
 S = 1_000_000
 SHORT = str(library.root() / "missions" / "short.rts")
@@ -71,7 +72,13 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
     assert (code, err) == (ExitCode.OK, "")
     found = json.loads(out)["campaign"]
     assert (found["mission"], found["flights"], found["failed"], found["campaign"]) == ("short", 2, 0, 1)
-    assert set(found["kinds"]) <= {"LinkSilence", "WindStep"}
+    assert set(found["kinds"]) == set(found["near"]) <= {"link-silence", "wind"}, "as sources and `--fault` call them"
+    titles = {each["name"]: each["title"] for each in found["margins"]}
+    assert titles["fence_mm"] == "distance inside the airspace, at its edge"
+    text = Path("made/report.html").read_text()
+    assert titles["fence_mm"] in text
+    for internal in ("fence_mm", "ended_us", "LinkSilence", "WindStep"):
+        assert internal not in text
     assert sum(sum(counts.values()) for counts in found["endings"].values()) == 2
     lines = [json.loads(line) for line in Path("made/results.jsonl").read_text().splitlines()]
     assert all(line["flown_us"] > S and len(line["log"]) == 64 for line in lines)
@@ -253,9 +260,25 @@ def test_what_makes_no_sense_is_refused(
 
 
 def test_a_cluster_that_does_not_answer_is_named(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("distributed")
-    code = app.main(["campaign", SHORT, *AT, "--cluster", "nonsense", "--flights", "1"])
+    def nobody(*_: object, **__: object) -> None:
+        raise OSError
+
+    monkeypatch.setattr(pytest.importorskip("distributed"), "Client", nobody)
+    flies(good)
+    code = app.main(["campaign", SHORT, *AT, "--cluster", "tcp://127.0.0.1:9", "--flights", "1"])
     assert code == ExitCode.LINK
-    assert "no cluster answers" in capsys.readouterr().err
+    assert "no cluster answers: `tcp://127.0.0.1:9`" in capsys.readouterr().err
+
+
+def test_what_is_no_scheduler_and_what_is_no_source_is_refused_before_anything_flies(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    flies(lambda *_: pytest.fail("nothing is to fly"))
+    assert app.main(["campaign", SHORT, *AT, "--cluster", "foo"]) == ExitCode.USAGE
+    assert "`foo` is no address of a Dask scheduler\n help: write it as `tcp://" in capsys.readouterr().err
+    Path("made.bundle").write_bytes(case.seal(case.mission(case.short_steps())))
+    assert app.main(["campaign", "made.bundle", *AT]) == ExitCode.USAGE
+    assert "`made.bundle` is a bundle, and no source\n help: give the source" in capsys.readouterr().err
+    assert app.main(["campaign", "none.rts", *AT]) == ExitCode.INPUT

@@ -62,8 +62,8 @@ class Energy:
     def suffices(self, battery: Value, volume: Volume) -> Truth:
         """Whether the battery holds what is needed; unknown when the charge is, or the place that counts."""
         low, high, gap, _ = battery
-        if self.stays and volume.height[2] > gap:
-            gap = volume.height[2]
+        if self.stays and volume.place.located > gap:
+            gap = volume.place.located
         if gap == ABSENT:
             return UNKNOWN
         nearest, farthest = volume.farthest

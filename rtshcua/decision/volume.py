@@ -12,7 +12,7 @@ from math import isqrt
 from typing import NamedTuple
 
 from rtshcua.decision.outline import Box
-from rtshcua.decision.values import ABSENT, MISSING, UNKNOWN, Span, Value
+from rtshcua.decision.values import MISSING, Span, Value
 from rtshcua.decision.zones import NOWHERE, Part, Place, Sweep, WellKnown
 from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Vehicle
@@ -21,7 +21,11 @@ HOME = (0, 0)  # the origin of local coordinates
 
 
 class Volume(NamedTuple):
-    """A planned volume: its `place`, the heights in it, and how far from home its farthest point is, mm rounded up."""
+    """A planned volume: its `place`, the heights in it, and how far from home its farthest point is, mm rounded up.
+
+    Where the height at the start is missing the place has no heights, and where the position is, no `farthest`
+    (`place.located`).
+    """
 
     place: Place
     height: Value
@@ -57,9 +61,7 @@ class Planner:
         return volume
 
     def _from(self, x: Value, y: Value, height: Value) -> Volume:
-        gap = max(x[2], y[2], height[2])
-        if gap == ABSENT:
-            return UNKNOWN_VOLUME
+        located, gap = max(x[2], y[2]), height[2]
         leg, farthest = self._first_leg(x, y)
         low, high = height[0], height[1]
         parts: list[Part] = []
@@ -74,7 +76,7 @@ class Planner:
             if self._kind == MotionKind.HOME:
                 low = min(low, 0)
             parts.append((self._sweep, low, high))
-        return Volume(Place(tuple(parts), UNKNOWN if gap else 0), (low, high, gap, None), farthest)
+        return Volume(Place(tuple(parts), located, gap), (low, high, gap, None), farthest)
 
     def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Span]:
         """The leg to the path, wherever in a box it starts, and the distance of the farthest point of leg and path."""

@@ -37,12 +37,14 @@ UNKNOWN_AHEAD = Ahead(UNKNOWN_VOLUME, 0)
 
 
 def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -> Ahead:
-    """The predicted path in one situation, and the ages of its slots; nothing is known where a signal of it is."""
+    """The predicted path in one situation, and the ages of its slots. Where position or velocity is missing nothing is
+    known of it; where the height is, how high it leads.
+    """
     known, vehicle = policy.tables.known, policy.policy.vehicle
     x, _, x_gap, _ = slots[known.x]
     y, _, y_gap, _ = slots[known.y]
     height, _, height_gap, _ = slots[known.height]
-    if x_gap != PRESENT or y_gap != PRESENT or height_gap != PRESENT:
+    if x_gap != PRESENT or y_gap != PRESENT:
         return UNKNOWN_AHEAD
     if not vehicle.braking:
         return Ahead(policy.still.volume(slots, known), 0)
@@ -54,9 +56,9 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     speed = _root(east * east + north * north + down * down)
     if speed > MAX_SPEED:
         return UNKNOWN_AHEAD
-    age_us = max(
-        ages[known.x], ages[known.y], ages[known.height], ages[known.east], ages[known.north], ages[known.down]
-    )
+    age_us = max(ages[known.x], ages[known.y], ages[known.east], ages[known.north], ages[known.down])
+    if height_gap == PRESENT:
+        age_us = max(age_us, ages[known.height])
     goes_us, braking = age_us + vehicle.reaction_us, vehicle.braking
     part, whole = 2 * braking * goes_us + speed * SECOND, 2 * braking * SECOND
     to_x, to_y = x + _away(east * part, whole), y + _away(north * part, whole)
@@ -65,8 +67,8 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     low, high = min(height, to_height), max(height, to_height)
     sweep = Sweep((x, y, to_x, to_y), (-reach, -reach, reach, reach))
     farthest = max(distance(x, y), distance(to_x, to_y))
-    place = Place(((sweep, low, high),), 0)
-    volume = _tuple(Volume, (place, (low, high, PRESENT, None), (farthest, farthest)))
+    place = Place(((sweep, low, high),), PRESENT, height_gap)
+    volume = _tuple(Volume, (place, (low, high, height_gap, None), (farthest, farthest)))
     return _tuple(Ahead, (volume, goes_us - age_us - (-speed * SECOND // braking)))
 
 
@@ -113,7 +115,7 @@ def way_home(at: Environment, volume: Volume, policy: PreparedPolicy) -> Truth:
     """
     vehicle = policy.policy.vehicle
     charge, _, gap, _ = at.slots[policy.tables.known.battery]
-    if gap != PRESENT or volume.height[2] != PRESENT:
+    if gap != PRESENT or volume.place.located != PRESENT:
         return UNKNOWN
     home = -(-volume.farthest[1] * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
     return TRUE if charge >= vehicle.reserve + home else FALSE

@@ -15,8 +15,8 @@ from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision.outline import Bands, Box, Slabs, edges
 from rtshcua.decision.times import Times
-from rtshcua.decision.values import ABSENT, AND, FALSE, TRUE, UNKNOWN, Truth, Value
-from rtshcua.model.flat.zone import CIRCLE, Zone
+from rtshcua.decision.values import ABSENT, AND, FALSE, PRESENT, TRUE, UNKNOWN, Truth, Value
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 NO_BOX: Box = (0, 0, 0, 0)
 
@@ -77,11 +77,12 @@ class Area:
 class PreparedZone:
     """A zone ready to be asked; `number` is its index in the policy, `times` is None where it exists at all times."""
 
-    __slots__ = ("ceiling", "floor", "number", "shape", "times")
+    __slots__ = ("banded", "ceiling", "floor", "number", "shape", "times")
 
     def __init__(self, number: int, zone: Zone, utc_offset_us: int = 0) -> None:
         self.number = number
         self.floor, self.ceiling = zone.floor, zone.ceiling
+        self.banded = (zone.floor, zone.ceiling) != (LOWEST, HIGHEST)
         self.shape: Circle | Area = Circle(zone.data) if zone.shape == CIRCLE else Area(zone)
         self.times = Times(zone, utc_offset_us) if zone.daily or zone.dates else None
 
@@ -96,11 +97,19 @@ class PreparedZone:
             return TRUE | FALSE
         return TRUE if shape.contains(path[0], path[1]) else FALSE
 
-    def between(self, low: int, high: int) -> Truth:
-        """Whether the heights `low`..`high` (mm above home) lie between floor and ceiling."""
-        if low > self.floor and high < self.ceiling:
+    def between(self, low: int, high: int, gap: int = PRESENT) -> Truth:
+        """Whether the heights `low`..`high` (mm above home), which may be missing, lie between floor and ceiling. A
+        zone with neither does not ask for the height.
+        """
+        if not self.banded:
             return TRUE
-        return FALSE if high <= self.floor or low >= self.ceiling else TRUE | FALSE
+        if gap == ABSENT:
+            return UNKNOWN
+        if low > self.floor and high < self.ceiling:
+            truth = TRUE
+        else:
+            truth = FALSE if high <= self.floor or low >= self.ceiling else TRUE | FALSE
+        return truth | UNKNOWN if gap else truth
 
 
 class Sweep:
@@ -126,15 +135,16 @@ Part: TypeAlias = tuple[Sweep, int, int]
 
 
 class Place:
-    """A set of places, the union of its parts; `unknown` is UNKNOWN when the place may be missing, else 0.
+    """A set of places, the union of its parts; there is at least one. `located` and `high` say whether it may be
+    missing where they are, and how high: either may tell by itself that they are outside of a zone.
 
     It too remembers each zone's answer, so that a planned volume that did not change is not looked at again.
     """
 
-    __slots__ = ("_answers", "parts", "unknown")
+    __slots__ = ("_answers", "high", "located", "parts")
 
-    def __init__(self, parts: tuple[Part, ...], unknown: Truth) -> None:
-        self.parts, self.unknown = parts, unknown
+    def __init__(self, parts: tuple[Part, ...], located: int = PRESENT, high: int = PRESENT) -> None:
+        self.parts, self.located, self.high = parts, located, high
         self._answers: dict[int, Truth] = {}
 
     def inside(self, zone: PreparedZone) -> Truth:
@@ -145,14 +155,19 @@ class Place:
         return answer
 
     def _inside(self, zone: PreparedZone) -> Truth:
-        truth = self.unknown
+        truth, located = 0, self.located
         for sweep, low, high in self.parts:
-            vertical = zone.between(low, high)
-            truth |= FALSE if vertical == FALSE else AND[vertical][sweep.within(zone)]
+            vertical = zone.between(low, high, self.high)
+            if vertical == FALSE:
+                truth |= FALSE
+            elif located == ABSENT:
+                truth |= AND[vertical][UNKNOWN]
+            else:
+                truth |= AND[vertical][sweep.within(zone) | (UNKNOWN if located else 0)]
         return truth
 
 
-NOWHERE = Place((), UNKNOWN)
+NOWHERE = Place(((Sweep((0, 0), NO_BOX), 0, 0),), ABSENT, ABSENT)
 
 
 class WellKnown(NamedTuple):
@@ -174,8 +189,5 @@ def here(slots: Sequence[Value], known: WellKnown) -> Place:
     west, east, x_gap, _ = slots[known.x]
     south, north, y_gap, _ = slots[known.y]
     low, high, height_gap, _ = slots[known.height]
-    gap = max(x_gap, y_gap, height_gap)
-    if gap == ABSENT:
-        return NOWHERE
     sweep = Sweep((west, south), (0, 0, east - west, north - south))
-    return Place(((sweep, low, high),), UNKNOWN if gap else 0)
+    return Place(((sweep, low, high),), max(x_gap, y_gap), height_gap)

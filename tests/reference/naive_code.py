@@ -10,14 +10,15 @@ from itertools import product
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.zone import CIRCLE, Zone
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 DAY = 24 * 3600 * 1_000_000
 Truths = frozenset[str]
 T, F, U = frozenset("T"), frozenset("F"), frozenset("U")
 
-#: widened legs (a, b, box) between two heights
-Leg = tuple[tuple[int, int], tuple[int, int], tuple[int, int, int, int], int, int]
+Point = tuple[int, int]
+#: widened legs (a, b, box) between two heights; a is None where nobody knows the place, the heights where not how high
+Leg = tuple[Point | None, Point | None, tuple[int, int, int, int], int | None, int | None]
 
 
 class TooNear(Exception):
@@ -26,7 +27,7 @@ class TooNear(Exception):
 
 @dataclass
 class World:
-    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is (None: unknown). A letter
+    """Slots (None: missing), argument cells, the moment, and the legs of where the vehicle is. A letter
     for each temporal monitor, and the number of the phase among the policy's."""
 
     policy: Policy
@@ -34,7 +35,7 @@ class World:
     arguments: tuple[int, ...]
     utc: int
     error: int
-    legs: list[Leg] | None
+    legs: list[Leg]
     heights: tuple[int, int] | None = None  # of the legs, where the height ranges over them
     monitors: str = ""
     phase: int = -1
@@ -142,15 +143,22 @@ def compared(op: int, left: tuple[int, int], right: tuple[int, int], heights: tu
 
 
 def inside(world: World, zone: Zone) -> Truths:
-    if world.legs is None:
-        return both(U, exists(world, zone))
+    """Inside is between floor and ceiling, and within the outline: each by itself may be unknown."""
     found: set[str] = set()
     for a, b, box, low, high in world.legs:
-        vertical = {"T" if zone.floor < z < zone.ceiling else "F" for z in (low, high)}
-        if low <= zone.floor and high >= zone.ceiling and zone.ceiling - zone.floor > 1:
-            vertical.add("T")
-        flat = horizontal(a, b, box, zone)
-        found |= {"T" if v == h == "T" else "F" for v, h in product(vertical, flat)}
+        if (zone.floor, zone.ceiling) == (LOWEST, HIGHEST):
+            vertical = {"T"}
+        elif low is None or high is None:
+            vertical = {"U"}
+        else:
+            vertical = {"T" if zone.floor < z < zone.ceiling else "F" for z in (low, high)}
+            if low <= zone.floor and high >= zone.ceiling and zone.ceiling - zone.floor > 1:
+                vertical.add("T")
+        if vertical == {"F"}:
+            found.add("F")
+            continue
+        flat = U if a is None or b is None else horizontal(a, b, box, zone)
+        found |= {kleene_and(v, h) for v, h in product(vertical, flat)}
     return both(frozenset(found), exists(world, zone))
 
 

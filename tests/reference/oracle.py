@@ -36,26 +36,24 @@ class Oracle:
     def slot(self, slot: int) -> int | None:
         return None if slot == -1 else self.slots[slot]
 
-    def position(self) -> tuple[int, int, int] | None:
+    def place(self) -> tuple[int, int] | None:
+        """Where it is over ground, if that is known."""
         vehicle = self.policy.vehicle
-        if vehicle.position == -1 or vehicle.height == -1:
-            return None
-        x, y, z = self.slots[vehicle.position], self.slots[vehicle.position + 1], self.slots[vehicle.height]
-        return None if x is None or y is None or z is None else (x, y, z)
+        x, y = (None, None) if vehicle.position == -1 else self.slots[vehicle.position : vehicle.position + 2]
+        return None if x is None or y is None else (x, y)
 
     def truth(self, clause: Clause | None, arguments: tuple[int, ...]) -> str:
         """One letter: a single situation has a single truth."""
         if clause is None:
             return "T"
-        at = self.position()
-        legs: list[Leg] | None = None if at is None else [(at[:2], at[:2], (0, 0, 0, 0), at[2], at[2])]
-        (letter,) = truths(clause.code, self.world(arguments, legs))
+        at, z = self.place(), self.slot(self.policy.vehicle.height)
+        (letter,) = truths(clause.code, self.world(arguments, [(at, at, (0, 0, 0, 0), z, z)]))
         return letter
 
     def world(
         self,
         arguments: tuple[int, ...],
-        legs: list[Leg] | None,
+        legs: list[Leg],
         heights: tuple[int, int] | None = None,
         through: int = 0,
     ) -> World:
@@ -65,27 +63,28 @@ class Oracle:
 
     # ------------------------------------------------------------------------------------------ planned volume
 
-    def volume(self, kind: int, path: tuple[int, ...], altitude: int | None) -> list[Leg] | None:
-        at = self.position()
-        if at is None:
-            return None
-        x, y, z = at
+    def volume(self, kind: int, path: tuple[int, ...], altitude: int | None) -> list[Leg]:
+        """From an unknown place nobody knows where the legs are, from an unknown height not how high."""
+        place, z = self.place(), self.slot(self.policy.vehicle.height)
         error = self.policy.vehicle.position_error
         box = (-error, -error, error, error)
-        low, high = (z, z) if altitude is None else (min(z, altitude), max(z, altitude))
-        if kind == MotionKind.LAND:
+        low = high = z
+        if z is not None and altitude is not None:
+            low, high = min(z, altitude), max(z, altitude)
+        if z is not None and kind == MotionKind.LAND:
             low, high = min(z, 0), z
-        points = [(x, y), *zip(path[::2], path[1::2], strict=True)]
+        points = [place, *zip(path[::2], path[1::2], strict=True)]
         if kind == MotionKind.HOME:
-            return [((x, y), (0, 0), box, low, high), ((0, 0), (0, 0), box, min(low, 0), high)]
+            down = None if low is None else min(low, 0)
+            return [(place, (0, 0), box, low, high), (place and (0, 0), (0, 0), box, down, high)]
         if len(points) == 1:
-            return [((x, y), (x, y), box, low, high)]
-        return [(a, b, box, low, high) for a, b in pairwise(points)]
+            return [(place, place, box, low, high)]
+        return [(place and a, b, box, low, high) for a, b in pairwise(points)]
 
     def everywhere(self, found: Truths) -> str:
         return "F" if "F" in found else "U" if "U" in found else "T"
 
-    def in_airspace(self, legs: list[Leg] | None, through: int) -> str:
+    def in_airspace(self, legs: list[Leg], through: int) -> str:
         airspace = self.policy.airspace
         if airspace is None:
             return "T"
@@ -253,10 +252,10 @@ class Oracle:
             ("T" if plan.speed <= vehicle.speed else "F", Reason.ENVELOPE),
             (self.in_airspace(legs, longest), Reason.AIRSPACE),
         ]
-        heights = None if legs is None else (min(leg[3] for leg in legs), max(leg[4] for leg in legs))
+        heights = None
+        if self.slot(vehicle.height) is not None:
+            heights = (min(leg[3] for leg in legs), max(leg[4] for leg in legs))
         world = self.world(invocation.arguments, legs, heights, longest)
-        if legs is None and vehicle.height != -1:
-            world.slots = [None if slot == vehicle.height else value for slot, value in enumerate(self.slots)]
         letters += [(self.everywhere(truths(clause.code, world)), Reason.INVARIANT) for clause in contract.maintain]
         letters.append((self.charged(contract, legs), Reason.ENERGY))
         for rule in self.rules(invocation, RuleKind.DEGRADE):
@@ -264,10 +263,10 @@ class Oracle:
             letters.append((swapped, Reason.DEGRADED))
         return letters
 
-    def charged(self, contract: Contract, legs: list[Leg] | None) -> str:
+    def charged(self, contract: Contract, legs: list[Leg]) -> str:
         battery, vehicle = self.slot(self.policy.vehicle.battery), self.policy.vehicle
         ends = contract.motion.kind in (MotionKind.HOME, MotionKind.LAND)
-        if battery is None or (legs is None and not ends):
+        if battery is None or (self.place() is None and not ends):
             return "U"
         needed = contract.energy
         if not ends:

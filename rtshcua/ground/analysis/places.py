@@ -1,5 +1,6 @@
 """Atoms about zones over boxes: where the vehicle is, or where a place is that was given as an argument."""
 
+from rtshcua.decision.evaluate import known
 from rtshcua.decision.values import ABSENT, AND, FALSE, MAYBE, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.ground.analysis.atoms import Atom, initial
 from rtshcua.ground.analysis.box import VEHICLE, Box, Cell, Who, absent, clipped, present
@@ -59,11 +60,10 @@ class VehicleIn(Atom):
         enter_side(box, space, VEHICLE, self._zone, x, y)
 
     def truth(self, box: Box) -> Truth:
-        """Whether the vehicle is inside, where position and height are known."""
+        """Whether the vehicle is inside, as far as position and height tell."""
         low, high, gap, _ = box.cells[self._height]
-        gap = max(gap, box.located)
-        truth = 0 if gap == ABSENT else AND[self._prepared.between(low, high)][box.sides[VEHICLE, self._zone]]
-        return AND[self._existing.truth(box)][truth | (UNKNOWN if gap else 0)]
+        across = known(box.sides[VEHICLE, self._zone], box.located)
+        return AND[self._existing.truth(box)][AND[self._prepared.between(low, high, gap)][across]]
 
     def split(self, box: Box) -> list[Box]:
         """By what is missing, by floor and ceiling, by the zone's existence, then by its sides."""
@@ -74,14 +74,13 @@ class VehicleIn(Atom):
         height = box.cells[self._height]
         if height[2] == MAYBE:
             return [box.with_cell(self._height, present(height)), box.with_cell(self._height, absent(height))]
-        if height[2] != ABSENT and box.located != ABSENT:
+        if self._prepared.between(height[0], height[1], height[2]) == TRUE | FALSE:
             floor, ceiling = self._prepared.floor, self._prepared.ceiling
-            if self._prepared.between(height[0], height[1]) == TRUE | FALSE:
-                bounds = ((floor + 1, ceiling - 1), (-_FAR, floor), (ceiling, _FAR))
-                parts = (clipped(height, low, high) for low, high in bounds if low <= high)
-                return [box.with_cell(self._height, part) for part in parts if part is not None]
-            if box.sides[VEHICLE, self._zone] == TRUE | FALSE:
-                return sides_split(box, VEHICLE, self._zone)
+            bounds = ((floor + 1, ceiling - 1), (-_FAR, floor), (ceiling, _FAR))
+            parts = (clipped(height, low, high) for low, high in bounds if low <= high)
+            return [box.with_cell(self._height, part) for part in parts if part is not None]
+        if box.located != ABSENT and box.sides[VEHICLE, self._zone] == TRUE | FALSE:
+            return sides_split(box, VEHICLE, self._zone)
         return self._existing.split(box)
 
 

@@ -178,13 +178,25 @@ def test_the_way_home_is_that_from_where_it_would_stand() -> None:
             assert ((WAY_HOME, FALSE) not in holding(ready(STEP, POLICY), held, POLICY, NOW)) is kept
 
 
-@pytest.mark.parametrize("slot", [POSITION_X, HEIGHT, NORTH, EAST, DOWN])
+@pytest.mark.parametrize("slot", [POSITION_X, NORTH, EAST, DOWN])
 def test_without_one_of_its_signals_nothing_is_known(slot: int) -> None:
     state = moving((0, 0, 20 * M), (1 * M, 0, 0))
     values = tuple(None if number == slot else value for number, value in enumerate(state.values))
     found = unkept(State(values, state.ages))
     assert (AIRSPACE, UNKNOWN) in found
     assert (WAY_HOME, UNKNOWN) in found
+
+
+@pytest.mark.parametrize(("x", "airspace"), [(0, UNKNOWN), (499 * M, FALSE)])
+def test_without_its_height_it_is_known_where_over_ground_it_leads(x: int, airspace: int) -> None:
+    """Whatever its age: of a height that is missing it means nothing."""
+    state = moving((x, 0, 20 * M), (12 * M, 0, 0))
+    values = tuple(None if number == HEIGHT else value for number, value in enumerate(state.values))
+    for age in (0, 4 * STALE):
+        ages = tuple(age if number == HEIGHT else value for number, value in enumerate(state.ages))
+        assert [each for each in unkept(State(values, ages)) if each[0] in (AIRSPACE, WAY_HOME)] == [
+            (AIRSPACE, airspace)
+        ]
 
 
 def test_a_speed_beyond_all_sense_is_unknown() -> None:

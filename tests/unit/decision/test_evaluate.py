@@ -42,9 +42,8 @@ def question(of: Random) -> tuple[tuple[int, ...], tuple[int, ...], Condition]:
 def naive(code: tuple[int, ...], arguments: tuple[int, ...], state: State, now: Now) -> int:
     known = [value[0] if value[2] == 0 else None for value in situation(state, POLICY, now).values]
     x, y, z = known[flat.POSITION_X], known[flat.POSITION_Y], known[flat.HEIGHT]
-    legs: list[Leg] | None = None
-    if x is not None and y is not None and z is not None:
-        legs = [((x, y), (x, y), (0, 0, 0, 0), z, z)]
+    at = None if x is None or y is None else (x, y)
+    legs: list[Leg] = [(at, at, (0, 0, 0, 0), z, z)]
     said = "".join({TRUE: "T", FALSE: "F", UNKNOWN: "U"}[truth] for truth in situation(state, POLICY, now).monitors)
     about = (POLICY.policy, known, arguments, now.utc_us, now.utc_error_us, legs)
     (letter,) = truths(code, World(*about, monitors=said, phase=PHASE))

@@ -25,7 +25,8 @@ ENOUGH = 1_232
         ({BATTERY: ENOUGH - 1, **AWAY}, [(DEGRADE, FALSE), (WAY_HOME, FALSE)]),
         ({BATTERY: None}, [(DEGRADE, UNKNOWN), (WAY_HOME, UNKNOWN)]),
         ({POSITION_X: None}, [(AIRSPACE, UNKNOWN), (WAY_HOME, UNKNOWN)]),
-        ({HEIGHT: None}, [(AIRSPACE, UNKNOWN), (WAY_HOME, UNKNOWN)]),
+        ({HEIGHT: None}, [(AIRSPACE, UNKNOWN)]),  # the city has a ceiling
+        ({HEIGHT: None, POSITION_X: 600 * M}, [(AIRSPACE, FALSE)]),
         ({POSITION_X: 600 * M}, [(AIRSPACE, FALSE)]),
     ],
 )

@@ -27,12 +27,12 @@ from rtshcua.decision.contracts import Energy
 from rtshcua.decision.decide import decide
 from rtshcua.decision.values import MISSING, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
-from rtshcua.decision.zones import WellKnown
+from rtshcua.decision.zones import Place, WellKnown
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Airspace, RuleKind
-from rtshcua.model.flat.zone import LOWEST
+from rtshcua.model.flat.zone import HIGHEST, LOWEST
 from rtshcua.model.outcome import Outcome, Reason
 from virtual.rows import rows
 
@@ -137,12 +137,32 @@ def test_no_airspace_is_no_limit() -> None:
         ({HEIGHT: 25 * M + 1}, Reason.INVARIANT, flat.NOT_HIGH),
         ({POSITION_X: None}, Reason.SAFETY_UNKNOWN, flat.POLICY.airspace),
         ({HEIGHT: None}, Reason.SAFETY_UNKNOWN, flat.POLICY.airspace),
+        ({HEIGHT: None, POSITION_X: 600 * M}, Reason.AIRSPACE, flat.POLICY.airspace),  # whatever the height
+        ({HEIGHT: None, POSITION_X: 480 * M}, Reason.INVARIANT, flat.NEAR_AREA),
+        ({POSITION_X: None, HEIGHT: 130 * M}, Reason.AIRSPACE, flat.POLICY.airspace),  # wherever it is
+        ({POSITION_X: None, HEIGHT: 26 * M}, Reason.INVARIANT, flat.NOT_HIGH),
         ({POSITION_X: None, BATTERY: 3_600}, Reason.SAFETY_UNKNOWN, flat.POLICY.airspace),
     ],
 )
 def test_maintain_over_the_planned_volume(values: dict[int, int | None], reason: Reason, clause_: Any) -> None:
     decision = ask(values=values)
     assert (decision.reason, decision.clause) == (reason, clause_)
+
+
+def test_a_zone_without_a_band_needs_no_height() -> None:
+    """Neither where a rule forbids it, nor for the airspace, nor to know the way home."""
+    zones = tuple(replace(zone, floor=LOWEST, ceiling=HIGHEST) for zone in flat.ZONES)
+    forbid = flat.rule(RuleKind.FORBID, when=clause("position inside bridge_a", (Op.POSITION_IN, flat.BRIDGE, 0)))
+    step, away = goto(150 * M, 0), {HEIGHT: None, POSITION_X: 0}
+    open_to_the_sky = replace(flat.POLICY, zones=zones)
+    assert ask(step, values=away, policy=loaded(open_to_the_sky)).reason is Reason.ADMITTED
+    assert ask(step, values=away | {BATTERY: 1_499}, policy=loaded(open_to_the_sky)).reason is Reason.ENERGY
+    forbidden = loaded(replace(open_to_the_sky, rules=(*flat.POLICY.rules, forbid)))
+    assert ask(step, values=away, policy=forbidden).reason is Reason.ADMITTED
+    assert ask(step, values={HEIGHT: None, POSITION_X: 150 * M}, policy=forbidden).outcome is DENY
+    banded = loaded(replace(flat.POLICY, rules=(*flat.POLICY.rules, forbid)))
+    assert ask(step, values={HEIGHT: None, POSITION_X: 150 * M}, policy=banded).reason is Reason.FORBID_UNKNOWN
+    assert ask(step, values=away, policy=banded).reason is Reason.SAFETY_UNKNOWN
 
 
 def test_maintain_along_the_whole_path() -> None:
@@ -203,7 +223,7 @@ ENERGY = Energy(flat.CONTRACTS[GOTO], flat.POLICY.vehicle)
 
 
 def volume(near: int, far: int, gap: int = 0) -> Volume:
-    return Volume(UNKNOWN_VOLUME.place, (0, 0, gap, None), (near, far))
+    return Volume(Place(UNKNOWN_VOLUME.place.parts, gap), MISSING, (near, far))
 
 
 @rows(
@@ -291,7 +311,7 @@ def test_planned_volume(kind: int, path: Any, altitude: int | None, parts: Any, 
     found = Planner(kind, path, altitude, 3).volume(START, KNOWN)
     assert [(sweep.path, low, high) for sweep, low, high in found.place.parts] == parts
     assert {sweep.box for sweep, _, _ in found.place.parts} == {BOX}
-    assert (found.height, found.place.unknown) == ((*heights, 0, None), 0)
+    assert (found.height, found.place.located, found.place.high) == ((*heights, 0, None), 0, 0)
 
 
 def test_below_home_a_landing_goes_no_further_down_than_the_vehicle_is() -> None:
@@ -301,13 +321,11 @@ def test_below_home_a_landing_goes_no_further_down_than_the_vehicle_is() -> None
 
 
 @pytest.mark.parametrize("slot", [0, 1, 2])
-def test_without_position_or_height_the_volume_is_unknown(slot: int) -> None:
-    gone = [MISSING if n == slot else value for n, value in enumerate(START)]
+def test_what_is_missing_of_the_start_is_missing_of_the_volume(slot: int) -> None:
     planner = Planner(MotionKind.FLY, (7, 8), 2_000, 3)
-    assert planner.volume(gone, KNOWN) is UNKNOWN_VOLUME
-    doubtful = [maybe(value) if n == slot else value for n, value in enumerate(START)]
-    found = planner.volume(doubtful, KNOWN)
-    assert (found.place.unknown, found.height[2]) == (U, 1)
+    for gap, start in ((2, MISSING), (1, maybe(START[slot]))):
+        found = planner.volume([start if n == slot else value for n, value in enumerate(START)], KNOWN)
+        assert (found.place.located, found.place.high, found.height[2]) == ((0, gap, gap) if slot == 2 else (gap, 0, 0))
 
 
 def test_from_a_set_of_starts_the_leg_covers_every_leg() -> None:

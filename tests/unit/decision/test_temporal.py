@@ -178,9 +178,8 @@ def naive(code: tuple[int, ...], state: State, moment: Now, policy: PreparedPoli
     """The truth of a condition in one state, by the naive interpreter."""
     known = [value[0] if value[2] == 0 else None for value in situation(state, policy, moment).values]
     x, y, z = known[flat.POSITION_X], known[flat.POSITION_Y], known[flat.HEIGHT]
-    legs: list[Leg] | None = None
-    if x is not None and y is not None and z is not None:
-        legs = [((x, y), (x, y), (0, 0, 0, 0), z, z)]
+    at = None if x is None or y is None else (x, y)
+    legs: list[Leg] = [(at, at, (0, 0, 0, 0), z, z)]
     about = (policy.policy, known, (), moment.utc_us, moment.utc_error_us, legs)
     (letter,) = truths(code, World(*about, monitors=monitors))
     return letter

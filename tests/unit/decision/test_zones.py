@@ -6,11 +6,12 @@ from math import cos, pi, sin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from reference import outlines, worlds
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
-from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.zones import Place, PreparedZone, Sweep
+from rtshcua.decision.values import ABSENT, FALSE, MAYBE, PRESENT, TRUE, UNKNOWN
+from rtshcua.decision.zones import NOWHERE, Place, PreparedZone, Sweep
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
 from virtual.rows import rows
 
@@ -206,16 +207,43 @@ def test_a_place_in_a_box(box: tuple[int, int, int, int], answer: int) -> None:
 def test_floor_and_ceiling_are_outside(low: int, high: int, answer: int) -> None:
     zone = PreparedZone(0, SQUARE)
     assert zone.between(low, high) == answer
-    assert Place(((Sweep((5, 5), (0, 0, 0, 0)), low, high),), 0).inside(zone) == answer
+    assert Place(((Sweep((5, 5), (0, 0, 0, 0)), low, high),)).inside(zone) == answer
 
 
 def test_a_place_is_the_union_of_its_parts_and_of_what_is_unknown() -> None:
     zone = PreparedZone(0, SQUARE)
     inside = (Sweep((5, 5), (0, 0, 0, 0)), 6, 7)
     outside = (Sweep((15, 5), (0, 0, 0, 0)), 6, 7)
-    assert Place((inside, outside), 0).inside(zone) == T | F
-    assert Place((inside,), UNKNOWN).inside(zone) == T | UNKNOWN
-    assert Place((), UNKNOWN).inside(zone) == UNKNOWN
+    assert Place((inside, outside)).inside(zone) == T | F
+    assert Place((inside,), MAYBE).inside(zone) == T | UNKNOWN
+    assert Place((inside,), PRESENT, MAYBE).inside(zone) == T | UNKNOWN
+    assert NOWHERE.inside(zone) == UNKNOWN
+
+
+@rows(
+    ("banded", "place", "high", "answer"),
+    [  # inside of the outline and of the band, out of the one, out of the other
+        (True, (5, 5, 6), ABSENT, UNKNOWN),
+        (True, (15, 5, 6), ABSENT, F),
+        (True, (15, 5, 6), MAYBE, F),
+        (False, (5, 5, 6), ABSENT, T),
+        (False, (5, 5, 6), MAYBE, T),
+        (False, (15, 5, 6), ABSENT, F),
+    ],
+)
+def test_an_unknown_height_counts_where_a_band_and_the_outline_leave_it_open(
+    banded: bool, place: tuple[int, int, int], high: int, answer: int
+) -> None:
+    zone = SQUARE if banded else replace(SQUARE, floor=LOWEST, ceiling=HIGHEST)
+    x, y, z = place
+    part = (Sweep((x, y), (0, 0, 0, 0)), z, z)
+    assert Place((part,), PRESENT, high).inside(PreparedZone(0, zone)) == answer
+
+
+@rows(("height", "located", "answer"), [(6, ABSENT, UNKNOWN), (20, ABSENT, F), (20, MAYBE, F), (6, MAYBE, T | UNKNOWN)])
+def test_an_unknown_place_counts_where_the_height_leaves_it_open(height: int, located: int, answer: int) -> None:
+    part = (Sweep((5, 5), (0, 0, 0, 0)), height, height)
+    assert Place((part,), located).inside(PreparedZone(0, SQUARE)) == answer
 
 
 def test_the_largest_coordinates_stay_within_64_bits() -> None:

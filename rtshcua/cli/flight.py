@@ -111,7 +111,8 @@ class Flight:
         self._sink = EvidenceWriter(log)
         genesis = self._recorder.genesis(
             now, bundle=bundle, root=root, boot=loaded.in_force.flight, vehicle=loaded.vehicle,
-            mission=mission.name, mode=loaded.mode, before=past.hash, sync_us=clock.us_in(SYNC_US / 1e6),
+            mission=mission.name, mode=loaded.mode, before=past.hash, received_us=loaded.in_force.received_us(0),
+            sync_us=clock.us_in(SYNC_US / 1e6),
         )  # fmt: skip
         self._sink.append(genesis, SYNCED_FIRST)
         if simulated is not None:

@@ -49,6 +49,7 @@ class InForce:
     """The verified bundle and its invocations; after a replacement, with those of the mission that flies now.
 
     `flight` is the id of this one flight: documents name it, so that none serves another flight of the same mission.
+    `received_us` is when the bundle was received on board, monotonic.
     `recalled` says that no step may begin any more.
     """
 
@@ -60,6 +61,7 @@ class InForce:
         root: TrustRoot,
         vehicle: str,
         flight: bytes,
+        received_us: int,
     ) -> None:
         self.bundle = bundle
         self.invocations = invocations
@@ -69,6 +71,8 @@ class InForce:
         self._vehicle = vehicle
         self.flight = flight
         self._approvals = Approvals(policy.policy)
+        #: by step
+        self._received_us: tuple[int, ...] = (received_us,) * len(invocations)
         #: the last replacements that were considered, by their bytes
         self._ahead: dict[bytes, _Ahead] = {}
         self._issued_at_us = bundle.mission.issued_at_us
@@ -80,6 +84,10 @@ class InForce:
     def approvals(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
         """The verified answers that a decision on an invocation is told of."""
         return self._approvals.about(invocation, now)
+
+    def received_us(self, step: int) -> int:
+        """When a step was received on board, monotonic (paper symbol `t_r`): nothing is released before."""
+        return self._received_us[step]
 
     def consider(self, document: bytes, now: Now) -> None:
         """Verify and prepare a replacement ahead, in whatever thread, so that `take` need not: that takes a while.
@@ -162,6 +170,7 @@ class InForce:
         self._seen |= new
         self.bundle = after
         self.invocations = (*self.invocations[: found.kept], *prepared[found.kept :])
+        self._received_us = (*self._received_us[: found.kept], *[now.monotonic_us] * (len(prepared) - found.kept))
         self._digests = (*self._digests, found.digest)
         self._approvals.keep(after.mission.invocations)
         steps = len(prepared)

@@ -98,9 +98,12 @@ class Recorder:
         mission: str,
         mode: str,
         before: str | None = None,
+        received_us: int | None = None,
         sync_us: int = SYNC_US,
     ) -> bytes:
-        """The first line. `boot` is 16 random bytes; `mode`, the enforcement mode, stands in each decision too."""
+        """The first line. `boot` is 16 random bytes; `mode`, the enforcement mode, stands in each decision too.
+        `received_us` is when the bundle was received on board, monotonic; without it, now.
+        """
         self._mode = mode
         self._origin = origin_of(vehicle, boot.hex())
         key = EpochKey(self._draw())
@@ -117,6 +120,7 @@ class Recorder:
             mission=mission,
             mode=mode,
             next_key=key.public.hex(),
+            received_us=now.monotonic_us if received_us is None else received_us,
             root=b64encode(root).decode(),
             seq=self._head.seq,
             sync_us=sync_us,

@@ -20,6 +20,9 @@ class Clocks:
         """What is wrong with the times of the next record, or None."""
         at_us, utc_us, error_us = record.at_us, record.utc_us, record.utc_error_us
         apart_us = utc_us - at_us
+        if isinstance(record, Genesis) and record.received_us > at_us:
+            text = "its bundle was received after the log that holds it began"
+            return Flaw("clock/received", text, f"{record.received_us} us", f"{at_us} us or before")
         if isinstance(record, Genesis | Recover):
             self._apart_us, self._apart_error_us = apart_us, error_us
         elif at_us < self.at_us:

@@ -43,8 +43,9 @@ class Genesis(Record, frozen=True):
 
     `bundle` and `root` are base64 of the bundle and of the trust root; `log_key` is the Ed25519 public key, called
     `log_kid` in the root, that signs this record. `boot` is 16 random bytes; `before` the last line's hash of the log
-    that this vehicle wrote before, or null. `mode` is the enforcement mode. A record of durability class 2 is on the
-    disk within `sync_us`.
+    that this vehicle wrote before, or null. `received_us` is the monotonic time at which the bundle was received on
+    board (paper symbol `t_r`); what a replacement brings is received when the effect says so. `mode` is the enforcement
+    mode. A record of durability class 2 is on the disk within `sync_us`.
     """
 
     prev: Hash
@@ -59,6 +60,7 @@ class Genesis(Record, frozen=True):
     mission: str
     mode: str
     next_key: Hash
+    received_us: Count
     root: str
     seq: Count
     sync_us: Count

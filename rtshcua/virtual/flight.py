@@ -185,6 +185,7 @@ class VirtualFlight:
                 mission=mission.name,
                 mode=mode,
                 before=before,
+                received_us=now.monotonic_us,
             ),
             SYNCED_FIRST,
         )

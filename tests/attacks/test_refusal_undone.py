@@ -146,7 +146,7 @@ def test_an_id_that_was_seen_before_is_refused() -> None:
         OF.bundle.policy, taken, OF.bundle.policy_digest, OF.bundle.mission_digest, OF.bundle.digest,
         OF.bundle.policy_key, OF.bundle.mission_key,
     )  # fmt: skip
-    of = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT)
+    of = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT, 0)
     document = sign_document(
         names.REPLACEMENT,
         ReplacementDocument(FLIGHT, OF.bundle.mission_digest, ASKED, bound),

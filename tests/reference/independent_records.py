@@ -153,11 +153,12 @@ FORMS = {
         "mission": text,
         "mode": text,
         "next_key": digits(64),
+        "received_us": count,
         "root": base64_text,
         "sync_us": count,
         "type": text,
         "vehicle": text,
-        "version": one_of(3),
+        "version": one_of(4),
     },
     "decision": _ALL
     | dict.fromkeys(_INTEGERS, integer)

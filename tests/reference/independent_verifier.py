@@ -164,6 +164,8 @@ class Walk:
     def _clocks(self, record: dict) -> None:
         at, utc, error = record["at_us"], record["utc_us"], record["utc_error_us"]
         anew = record["type"] in ("genesis", "recover")
+        if record["type"] == "genesis" and record["received_us"] > at:
+            raise Broken("received after it began")
         if not anew and at < self.at_us:
             raise Broken("at_us goes back")
         if utc + error < self.low:

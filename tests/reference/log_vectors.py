@@ -58,6 +58,7 @@ def _epoch(number: int) -> str:
 def genesis(**fields: object) -> Fields:
     """A genesis at 0 ms."""
     first = read(flight()[0]) | times(0)
+    first["received_us"] = first["at_us"] - 2_000
     return first | {"root": b64encode(root()).decode(), "next_key": _epoch(0)} | fields
 
 
@@ -146,6 +147,8 @@ def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
     yield "stripped", "2: no signature", [*good[:-1], line_of(read(good[-1]) | {"checkpoint": None})]
     yield "unsealed", "3: more than 20 s and no seal", log(genesis(), effect(20_001), close(20_002))
     yield "clock", "4: monotonic time goes back", log(genesis(), effect(10), effect(9), close(20))
+    later = genesis(received_us=MONOTONIC_US + 1)
+    yield "received", "4: the bundle received after the log began", log(later, effect(10), close(20))
     yield "utc_jump", "4: the clocks part", log(genesis(), effect(10, utc_us=UTC_US + 2_011_000), close(20))
     yield "origin", "2: the origin of another boot", _with_text(good, lambda _, text: text.replace("00\n", "01\n", 1))
     larger = _with_text(good, lambda n, text: text.replace(f"\n{n}\n", f"\n{n + 1}\n", 1))

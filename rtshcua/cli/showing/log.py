@@ -71,11 +71,20 @@ def _records(lines: Iterable[bytes]) -> Iterator[AnyRecord | Flaw]:
 def _head(page: Page, genesis: Genesis) -> None:
     page.head(f"Log of mission {genesis.mission} on {genesis.vehicle}")
     page.row("begun", f"{utc(genesis.utc_us)}, {true_to(genesis.utc_error_us)}")
+    found = _bundle(genesis)
+    if found is not None:
+        page.row("received", _received(genesis, found.mission.issued_at_us))
     page.row("mode", genesis.mode)
     page.row("log key", genesis.log_kid)
     page.row("boot", genesis.boot)
     if genesis.before is not None:
         page.row("follows", f"the log whose last line has the hash {genesis.before}")
+
+
+def _received(genesis: Genesis, issued_at_us: int) -> str:
+    """How long the bundle took to come on board: what the paper calls `L_src` and `L_comp`, and the way."""
+    took_us = genesis.utc_us - (genesis.at_us - genesis.received_us) - issued_at_us
+    return f"{took_us / 1_000_000:.3f} s after the mission was issued"
 
 
 def _entry(record: AnyRecord, what: str) -> dict[str, object]:

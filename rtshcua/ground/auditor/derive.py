@@ -119,6 +119,13 @@ class Deriver:
         if given.approvals != tuple(astuple(each) for each in approvals):
             text = "the approvals that it read are not those that the log holds and that are verified"
             return Flaw("decision/approvals", text, str(given.approvals), str(approvals))
+        received_us = self._basis.in_force.received_us(record.step)
+        if given.released_us < received_us:
+            text = "a step was released before it was received on board"
+            return Flaw("decision/released", text, f"{given.released_us} us", f"{received_us} us or later")
+        if given.released_us > record.at_us:
+            text = "a step is decided before it is released: the boundary decides no such step"
+            return Flaw("decision/released", text, f"{given.released_us} us", f"{record.at_us} us or before")
         binding = _octets(record.binding)
         if binding is None:
             return Flaw("decision/inputs", "the binding is not written in hexadecimal", record.binding)

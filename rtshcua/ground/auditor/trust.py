@@ -49,7 +49,9 @@ def establish(genesis: Genesis, pinned: bytes, *, bundle: bytes | None = None) -
     if isinstance(prepared, Flaw):
         return prepared
     policy, invocations = prepared
-    return Basis(root, policy, InForce(opened, policy, invocations, root, genesis.vehicle, bytes.fromhex(genesis.boot)))
+    boot = bytes.fromhex(genesis.boot)
+    in_force = InForce(opened, policy, invocations, root, genesis.vehicle, boot, genesis.received_us)
+    return Basis(root, policy, in_force)
 
 
 # A log that is asked several things (by the quick verifier and then the careful one, for one proof and the next) says

@@ -88,6 +88,9 @@ class SoftwareBoundary:
         refused = self._session.refusal(ref)
         if refused is not None:
             return encode_refusal(refused)
+        # nor was anything released before it was here
+        if asked.kind == STEP and asked.released_us < self._in_force.received_us(asked.step):
+            return encode_refusal(Status.MALFORMED)
         return encode(self._step(asked) if asked.kind == STEP else self._link(asked, ref))
 
     def consider(self, document: bytes, now: Now) -> None:

@@ -75,6 +75,8 @@ def load(
     """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
     `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log.
 
+    `now` is when the bundle was received (paper symbol `t_r`).
+
     Raises ValueError for a session key or an id of another length; whatever is wrong with the bundle is a `Refusal`.
     """
     if len(session_key) != SESSION_KEY_BYTES:
@@ -96,7 +98,8 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
-    return session(InForce(opened, policy, invocations, root, vehicle, flight), policy, vehicle, mode, session_key)
+    in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
+    return session(in_force, policy, vehicle, mode, session_key)
 
 
 def session(in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes) -> Loaded:

@@ -116,6 +116,7 @@ def test_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "· violated" in out
     assert f"closed after {len(other_flight()) - 1} records: aborted" in out
     assert sum("  · dispatched" in line for line in out.splitlines()) == 3
+    assert "s after the mission was issued" in out
 
 
 def test_a_log_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

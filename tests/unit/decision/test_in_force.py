@@ -30,7 +30,7 @@ IN_DOUBT = START.utc_us + START.utc_error_us
 
 
 def flight(root: TrustRoot = ROOT) -> InForce:
-    return InForce(OF.bundle, OF.policy, OF.invocations, root, VEHICLE, FLIGHT)
+    return InForce(OF.bundle, OF.policy, OF.invocations, root, VEHICLE, FLIGHT, 0)
 
 
 def entitled(**fields: object) -> TrustRoot:
@@ -200,6 +200,15 @@ def test_after_a_replacement_its_steps_are_in_force_and_their_answers_are_forgot
     assert take(of, recall(OF)).accepted, "by the mission that was opened"
 
 
+def test_what_a_replacement_brings_was_received_with_it() -> None:
+    of = InForce(OF.bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT, 7)
+    assert [of.received_us(step) for step in range(len(of.invocations))] == [7] * len(of.invocations)
+    kept = take(of, replacement(OF), later(5)).step
+    received = [of.received_us(step) for step in range(len(of.invocations))]
+    assert received == [7] * kept + [START.monotonic_us + 5] * (len(of.invocations) - kept)
+    assert len(received) > kept > 0
+
+
 def test_a_replacement_considered_ahead_is_taken_as_any_other() -> None:
     of, plain = flight(), flight()
     of.consider(approval(OF), START)
@@ -286,7 +295,7 @@ def test_a_replacement_that_brings_back_an_id_seen_before_is_refused() -> None:
 
     def with_last(id_: bytes) -> InForce:
         mission = replace(OF.bundle.mission, invocations=(*steps, replace(last, invocation_id=id_)))
-        return InForce(with_fields(OF.bundle, mission=mission), OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT)
+        return InForce(with_fields(OF.bundle, mission=mission), OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT, 0)
 
     of = with_last(as_replacement(first).invocations[2].invocation_id)
     before = of.bundle

@@ -31,7 +31,7 @@ class Asked:
     """A session, asked by hand. Each step is released when it is asked for, at the bridge."""
 
     def __init__(self, of: Loaded = LOADED, *, enforced: bool = True) -> None:
-        self.in_force = InForce(of.bundle, of.policy, of.invocations, world.ROOT, world.VEHICLE, world.FLIGHT)
+        self.in_force = InForce(of.bundle, of.policy, of.invocations, world.ROOT, world.VEHICLE, world.FLIGHT, 0)
         self.session = Session(of.policy, self.in_force, enforced=enforced)
 
     def step(self, step: int, values: dict[int, int | None] | None = None, **context: Any) -> Outcome:

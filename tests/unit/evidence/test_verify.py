@@ -161,10 +161,10 @@ def test_a_log_begins_with_its_genesis(log: list[bytes]) -> None:
 @pytest.mark.parametrize(
     ("fields", "found"),
     [
-        ({"version": 4}, "rtshcua/log version 4"),
+        ({"version": 5}, "rtshcua/log version 5"),
         ({"version": 1, "later": 1}, "rtshcua/log version 1"),
-        ({"format": "other/log"}, "other/log version 3"),
-        ({"version": 2}, "rtshcua/log version 2"),
+        ({"format": "other/log"}, "other/log version 4"),
+        ({"version": 3}, "rtshcua/log version 3"),
     ],
 )
 def test_a_format_must_be_known(fields: dict[str, object], found: str, log: list[bytes]) -> None:
@@ -172,7 +172,7 @@ def test_a_format_must_be_known(fields: dict[str, object], found: str, log: list
     assert report.failure is not None
     assert report.failure.slug == "genesis/format"
     assert report.failure.found == found
-    assert report.failure.expected == "rtshcua/log version 3"
+    assert report.failure.expected == "rtshcua/log version 4"
 
 
 def test_an_unknown_field_in_a_known_version(log: list[bytes]) -> None:
@@ -217,6 +217,12 @@ def test_monotonic_time_stands_or_goes_on(log: list[bytes]) -> None:
     start = 1_750_000_000_000_000
     assert shortfall(chained([log[0], edit(log[1], at_us=5_000_000, utc_us=start)])) == ("close/missing", 2)
     assert failure(chained([log[0], edit(log[1], at_us=4_999_999)])) == ("clock/backwards", 1)
+
+
+def test_the_bundle_was_received_before_the_log_began(log: list[bytes]) -> None:
+    began_us = json.loads(log[0])["at_us"]
+    assert failure([edit(log[0], received_us=began_us - 1)]) == ("seal/self", 0)
+    assert failure([edit(log[0], received_us=began_us + 1)]) == ("clock/received", 0)
 
 
 def test_utc_may_step_back_within_its_stated_error(log: list[bytes]) -> None:

@@ -84,6 +84,12 @@ def test_a_release_that_is_still_to_come_is_refused() -> None:
     allowed(of)
 
 
+def test_a_release_before_the_bundle_was_received_is_refused() -> None:
+    of = loaded()
+    assert answer_to(of, request_for(of, released_us=START.monotonic_us - 1)) is Status.MALFORMED
+    allowed(of)
+
+
 def test_time_that_goes_back_is_refused() -> None:
     of = loaded()
     allowed(of)

@@ -210,7 +210,7 @@ def test_no_proof_is_made_of_a_log_that_does_not_hold() -> None:
     assert slug(prove_consistency(lambda: changed, 6)) == "proof/consistency"
     assert slug(prove_inclusion(lambda: lines[1:], 3)) == "proof/log"
     assert slug(prove_inclusion(lambda: [b"junk\n"], 3)) == "proof/no-log"
-    earlier = [lines[0].replace(b'"version":3}', b'"version":2}')]
+    earlier = [lines[0].replace(b'"version":4}', b'"version":3}')]
     assert slug(prove_inclusion(lambda: earlier, 0)) == "genesis/format"
     assert slug(prove_inclusion(lambda: [lines[0], *lines[2:]], 3)) == "proof/log"
     assert slug(prove_inclusion(lambda: [lines[0], lines[0]], 0)) == "proof/log"

@@ -5,7 +5,7 @@ from functools import cache
 import pytest
 from msgspec.structs import replace
 
-from reference.forgery import edit, expect, other_flight, prove, read, signed
+from reference.forgery import edit, expect, flight, other_flight, prove, read, signed
 from reference.kinds_of_flight import fallen_back
 from rtshcua.model.faults import BatteryLevel
 from virtual import case
@@ -56,6 +56,15 @@ def test_a_forged_link_of_the_contingency(fields: dict[str, object], slug: str) 
     lines = denied_in_the_air()
     number = decisions(lines, 2)[0]
     assert forged(lines, number, **fields) == (slug, number)
+
+
+@pytest.mark.parametrize("by_us", [-1, 1])
+def test_a_step_is_released_after_it_was_received_and_before_it_is_decided(by_us: int) -> None:
+    lines = flight()
+    number = decisions(lines, 0)[0]
+    end = read(lines[0])["received_us"] if by_us < 0 else read(lines[number])["at_us"]
+    context = read(lines[number])["context"] | {"released_us": end + by_us}
+    assert forged(lines, number, context=context) == ("decision/released", number)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import typer
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
-from rtshcua.cli.faults import fail, refuse, untrusted
+from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
-from rtshcua.cli.unlock import unlock_person
+from rtshcua.cli.unlock import terminal, unlock_person
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -46,11 +46,13 @@ def approve(
     ] = None,
     approval_key: Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="sign without asking, at a terminal too; for scripts")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:  # fmt: skip
     """Answer the `confirm` rules that ask you about one step of one mission: yes, or no.
 
-    What you answer is told from the step's skill and arguments, each zone with its size and its way from home.
+    What you answer is told first, from the step's skill and arguments, each zone with its size and its way from home;
+    at a terminal you are then asked whether to sign it. Without a terminal it is told and signed.
 
     The bundle is verified first, so that you sign what it says. The answer is good for that step of that mission alone,
     on its vehicle, and for a bounded time; a step that flies already is not recalled by it.
@@ -82,14 +84,21 @@ def approve(
             issued_at_us=now_us,
             expires_at_us=now_us + seconds * 1_000_000,
         )
+        told = words.step(flying.policy, steps[step])
+        say(f"step {step} of `{flying.mission.name}` on `{said.vehicle}`: `{told}`")
+        if not yes and terminal() and not typer.confirm(f"sign that {_answer(refused)} as {role}?", err=True):
+            return fail(ExitCode.REFUSED, "nothing was signed", slug="not-signed")
         store = KeyStore(data_folder())
         key = unlock_person(store, person, role, path=approval_key, passphrase_file=passphrase_file)
         document = sign_approval(said, key)
     except Untrusted as error:
         return refuse(untrusted(error))
-    told = words.step(flying.policy, steps[step])
     what = f"{'refused' if refused else 'approved'} as {role} for {seconds} s: step {step}, `{told}`"
     return deliver(document, what, to=to, output=output, as_json=as_json)
+
+
+def _answer(refused: bool) -> str:
+    return "it is refused" if refused else "it may be flown"
 
 
 def _roles(policy: Policy, invocation: Invocation) -> list[str]:

@@ -9,6 +9,7 @@ import typer
 from rtshcua.cli.archiving.given import logs_in, time_of, unknown, with_extra
 from rtshcua.cli.archiving.told import Shape, tell
 from rtshcua.cli.faults import distrust, fail
+from rtshcua.cli.stdout import out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.untrusted import Untrusted
 
@@ -167,7 +168,7 @@ def query(
         if name is not None and question is None:
             return fail(ExitCode.USAGE, f"no such question: `{name}`", "`rtshcua archive query` lists them")
         if show_sql and question is not None:
-            print(question.sql)
+            out_rendered(question.sql)
             return ExitCode.OK
         times = [None if text is None else time_of(text) for text in (since, until)]
         for text, time in zip((since, until), times, strict=True):

@@ -29,6 +29,7 @@ from rtshcua.cli.faults import say, words_of
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.faults import KINDS
@@ -141,7 +142,7 @@ def campaign(
     summary = _summary(identity, past, folder)
     folder.tell(summary)
     if not as_json_:
-        print("\n".join(_told(summary, folder)))
+        out(*_told(summary, folder))
     return findings.finish(
         ExitCode.TESTS if summary.failures else ExitCode.OK, campaign=as_json(summary), folder=str(folder.path)
     )

@@ -11,6 +11,7 @@ from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.programs import programs
 from rtshcua.cli.progress import watched
+from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.codes import UNKNOWN_NAME
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -38,15 +39,15 @@ def check_sources(
     if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
         say(" help: what a specification speaks of stands in its policy's sources: `--with FILE` names them")
     if code is ExitCode.OK and not as_json:
-        print(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
+        out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
         for mission in found.missions:
-            print(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
+            out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
         for left_out in found.left_out:
-            print(left_out.told())
+            out(left_out.told())
         for each in found.versions:
-            print(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
+            out(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
         if since is not None and not found.versions:
-            print(f"nothing in {since} is an earlier version of a policy here")
+            out(f"nothing in {since} is an earlier version of a policy here")
     return findings.finish(
         code,
         missions=[{"mission": each.name, "file": each.file} | each.bounds._asdict() for each in found.missions],

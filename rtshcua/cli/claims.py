@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from textwrap import wrap
 
+from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.evidence.finding import Claim
 
@@ -26,12 +27,11 @@ def listed(title: str, style: str, mark: str, claims: Sequence[Claim]) -> list[t
 def write(lines: Iterable[tuple[str, str]]) -> None:
     """Prints (style, line): in colour on a terminal, unless NO_COLOR is set."""
     if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
-        for _, text in lines:
-            print(text)
+        out(*(text for _, text in lines))
         return
     from rich.console import Console
     from rich.text import Text
 
     console = Console(highlight=False)
     for style, text in lines:
-        console.print(Text(text, style))
+        console.print(Text(visible(text), style))

@@ -15,6 +15,7 @@ from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with
 from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.pins import Pins
@@ -114,9 +115,9 @@ def compile(
         return findings.end(untrusted(error))
     replace(target, data)
     if not as_json:
-        print(_told(compiled.policy, compiled.mission, target))
+        out(_told(compiled.policy, compiled.mission, target))
         if compiled.bounds is not None:
-            print(bounds_told(compiled.bounds))
+            out(bounds_told(compiled.bounds))
     return findings.finish(
         ExitCode.OK,
         bundle=_described(compiled.policy, compiled.mission, target, data, signers),

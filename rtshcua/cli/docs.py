@@ -19,6 +19,7 @@ from rtshcua.cli.moments import moment
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import Asked, programs
 from rtshcua.cli.sources import examine, read_sources
+from rtshcua.cli.stdout import out, out_rendered
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -122,12 +123,12 @@ def docs(
 
     text = page(book)
     if target is None:
-        sys.stdout.write(text)
+        out_rendered(text, end="")
         return ExitCode.OK
     replace(target, text.encode("utf-8"))
     for chapter in book.chapters:
-        print(f"{chapter.name}: version {chapter.version}, digest {chapter.digest}")
-    print(f"{len(book.chapters)} {'policies' if len(book.chapters) > 1 else 'policy'}, written to {target}")
+        out(f"{chapter.name}: version {chapter.version}, digest {chapter.digest}")
+    out(f"{len(book.chapters)} {'policies' if len(book.chapters) > 1 else 'policy'}, written to {target}")
     return ExitCode.OK
 
 

@@ -28,6 +28,7 @@ from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -106,7 +107,7 @@ def doctor(
         )  # fmt: skip
     code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
     if as_json:
-        print(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
+        out_json(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
     else:
         _print(findings)
     return code
@@ -160,14 +161,14 @@ def _print(findings: Sequence[VehicleFinding]) -> None:
     """A line a finding; what is wrong, with what is needed and what to do about it."""
     width = max(len(each.slug) for each in findings)
     for each in findings:
-        print(f"{_MARKS[each.verdict]:<5} {each.slug:<{width}}  {each.found}")
+        out(f"{_MARKS[each.verdict]:<5} {each.slug:<{width}}  {each.found}")
         for label, text in (("needed", each.needed), ("help", each.advice)):
             if text and each.verdict is not MissionVerdict.OK:
-                print(f"{'':<5} {'':<{width}}  {label}: {text}")
+                out(f"{'':<5} {'':<{width}}  {label}: {text}")
     stops = sum(each.verdict is MissionVerdict.STOP for each in findings)
     warns = sum(each.verdict is MissionVerdict.WARN for each in findings)
     end = f"{stops} would stop a mission" if stops else "nothing would stop a mission"
     unknown = sum(each.verdict is MissionVerdict.UNKNOWN for each in findings)
     if unknown and not stops:
         end = "nothing that was learned would stop a mission"
-    print(f"{end}; {warns} to know of" + (f"; {unknown} that it did not say" if unknown else ""))
+    out(f"{end}; {warns} to know of" + (f"; {unknown} that it did not say" if unknown else ""))

@@ -10,6 +10,7 @@ from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.cli.faults import fail
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
@@ -67,9 +68,9 @@ def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None,
 def _say(code: ExitCode, slug: str, text: str, *, as_json: bool) -> ExitCode:
     text = visible(text)  # names of the mission's, of files, and the words of who listens at the socket
     if as_json:
-        print(json.dumps({"slug": slug, "text": text, "exit": code.slug}, ensure_ascii=False))
+        out_json(json.dumps({"slug": slug, "text": text, "exit": code.slug}, ensure_ascii=False))
     elif code is ExitCode.OK:
-        print(text)
+        out(text)
     else:
         return fail(code, text)
     return code

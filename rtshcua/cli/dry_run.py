@@ -12,6 +12,7 @@ from rtshcua.cli.faults import say
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.showing.page import Page, for_terminal
 from rtshcua.cli.showing.why import would_pass
+from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
@@ -69,12 +70,12 @@ def dry_run(
     code = ExitCode.INTERRUPTED if interrupted else ExitCode.OK if would else ExitCode.REFUSED
     if as_json:
         told = {"refusal": refusal, "notes": list(notes), "interrupted": interrupted}
-        print(msgspec.json.encode(_object(loaded, found, unready, code) | told).decode())
+        out_json(msgspec.json.encode(_object(loaded, found, unready, code) | told).decode())
     else:
         page = _page(loaded, found, unready, refusal)
         if interrupted:
             page.text("(interrupted: this is as it stood then)")
-        print(page)
+        out_rendered(str(page))
     return code
 
 

@@ -8,6 +8,7 @@ import typer
 
 from rtshcua.cli.faults import fail
 from rtshcua.cli.pages import read_page
+from rtshcua.cli.stdout import out, out_json, out_rendered
 from rtshcua.diagnostics.codes import REGISTRY, Code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
@@ -31,11 +32,11 @@ def explain(
         return fail(ExitCode.USAGE, f"there is no code `{code}`", help)
     page = read_page(found)
     if as_json:
-        print(json.dumps(_row(found) | page._asdict(), indent=2, ensure_ascii=False))
+        out_json(json.dumps(_row(found) | page._asdict(), indent=2, ensure_ascii=False))
     elif sys.stdout.isatty():
         _draw(page.text)
     else:
-        print(page.text, end="")
+        out_rendered(page.text, end="")
     return ExitCode.OK
 
 
@@ -55,10 +56,10 @@ def _row(code: Code) -> dict[str, str]:
 def _list(as_json: bool) -> None:
     codes = sorted(REGISTRY.values(), key=lambda code: code.id)
     if as_json:
-        print(json.dumps([_row(code) for code in codes], indent=2, ensure_ascii=False))
+        out_json(json.dumps([_row(code) for code in codes], indent=2, ensure_ascii=False))
         return
     for code in codes:
-        print(f"{code.id}  {code.severity.value:7}  {code.slug:24}  {code.meaning}")
+        out(f"{code.id}  {code.severity.value:7}  {code.slug:24}  {code.meaning}")
 
 
 def _draw(text: str) -> None:

@@ -11,6 +11,7 @@ from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_mea
 from rtshcua.cli.pin import Pin
 from rtshcua.cli.showing.page import for_terminal
 from rtshcua.cli.showing.record import Told, show_record
+from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 
 
@@ -41,7 +42,7 @@ def explained(
     shown = show_record(page, told, report)
     if as_json:
         head = {"log": str(path), "verdict": report.verdict.value, "exit_code": int(code)}
-        print(json.dumps({**head, **shown}, ensure_ascii=False))
+        out_json(json.dumps({**head, **shown}, ensure_ascii=False))
     else:
-        print(page)
+        out_rendered(str(page))
     return code

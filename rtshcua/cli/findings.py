@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rtshcua.cli.faults import code_of, fail, say, say_lines, say_rendered
+from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -56,7 +57,7 @@ class Findings:
     def finish(self, code: ExitCode, **result: Any) -> ExitCode:
         """End; with `json`, print everything."""
         if self._json:
-            print(json.dumps(self._object | {"exit": code.slug} | result, indent=2, ensure_ascii=False))
+            out_json(json.dumps(self._object | {"exit": code.slug} | result, indent=2, ensure_ascii=False))
         return code
 
 

@@ -99,7 +99,7 @@ class Flight:
         self._witnesses = witnesses
         self._recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, draw)
         log = run.log()
-        past.begin(log.path)
+        past.begin(log.path, aloft=resumed)
         self._past = past
         self._frames = run.telemetry()
         tape.attach(self._frames)

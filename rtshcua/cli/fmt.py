@@ -13,6 +13,7 @@ from rtshcua.cli.faults import exit_code_of, say, tell, words_of
 from rtshcua.cli.findings import Findings
 from rtshcua.cli.formatting.each import Laid, of_file, of_text
 from rtshcua.cli.formatting.shown import difference
+from rtshcua.cli.stdout import out, out_rendered
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -75,7 +76,7 @@ def fmt(
     for path, width in wide:
         laid.append(of_file(path, width, write=not (check or diff)))
         if diff and not as_json:
-            print(difference(laid[-1]), end="")
+            out_rendered(difference(laid[-1]), end="")
     return _told(findings, laid, check=check, diff=diff, quiet=diff, as_json=as_json)
 
 
@@ -100,7 +101,7 @@ def _standard_input(findings: Findings, name: Path | None, projects: Projects, *
     excluded = project.excludes(path, project.settings.format.exclude)
     laid = Laid(path.as_posix(), data, data) if excluded else of_text(path, data, project.settings.format.width)
     if diff:
-        print(difference(laid), end="")
+        out_rendered(difference(laid), end="")
     elif not check and laid.after is not None:
         sys.stdout.flush()
         sys.stdout.buffer.write(laid.after)
@@ -118,10 +119,10 @@ def _told(findings: Findings, laid: list[Laid], *, check: bool, diff: bool, quie
     findings.report(found, {each.name: each.source for each in laid if each.diagnostics or each.changed})
     if not as_json and not quiet:
         for each in changed:
-            print(f"{'not formatted' if check else 'formatted'}: {each.name}")
+            out(f"{'not formatted' if check else 'formatted'}: {each.name}")
         rest = sum(each.before == each.after for each in laid)
         if changed or rest or not laid:
-            print(_count(len(changed), rest, check=check))
+            out(_count(len(changed), rest, check=check))
     code = ExitCode.DIAGNOSTICS if refused or ((check or diff) and changed) else ExitCode.OK
     if any(each.unreadable for each in laid):
         code = ExitCode.INPUT

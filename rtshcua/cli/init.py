@@ -11,6 +11,7 @@ import typer
 
 from rtshcua.adapters.store.laying import lay
 from rtshcua.cli.faults import fail, words_of
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.library import root
@@ -117,11 +118,11 @@ def _first_finding(files: Mapping[str, bytes]) -> str | None:
 def _tell(directory: Path, name: str, files: list[str], kept: tuple[str, ...], as_json: bool) -> None:
     if as_json:
         told = {"name": name, "folder": str(directory), "files": files, "kept": [*kept]}
-        print(json.dumps(told, ensure_ascii=False))
+        out_json(json.dumps(told, ensure_ascii=False))
         return
-    print(f"made {name} in {directory.absolute()}:")
+    out(f"made {name} in {directory.absolute()}:")
     for path in files:
-        print(f"  {path}")
+        out(f"  {path}")
     if kept:
-        print(f"kept as they were: {', '.join(kept)}")
-    print("next, in there: `rtshcua lint .`, `rtshcua test .`, and what README.md says")
+        out(f"kept as they were: {', '.join(kept)}")
+    out("next, in there: `rtshcua lint .`, `rtshcua test .`, and what README.md says")

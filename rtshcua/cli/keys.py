@@ -25,6 +25,7 @@ from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.meeting import unopened
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import read_passphrase, unlock
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -194,9 +195,9 @@ def show(
         return _refused(error)
     public = next(key.public for key in root.keys if key.kid == kid)
     if as_json:
-        print(json.dumps({"root_key": public.hex(), "kid": kid.hex(), "development": root.development}))
+        out_json(json.dumps({"root_key": public.hex(), "kid": kid.hex(), "development": root.development}))
     else:
-        print(public.hex())
+        out(public.hex())
     return ExitCode.OK
 
 
@@ -253,7 +254,7 @@ def _make_link_key(file: Path, passphrase_file: Path | None) -> ExitCode:
         write_link_key(file, key)
     except FileExistsError:
         return fail(ExitCode.REFUSED, f"there is a file `{file}` already", "a key that is in use is not overwritten")
-    print(f"{file}: link key {fingerprint(key)}")
+    out(f"{file}: link key {fingerprint(key)}")
     return ExitCode.OK
 
 
@@ -335,15 +336,15 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
     except Untrusted as error:
         return _refused(error)
     if as_json:
-        print(json.dumps(_as_object(store, root), indent=2, ensure_ascii=False))
+        out_json(json.dumps(_as_object(store, root), indent=2, ensure_ascii=False))
         return ExitCode.OK
     kind = "development root: for trying out, its keys are not encrypted" if root.development else "trust root"
-    print(f"{kind}\n  folder   {store.folder}\n  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}\n")
-    print(f"  {'duty':<9} {'key':<33} may speak for")
+    out(kind, f"  folder   {store.folder}", f"  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}", "")
+    out(f"  {'duty':<9} {'key':<33} may speak for")
     for key in root.keys:
-        print(f"  {key.duty:<9} {key.kid.hex():<33} {speaks(key)}")
+        out(f"  {key.duty:<9} {key.kid.hex():<33} {speaks(key)}")
     if root.witness_threshold > 1:
-        print(f"\n  {root.witness_threshold} witnesses must cosign what counts as anchored")
+        out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
     return ExitCode.OK
 
 

@@ -24,7 +24,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
-from rtshcua.cli.faults import code_of, untrusted
+from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
@@ -136,6 +136,7 @@ def launch(order: Launch) -> ExitCode:
                 )  # fmt: skip
             assert past is not None
             resumed = broke_off(order.state, loaded, vehicle, clock, events)
+            _expect_kept(signing, resumed=resumed)
             run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
             write_secret(run.path, secrets.token_bytes(SECRET_BYTES))
             feed = view.enter_context(Feed(order.style))
@@ -246,15 +247,33 @@ def _sign(order: Launch, loaded: Loaded, clock: LinkClock) -> Signing:
     try:
         signing = Signing(
             order.signing_key, loaded.bundle.policy, loaded.executor.frames, order.state, clock,
-            unsigned_radio=order.unsigned_radio,
+            unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
         )  # fmt: skip
     except LinkKeyError as error:
-        raise Refused(code_of(error.slug), f"link-key-{error.slug}", str(error), error.help) from None
+        raise _of_link_key(error) from None
     if order.signing_key is None and order.link is not None and not order.link.is_loopback:
         signing.notes.append(
             f"`{order.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"
         )
     return signing
+
+
+def _of_link_key(error: LinkKeyError) -> Refused:
+    return Refused(code_of(error.slug), f"link-key-{error.slug}", str(error), error.help)
+
+
+def _expect_kept(signing: Signing, *, resumed: bool) -> None:
+    """What keeps the link's timestamps from being known or kept keeps a vehicle on the ground, and none in the air."""
+    match signing.damage:
+        case None:
+            return
+        case error if resumed:
+            reason = str(error) if isinstance(error, LinkKeyError) else words_of(error)
+            signing.notes.append(f"{reason}; it is brought down all the same. The link needs a new key then")
+        case LinkKeyError() as error:
+            raise _of_link_key(error)
+        case error:
+            raise error
 
 
 def _hear(order: Launch, loaded: Loaded, signing: Signing) -> None:

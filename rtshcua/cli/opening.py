@@ -51,12 +51,14 @@ def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: Lin
     yet.
 
     Then a run of it broke off up there, or had just told it to take off: nothing of the mission is flown again, but it
-    is brought down. So it is where nobody can tell, for the state folder is damaged or cannot be read: what flies must
-    come down whatever that says.
+    is brought down. So it is where nobody can tell, for the state folder is damaged, or cannot be read or written: what
+    flies must come down whatever that says.
     """
     unread: OSError | None = None
     try:
         opening = _looked_up(state, loaded)
+        if opening is Opening.OPENED:
+            FileReplayStore(state, loaded.vehicle).expect_room()
     except OSError as error:
         opening, unread = Opening.DAMAGED, error
     if opening is Opening.OPENED:

@@ -11,6 +11,8 @@ from rtshcua.wire.keys import SigningKey
 #: the effect that says, in the signed log, what there was to tell of the one before
 LOG_BEFORE = "log-before"
 
+_UNKEPT = "the next log will not know of this one, for that cannot be kept"
+
 
 class Past:
     """Ends the last log of a vehicle, where it must, when it is made. `hash` and `note` are for the next log."""
@@ -32,10 +34,17 @@ class Past:
         """What there is to tell of it; empty where all is as it should be."""
         return self._earlier.note
 
-    def begin(self, log: Path) -> None:
-        """The next log was made, and nothing is in it yet; nobody recovers it before `end`. Raises OSError."""
+    def begin(self, log: Path, *, aloft: bool = False) -> None:
+        """The next log was made, and nothing is in it yet; nobody recovers it before `end`. Raises OSError where that
+        cannot be kept; not for a vehicle that is `aloft`, which comes down whatever the state folder says.
+        """
         self._held.enter_context(alone(log))
-        self._last.begin(log, self.hash)
+        try:
+            self._last.begin(log, self.hash)
+        except OSError as error:
+            if not aloft:
+                raise
+            self._earlier = self._earlier._replace(note=f"{self.note}; {_UNKEPT}: {error}".removeprefix("; "))
         self._log = log
 
     def end(self, last: str) -> None:

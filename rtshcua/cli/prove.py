@@ -15,6 +15,7 @@ from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regula
 from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.outcome import CUT_AT_FIRST
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
@@ -123,12 +124,12 @@ def prove(
     target = output or Path(name)
     replace(target, made)
     if as_json:
-        print(json.dumps({"proof": str(target), "log": str(path), "octets": len(made), "exit_code": 0}))
+        out_json(json.dumps({"proof": str(target), "log": str(path), "octets": len(made), "exit_code": 0}))
     else:
         what = f"record {record}" if record is not None else f"that nothing before record {since} was changed since"
-        print(f"wrote `{target}`: {what}, proven in {len(made)} bytes")
+        out(f"wrote `{target}`: {what}, proven in {len(made)} bytes")
         if not cose and not is_anchored(made):
-            print(_UNANCHORED)
+            out(_UNANCHORED)
     return ExitCode.OK
 
 

@@ -15,6 +15,7 @@ from rtshcua.adapters.files.recovery import InUse, Recovered, Signer, examine, r
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.cli.faults import fail, of_each, tell
 from rtshcua.cli.outcome import is_log, logs_meant
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
@@ -92,9 +93,9 @@ def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -
         return fail(ExitCode.INPUT, str(busy), "a flight ends its log itself", slug="in-use")
     code = ExitCode.OK if done.done else _code(done.found)
     if as_json:
-        print(json.dumps(_object(path, done, code), ensure_ascii=False), flush=True)
+        out_json(json.dumps(_object(path, done, code), ensure_ascii=False), flush=True)
     elif done.done or done.found.state in (*RECOVERABLE, State.CLOSED):
-        print("\n".join(_told(path, done)), flush=True)
+        out(*_told(path, done), flush=True)
     if done.found.state in _HELPS:
         return tell(code, f"`{path}`: {_why(done.found)}", _HELPS[done.found.state])
     return code

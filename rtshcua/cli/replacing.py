@@ -8,6 +8,7 @@ from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.documents import flight_id, subject
 from rtshcua.cli.faults import code_of
 from rtshcua.cli.findings import Findings
+from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import check_trusted, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Mission
@@ -64,7 +65,7 @@ def replace_with(
     replace(order.target, document)
     steps = len(mission.invocations)
     if not quiet:
-        print(f"{mission.name}: {steps} steps, new from {order.first}, signed into {order.target}")
+        out(f"{mission.name}: {steps} steps, new from {order.first}, signed into {order.target}")
     return findings.finish(
         ExitCode.OK,
         replacement={

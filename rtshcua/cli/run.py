@@ -18,6 +18,7 @@ from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.clock_error import duration_us, utc_error_text
 from rtshcua.cli.faults import fail, misaddressed, tell
 from rtshcua.cli.launch import Launch, Refused, launch
+from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.simulation.config import Kind
@@ -186,5 +187,5 @@ def _say(refused: Refused, *, as_json: bool) -> ExitCode:
     """A flight that never began: for a person, and with `--json` for a program too."""
     if as_json:
         said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
-        print(msgspec.json.encode(said).decode())
+        out_json(msgspec.json.encode(said).decode())
     return (tell if as_json else fail)(refused.code, str(refused), refused.help)

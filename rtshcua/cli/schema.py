@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.cli.findings import Findings, exit_code
+from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
@@ -46,7 +47,7 @@ def schema(
         found = _narrowed(policy, name, findings)
     if isinstance(found, ExitCode):
         return found
-    print(json.dumps(FORMS[form](found, narrow=policy is not None), indent=2, ensure_ascii=False))
+    out_json(json.dumps(FORMS[form](found, narrow=policy is not None), indent=2, ensure_ascii=False))
     return ExitCode.OK
 
 

@@ -17,6 +17,7 @@ from rtshcua.cli.showing.document import kind_of_document, show_document
 from rtshcua.cli.showing.keys import KEY_FILE, show_key, show_root
 from rtshcua.cli.showing.log import show_log
 from rtshcua.cli.showing.page import Page, for_terminal
+from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.bundle import MAX_BUNDLE
@@ -49,7 +50,10 @@ def show(
         return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
     if shown["kind"] == "log" and not shown["records"]:
         return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")
-    print(json.dumps(shown, ensure_ascii=False) if as_json else page)
+    if as_json:
+        out_json(json.dumps(shown, ensure_ascii=False))
+    else:
+        out_rendered(str(page))
     return ExitCode.OK
 
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.files.signing import LinkKeeper, LinkKeyError, LinkStore, read_link_key
+from rtshcua.adapters.files.signing import IN_USE, LinkKeeper, LinkKeyError, LinkStore, read_link_key
 from rtshcua.mavlink.radio import UnsignedRadio
-from rtshcua.mavlink.signing import SignedLink
+from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
@@ -19,13 +19,16 @@ class Signing:
     """Signs what `frames` lets out to a vehicle, and verifies what comes in. Without a key it does neither.
 
     `state` is the folder where timestamps are kept, by the vehicle's identity. Raises LinkKeyError, and OSError where
-    they cannot be. `unheard` holds the slots of the signals that cannot come, for nobody signs what carries them.
+    they cannot be; `even_damaged`, that waits in `damage` until it is known whether the vehicle flies, for what flies
+    must come down: it signs by this machine's time meanwhile, and hears nothing older than a minute. `unheard` holds
+    the slots of the signals that cannot come, for nobody signs what carries them.
     """
 
     def __init__(
         self, key_file: Path | None, policy: Policy, frames: FrameSession, state: Path, clock: LinkClock,
-        *, unsigned_radio: bool,
+        *, unsigned_radio: bool, even_damaged: bool = False,
     ) -> None:  # fmt: skip
+        self.damage: LinkKeyError | OSError | None = None
         self.verifier: SignedLink | UnsignedRadio | None = None
         self.trouble: str | None = None
         self.notes: list[str] = []
@@ -35,14 +38,19 @@ class Signing:
         if key_file is None:
             return
         key = read_link_key(key_file)
-        store = LinkStore(state, policy.vehicle.identity, key)
+        now, link, store = clock.now(), None, None
         try:
-            now = clock.now()
+            store = LinkStore(state, policy.vehicle.identity, key)
             link = SignedLink(key, store.load(), now.utc_us, now.monotonic_us)
             self._keeper = LinkKeeper(store, link, clock.us_in)
-        except (LinkKeyError, OSError):
-            store.close()
-            raise
+        except (LinkKeyError, OSError) as error:
+            if store is not None:
+                store.close()
+            if not even_damaged or (isinstance(error, LinkKeyError) and error.slug == IN_USE):
+                raise
+            self.damage = error
+        if link is None:
+            link = SignedLink(key, State(0, {}), now.utc_us, now.monotonic_us)
         frames.sign_with(link)
         self._link = link
         self.verifier = UnsignedRadio(link) if unsigned_radio else link

@@ -13,6 +13,7 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.cli import simulated
 from rtshcua.cli.faults import code_of, fail, misaddressed
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.simulation.config import Answers, Boot, Estimate, Kind
 
@@ -104,9 +105,9 @@ def sim(
         return fail(ExitCode.LINK, str(error))
     with vehicle:
         if as_json:
-            print(json.dumps(vehicle.ready), flush=True)
+            out_json(json.dumps(vehicle.ready), flush=True)
         else:
-            print("\n".join(_introduction(vehicle.ready, port, signing_key)), flush=True)
+            out(*_introduction(vehicle.ready, port, signing_key), flush=True)
         try:
             code = vehicle.wait()
         except KeyboardInterrupt:

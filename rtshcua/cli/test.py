@@ -10,6 +10,7 @@ from rtshcua.adapters.store.writing import write_out
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import SPECIFICATION, unfolded
+from rtshcua.cli.stdout import out, out_rendered
 from rtshcua.cli.testing.generating import Wanted, generate
 from rtshcua.cli.testing.running import Results, run_all
 from rtshcua.cli.testing.told import Told
@@ -122,7 +123,7 @@ def _finish(
     told = Told(results.sources)
     if not quiet:
         for line in (*told.tests(ran, verbose=verbose), *told.scenarios(flown, verbose=verbose)):
-            print(line)
+            out_rendered(line)
     failed = tuple(each.finding for each in ran if each.finding is not None)
     failed += tuple(finding for each in flown for finding in each.findings)
     findings.report((*results.diagnostics, *failed), results.sources)
@@ -136,10 +137,10 @@ def _finish(
         code = ExitCode.TESTS
     if not quiet:
         for line in told.coverage(covered or (), verbose=verbose):
-            print(line)
-        print(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
+            out_rendered(line)
+        out_rendered(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
         if short:
-            print(f"less than {least} % is covered (`--fail-under`, or `fail-under` of the configuration)")
+            out(f"less than {least} % is covered (`--fail-under`, or `fail-under` of the configuration)")
     shares = None if covered is None else coverage_json(covered, results.sources)
     return findings.finish(
         code,

@@ -26,7 +26,7 @@ def unlock(
     try:
         return _load(store, duty, path, given, whose)
     except KeyFileError as error:
-        if error.slug != "passphrase-needed" or given is not None or not _terminal():
+        if error.slug != "passphrase-needed" or given is not None or not terminal():
             raise
     return _load(store, duty, path, getpass(f"passphrase of the `{duty}` key: ").encode(), whose)
 
@@ -92,5 +92,6 @@ def _load(store: KeyStore, duty: Duty, path: Path | None, passphrase: bytes | No
     return store.signing_key(duty, passphrase=passphrase, whose=whose)
 
 
-def _terminal() -> bool:
+def terminal() -> bool:
+    """Whether a person can be asked."""
     return sys.stdin is not None and sys.stdin.isatty()

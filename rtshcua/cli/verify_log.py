@@ -16,6 +16,7 @@ from rtshcua.cli.faults import distrust, fail, of_each
 from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.simulation import with_simulated
+from rtshcua.cli.stdout import out_json
 from rtshcua.cli.unconfirmed import UnconfirmedFallbacks
 from rtshcua.cli.verdict import as_object, as_text
 from rtshcua.diagnostics.exits import ExitCode
@@ -124,7 +125,7 @@ def _verify(
     audit = audit._replace(report=report)
     code = exit_code(audit.report)
     if as_json:
-        print(json.dumps(as_object(audit, path, pinned, code), ensure_ascii=False))
+        out_json(json.dumps(as_object(audit, path, pinned, code), ensure_ascii=False))
     else:
         as_text(audit, path, pinned, first=first)
     return code

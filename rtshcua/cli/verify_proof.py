@@ -10,6 +10,7 @@ from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import distrust, of_each
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.proof_told import Told, as_object, as_text
+from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import parse, split
@@ -57,7 +58,7 @@ def _verify(path: Path, pinned: Pin, kept: str | None, *, as_json: bool, first: 
         result = _same(result, kept) or result
     code = exit_code(result)
     if as_json:
-        print(json.dumps(as_object(result, path, pinned, code), ensure_ascii=False))
+        out_json(json.dumps(as_object(result, path, pinned, code), ensure_ascii=False))
     else:
         as_text(result, path, pinned, kept=kept is not None, first=first)
     return code

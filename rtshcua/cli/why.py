@@ -17,6 +17,7 @@ from rtshcua.cli.showing.page import Page, for_terminal
 from rtshcua.cli.showing.why import Case, show_why
 from rtshcua.cli.shown import utc
 from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.cli.subject import Subject, prepared, unpacked
 from rtshcua.cli.why_log import from_log
 from rtshcua.diagnostics.exits import ExitCode
@@ -75,7 +76,10 @@ def why(
         shown = _by_hand(page, subject, step, state or [], utc_us, waited)
     if isinstance(shown, ExitCode):
         return shown
-    print(json.dumps(shown, indent=2, ensure_ascii=False) if as_json else page)
+    if as_json:
+        out_json(json.dumps(shown, indent=2, ensure_ascii=False))
+    else:
+        out_rendered(str(page))
     return ExitCode.OK
 
 

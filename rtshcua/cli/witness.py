@@ -19,6 +19,7 @@ from rtshcua.cli.faults import as_json as saying_json
 from rtshcua.cli.faults import distrust, exit_code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.interrupts import terminated_as_interrupted
 from rtshcua.cli.shown import many
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -207,7 +208,10 @@ def _log_keys(trust: TrustRoot, vehicle: str) -> list[bytes]:
 
 def _saying(*, as_json: bool) -> Say:
     def say(said: dict[str, object], words: str) -> None:
-        print(json.dumps(said, ensure_ascii=False) if as_json else words, flush=True)
+        if as_json:
+            out_json(json.dumps(said, ensure_ascii=False), flush=True)
+        else:
+            out(words, flush=True)
 
     return say
 

@@ -123,3 +123,18 @@ def visible(text: str) -> str:
     if text.isprintable() and (text.isascii() or _BLANKS.search(text) is None):
         return text
     return "".join(each if each.isprintable() and not _BLANKS.match(each) else f"<U+{ord(each):04X}>" for each in text)
+
+
+def escaped(json: str) -> str:
+    """JSON with every character that `visible` would not show as it is written as an escape: it says the same to who
+    parses it. Line feeds stay, which JSON has between its values only.
+    """
+    lines = json.split("\n")
+    if all(visible(line) == line for line in lines):
+        return json
+    return "\n".join("".join(each if visible(each) == each else _escape(each) for each in line) for line in lines)
+
+
+def _escape(character: str) -> str:
+    units = character.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2))

@@ -1,5 +1,6 @@
 """Threats to who signs: words of a proposer, of a bundle or of a file's name that say something else than what is."""
 
+import io
 import json
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from rtshcua.cli.documents import deliver
 from rtshcua.cli.faults import say
 from rtshcua.cli.live.lines import plain
 from rtshcua.cli.live.story import Plan
+from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
@@ -22,6 +24,7 @@ from rtshcua.library import root
 
 ESCAPES = "\x1b[2K\r\x9b1mapproved\u202e\u2066\u200b\u00ad\ufe0f\U000e0041\u3164\nerror: none"
 PROPOSAL = (root() / "missions" / "proposal.json").read_bytes()
+FLIGHT = ("--flight", bytes(16).hex())
 LOW = """import "lib:policies/bridge_inspection.rts"
 
 mission low under bridge_inspection@7 on quad {
@@ -38,7 +41,11 @@ mission low under bridge_inspection@7 on quad {
 
 
 def harmless(text: str) -> bool:
-    return all(line.isprintable() for line in text.splitlines()) and not {*text} & {*"\ufe0f\u3164"}
+    return all(line.isprintable() for line in text.replace("\t", " ").split("\n")) and not {*text} & {*"\ufe0f\u3164"}
+
+
+#: what a file may be called on this system
+NAME = ESCAPES.replace("/", "")
 
 
 @pytest.fixture
@@ -66,6 +73,35 @@ def test_what_is_approved_is_told_by_us(low: Path, capsys: pytest.CaptureFixture
     assert "area = bridge_a [77.0 m from west to east by 53.4 m, its middle 176.8 m from home, bearing 47°]" in out
 
 
+@pytest.mark.parametrize(
+    ("typed", "code"), [("y\n", ExitCode.OK), ("n\n", ExitCode.REFUSED), ("", ExitCode.INTERRUPTED)]
+)
+def test_what_is_approved_is_told_before_it_is_signed(
+    low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, typed: str, code: ExitCode
+) -> None:
+    """A person at a terminal sees the step, and only then says whether to sign it."""
+    seen: list[str] = []
+    monkeypatch.setattr("rtshcua.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr(
+        "rtshcua.cli.approve.unlock_person", lambda *a, **k: (seen.append("key"), unlock_person(*a, **k))[1]
+    )
+    monkeypatch.setattr("sys.stdin", io.StringIO(typed))
+    assert main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT]) == code
+    err = capsys.readouterr().err
+    assert "step 2 of `low` on `quad-07`: `inspect_area(" in err
+    assert "may be flown as supervisor? [y/N]" in err
+    assert err.index("inspect_area(") < err.index("[y/N]")
+    assert (low / "yes").exists() == bool(seen) == (code is ExitCode.OK)
+
+
+def test_a_script_at_a_terminal_is_not_asked(
+    low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtshcua.cli.approve.terminal", lambda: True)
+    assert main(["approve", "low.bundle", "--step", "2", "-o", "no", "--refuse", "--yes", *FLIGHT]) == ExitCode.OK
+    assert "step 2 of `low` on `quad-07`: `inspect_area(" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("as_json", [False, True])
 def test_what_became_of_a_document_is_one_harmless_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], as_json: bool
@@ -82,6 +118,60 @@ def test_an_error_is_one_harmless_line(capsys: pytest.CaptureFixture[str]) -> No
     err = capsys.readouterr().err
     assert harmless(err)
     assert "\nerror: none" not in err
+
+
+#: commands over files that somebody else named, and how they end: what prints a name at success is here too
+OVER_NAMES = [
+    (("check", "{source}"), ExitCode.OK), (("check", "{source}", "--json"), ExitCode.OK),
+    (("compile", "{source}", "-o", "{made}"), ExitCode.OK),
+    (("compile", "{source}", "-o", "{made}", "--json"), ExitCode.OK),
+    (("show", "{bundle}"), ExitCode.OK), (("show", "{bundle}", "--json"), ExitCode.OK),
+    (("show", "{source}"), ExitCode.INPUT), (("show", "{source}", "--json"), ExitCode.INPUT),
+    (("why", "{bundle}", "--step", "0"), ExitCode.OK), (("why", "{bundle}", "--step", "0", "--json"), ExitCode.OK),
+    (("approve", "{bundle}", "--step", "2", "-o", "{made}", *FLIGHT), ExitCode.OK),
+    (("approve", "{bundle}", "--step", "2", "-o", "{made}", *FLIGHT, "--json"), ExitCode.OK),
+    (("recall", "{bundle}", "-o", "{made}", *FLIGHT), ExitCode.OK),
+    (("recall", "{bundle}", "-o", "{made}", *FLIGHT, "--json"), ExitCode.OK),
+    (("fmt", "--check", "{untidy}"), ExitCode.DIAGNOSTICS), (("fmt", "--diff", "{untidy}"), ExitCode.DIAGNOSTICS),
+    (("fmt", "--check", "--json", "{untidy}"), ExitCode.DIAGNOSTICS), (("fmt", "{untidy}"), ExitCode.OK),
+    (("lint", "{source}", "--no-cache"), None), (("lint", "{source}", "--json"), None),
+    *(((("lint", "{source}", "--format", form), None)) for form in ("github", "sarif", "junit")),
+    (("lint", "{source}", "--fix", "--diff"), None), (("lint", "{source}", "--statistics"), None),
+    (("test", "{source}"), None), (("test", "{source}", "--json"), None),
+    (("docs", "{source}", "-o", "{made}"), ExitCode.OK), (("docs", "{source}", "--json"), ExitCode.OK),
+    (("init", "{folder}", "--name", "site"), ExitCode.OK),
+    (("init", "{folder}2", "--name", "site", "--json"), ExitCode.OK),
+    (("keys", "link", "{made}.key"), ExitCode.OK),
+    (("verify-log", "{source}"), ExitCode.INPUT), (("verify-log", "{source}", "--json"), ExitCode.INPUT),
+    (("archive", "check", "{folder}"), None), (("archive", "check", "{folder}", "--json"), None),
+    (("recover", "{source}", "--json"), ExitCode.INPUT), (("run", "{source}", "--json"), ExitCode.INPUT),
+    (("schema", "--policy", "{source}"), None), ((NAME,), ExitCode.USAGE), (("check", f"--{NAME}"), ExitCode.USAGE),
+    (("check", f"--{NAME}", "--json"), ExitCode.USAGE),
+]  # fmt: skip
+
+
+def test_names_of_others_are_harmless_whatever_is_said_of_them(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Over every command that takes a file: what it says at success, as JSON, as a report, and when it fails."""
+    names = {"source": f"{NAME}.rts", "bundle": f"{NAME}.bundle", "untidy": f"{NAME} u.rts", "folder": f"{NAME}-site"}
+    (low / names["source"]).write_text(LOW.replace("/* only hover(5 s), near home */ ", ""))
+    (low / names["untidy"]).write_text(LOW.replace("  intent", " intent"))
+    (low / "low.bundle").rename(low / names["bundle"])
+    for command, code in OVER_NAMES:
+        words = [word.format(made=f"{NAME} made", **names) for word in command]
+        found = main(words)
+        said = capsys.readouterr()
+        assert code in (None, found), (words, said)
+        assert harmless(said.out), (words, said.out)
+        assert harmless(said.err), (words, said.err)
+        assert "\nerror: none" not in said.out + said.err, words
+        if "--json" in words:
+            json.loads(said.out)
+
+
+def test_a_program_is_told_a_name_as_it_is(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (low / f"{NAME}.rts").write_text(LOW)
+    assert main(["fmt", "--check", "--json", f"{NAME}.rts"]) == ExitCode.DIAGNOSTICS
+    assert json.loads(capsys.readouterr().out)["files"][0]["file"] == f"{NAME}.rts"
 
 
 def test_the_header_of_a_run_is_one_harmless_line() -> None:

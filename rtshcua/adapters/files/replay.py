@@ -15,13 +15,22 @@ had been kept. Nothing here tells that the whole folder was put back to what it 
 import fcntl
 import json
 import re
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
 from rtshcua.adapters.store.reading import opened_folder, read_if_there, read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, sync_folder, write_new
+from rtshcua.adapters.store.writing import (
+    PRIVATE_FILE,
+    PRIVATE_FOLDER,
+    UNFINISHED,
+    make_folder,
+    replace,
+    sync_folder,
+    write_new,
+)
 from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
@@ -63,6 +72,12 @@ class FileReplayStore:
         with _alone(self.folder):
             (self.folder / digest.hex()).unlink(missing_ok=True)
             sync_folder(self.folder)
+
+    def expect_room(self) -> None:
+        """Whether a marker could be written; none is. Raises OSError."""
+        probe = self.folder / f"{UNFINISHED}{secrets.token_hex(8)}"
+        write_new(probe, b"0\n", mode=PRIVATE_FILE)
+        probe.unlink()
 
     def _prune(self, now_utc_us: int) -> None:
         expired = {}

@@ -28,6 +28,10 @@ _LONGEST: Final = 1_024
 _LARGEST: Final = 1 << 20  # octets of a state
 
 
+#: the slug of a key that another run signs with
+IN_USE: Final = "in-use"
+
+
 class LinkKeyError(Exception):
     """A key file, or what is kept for its key, does not serve: `exposed`, `malformed`, `in-use`, `damaged`."""
 
@@ -75,7 +79,7 @@ class LinkStore:
         try:
             self._lock = lock(self.path.with_suffix(".lock"))
         except BlockingIOError:
-            raise LinkKeyError("in-use", f"another run signs for `{vehicle}` with this key") from None
+            raise LinkKeyError(IN_USE, f"another run signs for `{vehicle}` with this key") from None
 
     def load(self) -> State:
         """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""

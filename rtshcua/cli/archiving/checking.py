@@ -17,6 +17,7 @@ from rtshcua.cli.archiving.told import code_of, counted
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.shown import many
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.untrusted import Untrusted
@@ -116,31 +117,29 @@ def _told(
             "missing": [dict(zip(missing.columns, row, strict=True)) for row in missing.rows],
             "conflicts": [dict(zip(conflicts.columns, row, strict=True)) for row in conflicts.rows],
         }
-        print(json.dumps(said, ensure_ascii=False))
+        out_json(json.dumps(said, ensure_ascii=False))
         return code
     for left in skipped[:_TOLD]:
-        print(f"skipped     {visible(str(left.path))}: {left.why}")
+        out(f"skipped     {visible(str(left.path))}: {left.why}")
     if len(skipped) > _TOLD:
-        print(f"... and {len(skipped) - _TOLD} more that are no logs")
+        out(f"... and {len(skipped) - _TOLD} more that are no logs")
     wrong = [each for each in done if each.entry.status != "verified"]
     for each in wrong[:_TOLD]:
         what = f"{each.entry.finding}, {visible(each.entry.finding_text or '')}"
-        print(f"{each.entry.status:<10}  {visible(str(each.path))}: {what}")
+        out(f"{each.entry.status:<10}  {visible(str(each.path))}: {what}")
     if len(wrong) > _TOLD:
-        print(f"... and {len(wrong) - _TOLD} more: `rtshcua archive query findings`")
+        out(f"... and {len(wrong) - _TOLD} more: `rtshcua archive query findings`")
     new = sum(not each.known for each in done)
-    print(f"{many(len(done), 'log')}, {new} of them verified now, under {visible(pinned.source)}: {counted(counts)}")
+    out(f"{many(len(done), 'log')}, {new} of them verified now, under {visible(pinned.source)}: {counted(counts)}")
     if others:
         rest = "rests on another root" if others == 1 else "rest on other roots"
-        print(f"{many(others, 'log')} in the archive {rest}: `--root` takes the one that they were verified under")
+        out(f"{many(others, 'log')} in the archive {rest}: `--root` takes the one that they were verified under")
     if missing.rows:
-        print(f"missing: logs before {len(missing.rows)} of these: `rtshcua archive query missing`")
+        out(f"missing: logs before {len(missing.rows)} of these: `rtshcua archive query missing`")
     for one, other, seq in pairs[:_TOLD]:
-        print(
-            f"conflict: `{visible(names[one])}` and `{visible(names[other])}` were signed differently at record {seq}"
-        )
+        out(f"conflict: `{visible(names[one])}` and `{visible(names[other])}` were signed differently at record {seq}")
     if pairs:
-        print(f"conflict: {many(len(pairs), 'pair')} of logs, told by `rtshcua archive query conflicts`")
+        out(f"conflict: {many(len(pairs), 'pair')} of logs, told by `rtshcua archive query conflicts`")
     return code
 
 

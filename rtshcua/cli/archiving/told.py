@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from rtshcua.cli.outcome import exit_code_of
 from rtshcua.cli.shown import shorten, utc
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -31,11 +32,11 @@ class Shape(StrEnum):
 def tell(columns: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape) -> None:
     """Prints rows on the standard output."""
     if shape is Shape.JSON:
-        print(json.dumps([dict(zip(columns, row, strict=True)) for row in rows], ensure_ascii=False, default=str))
+        out_json(json.dumps([dict(zip(columns, row, strict=True)) for row in rows], ensure_ascii=False, default=str))
     elif shape is Shape.CSV:
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows(rows)
+        writer.writerows([visible(each) if isinstance(each, str) else each for each in row] for row in rows)
     else:
         _table(columns, [[_cell(name, value) for name, value in zip(columns, row, strict=True)] for row in rows])
 
@@ -43,7 +44,7 @@ def tell(columns: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape)
 def _table(columns: Sequence[str], cells: list[list[str]]) -> None:
     widths = [max(len(row[i]) for row in [list(columns), *cells]) for i in range(len(columns))]
     for row in [list(columns), *cells]:
-        print("  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)).rstrip())
+        out("  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)).rstrip())
 
 
 def _cell(name: str, value: object) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from difflib import unified_diff
 
 from rtshcua.cli.formatting.each import Laid
+from rtshcua.diagnostics.excerpt import visible
 
 _COLOURS = {"---": "\033[1m", "+++": "\033[1m", "@@": "\033[36m", "-": "\033[31m", "+": "\033[32m"}
 _END = "\033[0m"
@@ -21,7 +22,11 @@ def difference(laid: Laid) -> str:
 
 
 def unified(name: str, before: bytes, after: bytes, was: str = "", now: str = "") -> Iterator[str]:
-    """The lines of a unified diff of two texts in UTF-8, byte for byte; `was` and `now` say of each what it is."""
+    """The lines of a unified diff of two texts in UTF-8, byte for byte; `was` and `now` say of each what it is.
+
+    Of a source that holds what hides others there is none, for it is refused; a file's name may hold anything.
+    """
+    name = visible(name)
     for line in unified_diff(_lines(before.decode("utf-8")), _lines(after.decode("utf-8")), name, name, was, now):
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
 

@@ -1,6 +1,5 @@
 """A run of `rtshcua lint`, from its options to its exit code."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from rtshcua.cli.linting.scope import Scope, scope
 from rtshcua.cli.linting.session import Session
 from rtshcua.cli.linting.touched import touched
 from rtshcua.cli.overwriting import refusal
+from rtshcua.cli.stdout import out, out_json, out_rendered
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -128,7 +128,7 @@ def _diffed(mended: Fixed) -> ExitCode:
     from rtshcua.cli.formatting.shown import unified
 
     for name, data in mended.files.items():
-        sys.stdout.write("".join(unified(name, mended.before[name], data)))
+        out_rendered("".join(unified(name, mended.before[name], data)), end="")
     return ExitCode.DIAGNOSTICS if mended.files else ExitCode.OK
 
 
@@ -160,7 +160,7 @@ def _report(
         failing = frozenset[Severity]().union(*(some(each) for each in told.found))
         text = written(form, told, names, code, failing)
         if options.output is None:
-            sys.stdout.write(text)
+            out_json(text, end="") if form in ("json", "sarif") else out_rendered(text, end="")
             return code
         from rtshcua.adapters.store.writing import write_out
 
@@ -169,11 +169,11 @@ def _report(
         say(f"note: the fixes of `{name}` would bring an error, so they were not made")
     Findings(json=False).report(told.found, told.sources)
     if files:
-        print(f"fixed {files} file{'s' * (files != 1)}")
+        out(f"fixed {files} file{'s' * (files != 1)}")
     if options.statistics and (told.found or told.ignored):
-        print(statistics(told))
+        out(*statistics(told).split("\n"))
     if not told.found:
-        print(summary(told, len(names), about.left_out))
+        out(summary(told, len(names), about.left_out))
     elif told.ignored:
         say(f"{len(told.ignored)} more {'is' if len(told.ignored) == 1 else 'are'} ignored")
     return code

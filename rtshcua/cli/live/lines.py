@@ -6,7 +6,7 @@ import msgspec
 
 from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.cli.shown import many
-from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 
 
@@ -66,6 +66,6 @@ def as_json(message: Message) -> Iterable[str]:
         case Snapshot():
             return
         case Happened(what):
-            yield msgspec.json.encode(what).decode()
+            yield escaped(msgspec.json.encode(what).decode())
         case _:
-            yield msgspec.json.encode(message).decode()
+            yield escaped(msgspec.json.encode(message).decode())

@@ -8,6 +8,7 @@ from typing import Final
 from rtshcua.campaign.flights import Field
 from rtshcua.campaign.trying import Trial, tries
 from rtshcua.campaign.workers import Here, Processes, Workers, cores
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.testing.flown import Flown, Tried, findings
 from rtshcua.ground.testing.scenarios import ScenarioFlight
 from rtshcua.virtual import development
@@ -56,5 +57,5 @@ class Flying:
 
     def _say(self, text: str) -> None:
         if self._shows:
-            sys.stderr.write(_CLEAR + text)
+            sys.stderr.write(_CLEAR + visible(text))
             sys.stderr.flush()

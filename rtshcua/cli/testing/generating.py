@@ -11,6 +11,7 @@ from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.shown import many
 from rtshcua.cli.sources import Reading, examine, read_sources, read_text
+from rtshcua.cli.stdout import out_source
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -146,7 +147,7 @@ def _write(one: _Found, wanted: Wanted, findings: Findings, *, quiet: bool) -> E
     if wanted.output is not None:
         write_out(wanted.output, text.encode())
     elif not quiet:
-        print(text, end="")
+        out_source(text)
     _tell(made, policy.name, wanted.output, quiet=quiet)
     return findings.finish(
         ExitCode.OK,

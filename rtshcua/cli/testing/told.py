@@ -48,7 +48,7 @@ class Told:
                 if verbose:
                     yield "      " + ", ".join(f"{count} {ending}" for ending, count in each.endings.items())
                     excused = sorted({text for flight in each.flights for text in flight.excused})
-                    yield from (f"      excused: {text}" for text in excused)
+                    yield from (f"      excused: {visible(text)}" for text in excused)
 
     def coverage(self, covered: Sequence[Covered], *, verbose: bool) -> Iterator[str]:
         """What is missing, clause by clause; with `verbose` also what is not."""

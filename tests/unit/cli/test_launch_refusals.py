@@ -1,6 +1,8 @@
 """What `run` refuses between loading a bundle and flying it."""
 
 import os
+import shutil
+from errno import ENOSPC
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -11,10 +13,13 @@ from msgspec.structs import replace
 from reference.flat_case import MISSION, POLICY
 from reference.world import VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.files import replay
 from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.files.signing import LinkStore, write_link_key
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.cli import launch, opening
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.signal import SignalSource
 
 LATER = 1 << 52  # us
@@ -48,7 +53,7 @@ def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_abou
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "replayed")
 
 
-@pytest.mark.parametrize("damage", ["empty", "no-versions", "pipe", "no-folder"])
+@pytest.mark.parametrize("damage", ["empty", "no-versions", "pipe", "no-folder", "gone", "full"])
 @pytest.mark.parametrize("armed", [False, True])
 def test_whatever_the_state_folder_says_what_flies_comes_down(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str, armed: bool
@@ -61,8 +66,13 @@ def test_whatever_the_state_folder_says_what_flies_comes_down(
         (folder / "floor-policies").write_bytes(b"[]")
     elif damage == "pipe":
         os.mkfifo(folder / "floor")
+    elif damage == "full":
+        monkeypatch.setattr(replay, "write_new", full)
     else:
         folder.rmdir()
+        if damage == "gone":  # and cannot be made again
+            folder.parent.rmdir()
+            folder = folder.parent
         folder.touch()
     seen = ObservedVehicle(armed=armed, landed_state=2 if armed else 1)
     vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
@@ -78,6 +88,46 @@ def test_whatever_the_state_folder_says_what_flies_comes_down(
         with pytest.raises(launch.Refused, match="damaged"):
             opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
         assert flight.refused
+
+
+def full(path: Path, *_: object, **__: object) -> None:
+    raise OSError(ENOSPC, "no space left on device", str(path))
+
+
+def test_that_a_mark_could_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
+    store = FileReplayStore(tmp_path, VEHICLE)
+    store.expect_room()
+    assert [*store.folder.iterdir()] == []
+
+
+@pytest.mark.parametrize("damage", ["damaged", "no-folder"])
+@pytest.mark.parametrize("resumed", [False, True])
+def test_a_link_whose_timestamps_are_not_known_brings_home_what_flies(
+    tmp_path: Path, damage: str, resumed: bool
+) -> None:
+    key_file = tmp_path / "link.key"
+    write_link_key(key_file, bytes(range(32)))
+    store = LinkStore(tmp_path, VEHICLE, bytes(range(32)))
+    store.close()
+    if damage == "damaged":
+        store.path.write_bytes(b"{")
+    else:
+        shutil.rmtree(tmp_path / "link")
+        (tmp_path / "link").touch()
+    order: Any = SimpleNamespace(signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False)
+    of = loaded()
+    signing = launch._sign(order, of, SystemClock())
+    assert isinstance(signing.verifier, SignedLink), "it can be heard whether it flies"
+    if resumed:
+        launch._expect_kept(signing, resumed=True)
+        assert any("brought down all the same" in note for note in signing.notes)
+    else:
+        with pytest.raises((launch.Refused, OSError)) as refused:
+            launch._expect_kept(signing, resumed=False)
+        if damage == "damaged":
+            assert isinstance(refused.value, launch.Refused)
+            assert (refused.value.code, refused.value.slug) == (ExitCode.UNTRUSTED, "link-key-damaged")
+    signing.close()
 
 
 class Grounded:

@@ -47,6 +47,18 @@ def test_a_log_that_was_closed_is_named_by_the_next(tmp_path: Path, log: Path) -
     assert recover(log, signer(Random(1))).done  # nobody holds it
 
 
+def test_what_is_aloft_does_not_wait_for_the_state_folder(tmp_path: Path, log: Path) -> None:
+    grounded = past(tmp_path)
+    (tmp_path / "state").touch()  # no folder, and none can be made
+    with pytest.raises(OSError, match=r"exists|Not a directory"):
+        grounded.begin(log)
+    grounded._held.close()
+    flying = past(tmp_path)
+    flying.begin(log, aloft=True)
+    assert "will not know of this one" in flying.note
+    flying.end("ab" * 32)
+
+
 def test_where_the_end_cannot_be_kept_the_log_is_asked(tmp_path: Path, log: Path) -> None:
     first = past(tmp_path)
     first.begin(log)

@@ -107,10 +107,13 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
         key_file.write_bytes(b"no key")
     elif what == "damaged":
         store.path.write_bytes(b"{")
-    of, order = loaded(), SimpleNamespace(signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None)
+    of, order = (
+        loaded(),
+        SimpleNamespace(signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False),
+    )
     asked: Any = order
     with pytest.raises(launch.Refused) as refused:
-        launch._sign(asked, of, SystemClock())
+        launch._expect_kept(launch._sign(asked, of, SystemClock()), resumed=False)
     code = ExitCode.INPUT if what == "malformed" else ExitCode.UNTRUSTED
     assert (refused.value.code, refused.value.slug) == (code, f"link-key-{what}")
     if what == "in-use":
@@ -124,7 +127,7 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
 )
 def test_a_link_without_a_key_that_others_may_reach_is_told_of(tmp_path: Path, link: str | None, told: bool) -> None:
     at = None if link is None else address.parse(link)
-    order: Any = SimpleNamespace(signing_key=None, state=tmp_path, unsigned_radio=False, link=at)
+    order: Any = SimpleNamespace(signing_key=None, state=tmp_path, unsigned_radio=False, link=at, dry_run=False)
     assert any("speak as the vehicle" in note for note in launch._sign(order, loaded(), SystemClock()).notes) == told
 
 

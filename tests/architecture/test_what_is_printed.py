@@ -1,0 +1,82 @@
+"""What commands print passes `rtshcua/cli/stdout.py` or `rtshcua/cli/faults.py`; who prints otherwise stands here."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from virtual.rows import rows
+
+PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
+
+#: who writes on a standard stream by other means, and why nothing that others wrote can be in it unseen
+ALLOWED = {
+    "adapters/language_server/prover.py": "logs, of a process whose standard error an editor reads",
+    "adapters/language_server/server.py": "speaks the protocol, and logs",
+    "cli/app.py": "the version and the overview: our own words",
+    "cli/archiving/checking.py": "a count",
+    "cli/archiving/told.py": "a CSV writer; each text passed `visible`",
+    "cli/campaign.py": "counts, and slugs of ours",
+    "cli/claims.py": "in colour; each line passes `visible`",
+    "cli/completion.py": "a script for a shell: our own words",
+    "cli/doctor.py": "a count of seconds",
+    "cli/explain.py": "a page that ships, in colour",
+    "cli/faults.py": "errors; each line passes `visible`",
+    "cli/fmt.py": "gives the standard input back, laid out, octet for octet",
+    "cli/live/__main__.py": "lines of `live/lines.py`, each of which passes `visible` or `escaped`",
+    "cli/live/screen.py": "in colour; each text passes `visible`",
+    "cli/progress.py": "passes `visible`",
+    "cli/stdout.py": "the door",
+    "cli/testing/flying.py": "passes `visible`",
+    "cli/verify_log.py": "a bar",
+    "simulation/process.py": "a process of its own: its ready line is JSON in ASCII, its options are ours",
+}
+PRINTING = {"print", "echo", "secho", "Console", "StreamHandler", "basicConfig"}
+STREAMS = ("sys.stdout", "sys.stderr", "sys.__stdout__", "sys.__stderr__")
+#: what reads a stream's properties only
+HARMLESS = {"isatty", "flush", "fileno", "reconfigure"}
+WORDS = re.compile(rf"\b(?:{'|'.join(PRINTING)})\s*\(|sys\.(?:__)?std(?:out|err)")
+
+
+def printing(source: str) -> Iterator[str]:
+    """Every way in which a module writes on a standard stream."""
+    if not WORDS.search(source):
+        return
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call):
+            continue
+        called = ast.unparse(node.func)
+        if called.rsplit(".", 1)[-1] in PRINTING:
+            yield called
+        if called.startswith(STREAMS) and called.rsplit(".", 1)[-1] not in HARMLESS:
+            yield called
+        yield from (f"{called}({text})" for each in node.args if (text := ast.unparse(each)).startswith(STREAMS)
+                    and text.count(".") == 1 and called not in ("isinstance", "getattr"))  # fmt: skip
+
+
+@rows(
+    "way",
+    [
+        "print(name)", "print(name, file=sys.stderr)", "sys.stdout.write(name)", "sys.stdout.buffer.write(data)",
+        "csv.writer(sys.stdout)", "typer.echo(name)", "Console(stderr=True).print(name)",
+        "sys.stderr.writelines(names)",
+    ],
+)  # fmt: skip
+def test_every_way_to_print_is_known(way: str) -> None:
+    assert [*printing(f"def f():\n    {way}\n")]
+
+
+@rows("way", ["sys.stdout.isatty()", "out(name)", "sys.stdout.flush()", "isinstance(sys.stdout, TextIOWrapper)"])
+def test_what_prints_nothing_is_let_be(way: str) -> None:
+    assert not [*printing(way)]
+
+
+def test_what_is_printed_passes_one_door() -> None:
+    found = {
+        path.relative_to(PACKAGE).as_posix(): sorted({*printing(path.read_text(encoding="utf-8"))})
+        for path in PACKAGE.rglob("*.py")
+    }
+    stray = {name: ways for name, ways in found.items() if ways and name not in ALLOWED}
+    assert not stray, f"printed past `rtshcua/cli/stdout.py`: {stray}"
+    idle = sorted(name for name in ALLOWED if not found.get(name))
+    assert not idle, f"these print nothing themselves any more: {idle}"

@@ -1,4 +1,4 @@
-"""`rtshcua keys`: make and list signing keys and the trust root."""
+"""`rtshcua keys`: make, list, replace and revoke signing keys, and the trust root."""
 
 import hashlib
 import json
@@ -9,13 +9,14 @@ import time
 from collections.abc import Callable
 from getpass import getpass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
+from rtshcua.adapters.files.roots import RootStore
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key, write_link_key
 from rtshcua.adapters.link_setup import LinkSetup, after_setup, carry_out
 from rtshcua.adapters.vehicle.address import Address, AddressError
@@ -26,13 +27,14 @@ from rtshcua.cli.meeting import unopened
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
 from rtshcua.cli.stdout import out, out_json
+from rtshcua.cli.trusting import HELPS, trust
 from rtshcua.cli.unlock import read_passphrase, unlock
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
-from rtshcua.wire.trust import HUMAN, TrustRoot, open_root
+from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -40,13 +42,15 @@ app = typer.Typer(add_completion=False)
 _DAY_US = 86_400_000_000
 _SHORTEST = 12  # characters of a passphrase
 _MOST_WITNESSES = 16
+_KEY_ID = re.compile(r"[0-9a-f]{8,32}")
+_LINK_ID = re.compile(r"[0-9a-f]{16}")
 _ROLE = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,99}")
 _NO_PASSPHRASE = f"encrypted keys need a passphrase of {_SHORTEST} characters or more, typed alike"
 
 
 @app.callback()
 def keys() -> None:
-    """Make and list signing keys and the trust root."""
+    """Make, list, replace and revoke signing keys, and the trust root."""
 
 
 @app.command()
@@ -172,6 +176,140 @@ def mission(
         own_passphrase_file,
         as_json=as_json,
     )
+
+
+@app.command()
+def revoke(
+    key: Annotated[
+        list[str] | None, typer.Argument(metavar="KEY", help="its id, or the first 8 digits, or the name of its file")
+    ] = None,
+    link: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ID", help="the key of a link: what `rtshcua keys link` printed, or its file (repeatable)"
+        ),
+    ] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Make the next version of the trust root, by which keys are never trusted again.
+
+    A vehicle refuses what they sign from when it accepts that root: `rtshcua keys accept`, or its next flight under it.
+    """
+
+    def revoked(store: KeyStore, root: TrustRoot, signer: SigningKey, now_us: int) -> ExitCode | None:
+        names = []
+        for text in key or ():
+            found = _named(store, root, text)
+            if isinstance(found, ExitCode):
+                return found
+            if found.duty is Duty.ROOT:
+                return fail(ExitCode.USAGE, "a root key is not revoked alone", "`rtshcua keys rotate-root` changes it")
+            names.append(found.kid)
+        for text in link or ():
+            name = _link_named(text)
+            if name is None:
+                return fail(ExitCode.USAGE, f"`{text}` is no link key", "accepted: 16 hexadecimal digits, or its file")
+            names.append(name)
+        if not names:
+            return fail(ExitCode.USAGE, "no key was named", "`rtshcua keys list` shows them")
+        store.revoke(names, signer=signer, now_us=now_us)
+        return None
+
+    return _succeeded(revoked, passphrase_file, as_json=as_json)
+
+
+@app.command(name="replace")
+def replace_(
+    key: Annotated[str, typer.Argument(help="its id, or the first 8 digits, or the name of its file")],
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
+    own_passphrase_file: Annotated[
+        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Revoke a key, and make another that may speak for the same: an agent's, an approver's, a vehicle's log key.
+
+    The old file is set aside. Hand the new one to whoever had it, and the trust root to the vehicles.
+    """
+
+    def replaced(store: KeyStore, root: TrustRoot, signer: SigningKey, now_us: int) -> ExitCode | None:
+        found = _named(store, root, key)
+        if isinstance(found, ExitCode):
+            return found
+        if found.duty is Duty.ROOT:
+            return fail(ExitCode.USAGE, "a root key has its own command", "`rtshcua keys rotate-root` changes it")
+        own = _own_passphrase(root, own_passphrase_file)
+        if own is False:
+            return fail(ExitCode.USAGE, _NO_PASSPHRASE)
+        seed = secrets.token_bytes(SEED_BYTES)
+        store.renew(found.kid, seed, passphrase=own or None, signer=signer, now_us=now_us)
+        return None
+
+    return _succeeded(replaced, passphrase_file, as_json=as_json)
+
+
+@app.command()
+def rotate_root(
+    days: Annotated[
+        int | None, typer.Option(min=1, max=3660, help="how long the new root is valid [default: as the old one]")
+    ] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
+    own_passphrase_file: Annotated[
+        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Change the root key, in two versions of the trust root: one names both keys, the next one revokes the old.
+
+    Vehicles go from the one to the other by themselves; whoever audits by the root key's pin is given the new one
+    (`rtshcua keys show`). A root that has expired is renewed so.
+    """
+
+    def rotated(store: KeyStore, root: TrustRoot, signer: SigningKey, now_us: int) -> ExitCode | None:
+        own = _own_passphrase(root, own_passphrase_file)
+        if own is False:
+            return fail(ExitCode.USAGE, _NO_PASSPHRASE)
+        expires_us = None if days is None else now_us + days * _DAY_US
+        seed = secrets.token_bytes(SEED_BYTES)
+        store.rotate(seed, passphrase=own or None, signer=signer, now_us=now_us, expires_us=expires_us)
+        return None
+
+    return _succeeded(rotated, passphrase_file, as_json=as_json)
+
+
+@app.command()
+def accept(
+    roots: Annotated[list[Path], typer.Argument(metavar="ROOT", help="signed trust roots, from the oldest on")],
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is")],
+    state_dir: Annotated[Path | None, typer.Option(help="where the vehicle's state is kept (the data folder)")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """On the vehicle: take a newer trust root, which may revoke keys. No older one is taken again.
+
+    Each root follows from the one before, without a gap: a vehicle that missed some is given those between too, which
+    may have expired. The first that a vehicle ever takes is trusted for being named here.
+    """
+    state = state_dir or state_folder()
+    now_us = time.time_ns() // 1000
+    try:
+        taken = trust(roots, data_folder(), state, vehicle, now_us)
+    except Untrusted as error:
+        return fail(code_of(error.slug), str(error), HELPS.get(error.slug), slug=f"root-{error.slug}")
+    if taken.distrust is not None:
+        return fail(taken.distrust.code, str(taken.distrust), taken.distrust.help, slug=taken.distrust.slug)
+    RootStore(state, vehicle).keep(taken.signed)
+    root = taken.root
+    if as_json:
+        revoked = sorted(name.hex() for name in root.revocations)
+        said = {"vehicle": vehicle, "version": root.version, "expires_at_us": root.expires_at_us, "revoked": revoked}
+        out_json(json.dumps(said, ensure_ascii=False))
+    else:
+        out(
+            taken.news
+            or f"trust root version {root.version} is in force on `{vehicle}`, until {utc(root.expires_at_us)}"
+        )
+    return ExitCode.OK
 
 
 @app.command(name="list")
@@ -330,6 +468,61 @@ def _added(
     return _listed(store, as_json=as_json)
 
 
+def _succeeded(
+    change: Callable[[KeyStore, TrustRoot, SigningKey, int], ExitCode | None],
+    passphrase_file: Path | None,
+    *,
+    as_json: bool,
+) -> ExitCode:
+    """Make a root that follows from the store's, say what it trusts, and who is to be given it."""
+    store = KeyStore(data_folder())
+    try:
+        root = _root(store)
+        signer = unlock(store, Duty.ROOT, passphrase_file=passphrase_file)
+        code = change(store, root, signer, time.time_ns() // 1000)
+        if code is not None:
+            return code
+        newer = _root(store)
+    except Untrusted as error:
+        return _refused(error)
+    code = _listed(store, as_json=as_json)
+    if code is ExitCode.OK and not as_json:
+        files = [*(store.earlier_path(each) for each in range(root.version + 1, newer.version)), store.root_path]
+        out("", f"hand it to each vehicle: `rtshcua keys accept {' '.join(map(str, files))} --vehicle IDENTITY`")
+    return code
+
+
+def _named(store: KeyStore, root: TrustRoot, text: str) -> VerificationKey | ExitCode:
+    """The key that a person means; an exit code where that is none, or several."""
+    paths = store.paths(root)
+    digits = text.lower() if _KEY_ID.fullmatch(text.lower()) else None
+    found = [
+        key
+        for key in root.keys
+        if text in (paths[key.kid].name, paths[key.kid].stem)
+        or (digits is not None and key.kid.hex().startswith(digits))
+    ]
+    if len(found) == 1:
+        return found[0]
+    what = "means several keys" if found else "is no key that the trust root names"
+    return fail(ExitCode.USAGE, f"`{text}` {what}", "`rtshcua keys list` shows them: an id, or the name of its file")
+
+
+def _link_named(text: str) -> bytes | None:
+    """The name of a link's key: 16 hexadecimal digits, or that of the key in a file. Raises OSError."""
+    if _LINK_ID.fullmatch(text.lower()):
+        return bytes.fromhex(text)
+    try:
+        return bytes.fromhex(fingerprint(read_link_key(Path(text))))
+    except LinkKeyError:
+        return None
+
+
+def _own_passphrase(root: TrustRoot, file: Path | None) -> bytes | Literal[False]:
+    """What a new key of this root is encrypted with; empty for development, False where no good one was given."""
+    return b"" if root.development else _new_passphrase(file) or False
+
+
 def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
     try:
         root = _root(store)
@@ -343,6 +536,9 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
     out(f"  {'duty':<9} {'key':<33} may speak for")
     for key in root.keys:
         out(f"  {key.duty:<9} {key.kid.hex():<33} {speaks(key)}")
+    for name in sorted(root.revocations):
+        what = "the key of a link" if len(name) == LINK_ID_BYTES else "never trusted again"
+        out(f"  {'revoked':<9} {name.hex():<33} {what}")
     if root.witness_threshold > 1:
         out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
     return ExitCode.OK
@@ -358,6 +554,7 @@ def _as_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
         "issued_at_us": root.issued_at_us,
         "expires_at_us": root.expires_at_us,
         "witness_threshold": root.witness_threshold,
+        "revoked": sorted(name.hex() for name in root.revocations),
         "keys": [{**as_object(key), "file": str(paths[key.kid])} for key in root.keys],
     }
 

@@ -3,13 +3,13 @@
 import gc
 import secrets
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
-from rtshcua.adapters.files.keystore import KeyStore, read_root
+from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.logs import write_secret
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
@@ -36,6 +36,7 @@ from rtshcua.cli.refused import Refused as Refused
 from rtshcua.cli.showing.document import HANDED_IN, kind_of_document
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.tape import Tape
+from rtshcua.cli.trusting import REVOKED, Trusted, trust
 from rtshcua.cli.unlock import unlock
 from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
@@ -45,7 +46,7 @@ from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, lo
 from rtshcua.onboard.ports import Ending
 from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
-from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
+from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
@@ -66,7 +67,8 @@ _NOT_HERE = ("mode-refused", "wrong-vehicle")
 class Launch:
     """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`.
 
-    `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
+    `roots`: the trust root, and before it those that lead to it from the one that the vehicle accepted last; none for
+    the key store's. `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
     `utc_error_us`: what the operator says that UTC is off by at most.
     """
 
@@ -76,7 +78,7 @@ class Launch:
     mode: Mode
     speed: float
     vehicle: str | None
-    root: Path | None
+    roots: Sequence[Path]
     log_key: Path | None
     passphrase_file: Path | None
     data: Path
@@ -99,11 +101,8 @@ def launch(order: Launch) -> ExitCode:
     bundle = _read(order.bundle)
     clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
     utc = _utc(order, clock)
-    try:
-        root, signed_root, log_key = _trust(order, clock.now().utc_us)
-        loaded = _load(order, bundle, root, clock)
-    except Untrusted as error:
-        raise Refused(code_of(error.slug), *untrusted(error)) from None
+    trust, log_key, loaded = _trusting(order, bundle, clock)
+    root, signed_root = trust.root, trust.signed
     witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
@@ -137,6 +136,8 @@ def launch(order: Launch) -> ExitCode:
             assert past is not None
             resumed = broke_off(order.state, loaded, vehicle, clock, events)
             _expect_kept(signing, resumed=resumed)
+            _expect_link_key(signing, root, resumed=resumed)
+            told = trust.settle(resumed=resumed)
             run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
             write_secret(run.path, secrets.token_bytes(SECRET_BYTES))
             feed = view.enter_context(Feed(order.style))
@@ -151,7 +152,7 @@ def launch(order: Launch) -> ExitCode:
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
             unsure = [UTC_NOTE] if utc.waits else []
-            for note in (*signing.notes, *filter(None, [past.note]), *unsure):
+            for note in (*signing.notes, *filter(None, [told, past.note]), *unsure):
                 feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
@@ -195,19 +196,59 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _trust(order: Launch, now_us: int) -> tuple[TrustRoot, bytes, SigningKey]:
-    """The trust root, its signed bytes, and the key that will sign the log. Raises `Untrusted` and `Refused`.
+def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, SigningKey, Loaded]:
+    """The trust root that counts, the key that will sign the log, and the bundle under that root. Raises `Refused`.
 
-    A root that is named on the command line is trusted for being named there.
+    Where the root does not follow from the one that was accepted last, or the bundle or the log's key is revoked, a run
+    of this bundle may still have broken off in the air: then it is brought down under the root that was given.
     """
-    store = KeyStore(order.data)
-    signed = store.root() if order.root is None else read_root(order.root)
-    root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
-    key = unlock(store, Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
+    now_us = clock.now().utc_us
+    try:
+        trusted = trust(order.roots, order.data, order.state, _vehicle(order, bundle), now_us)
+        key = unlock(KeyStore(order.data), Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
+        loaded = _loading(order, bundle, trusted, key, clock)
+    except Untrusted as error:
+        raise Refused(code_of(error.slug), *untrusted(error)) from None
+    except Refused as refused:
+        for each in trusted.before(refused, now_us):
+            with suppress(Refused):
+                trusted, loaded = each, _loading(order, bundle, each, key, clock)
+                break
+        else:
+            trusted.expect()
+            raise
+    if trusted.distrust is not None and (order.dry_run or not _may_have_flown(order, loaded)):
+        raise trusted.distrust
+    return trusted, key, loaded
+
+
+def _loading(order: Launch, bundle: bytes, trusted: Trusted, key: SigningKey, clock: LinkClock) -> Loaded:
+    _expect_log_key(key, trusted.root)
+    return _load(order, bundle, trusted.root, clock)
+
+
+def _may_have_flown(order: Launch, loaded: Loaded) -> bool:
+    try:
+        return flown_before(order.state, loaded) is not None
+    except OSError:
+        return True
+
+
+def _vehicle(order: Launch, bundle: bytes) -> str | None:
+    """Who the vehicle is, also by a bundle that nobody verified yet; None where it does not say."""
+    try:
+        return order.vehicle or claimed_vehicle(bundle)
+    except Untrusted:
+        return None
+
+
+def _expect_log_key(key: SigningKey, root: TrustRoot) -> None:
+    if key.kid in root.revocations:
+        text = f"the trust root revokes the log key {key.kid.hex()}"
+        raise Refused(ExitCode.UNTRUSTED, REVOKED, text, "`--log-key` gives the one that took its place")
     if key.kid not in root.keys_for(Duty.LOG):
         text = f"the trust root names no log key {key.kid.hex()}: nobody could verify the log"
         raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, "`--log-key` gives one that it names")
-    return root, signed, key
 
 
 def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
@@ -231,7 +272,10 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     now = clock.now()
     identity = order.vehicle
     if identity is None:
-        identity = open_bundle(bundle, root=root, vehicle=None, now_us=now.utc_us).policy.vehicle.identity
+        try:
+            identity = open_bundle(bundle, root=root, vehicle=None, now_us=now.utc_us).policy.vehicle.identity
+        except Untrusted as error:
+            raise Refused(code_of(error.slug), *untrusted(error)) from None
     loaded = load(
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=secrets.token_bytes(FLIGHT_BYTES),
@@ -274,6 +318,15 @@ def _expect_kept(signing: Signing, *, resumed: bool) -> None:
             raise _of_link_key(error)
         case error:
             raise error
+
+
+def _expect_link_key(signing: Signing, root: TrustRoot, *, resumed: bool) -> None:
+    if signing.name is None or signing.name not in root.revocations:
+        return
+    text = f"the trust root revokes the link's key {signing.name.hex()}"
+    if not resumed:
+        raise Refused(ExitCode.UNTRUSTED, "link-key-revoked", text, "a new key on both ends; `rtshcua keys link`")
+    signing.notes.append(f"{text}; it is brought down all the same")
 
 
 def _hear(order: Launch, loaded: Loaded, signing: Signing) -> None:

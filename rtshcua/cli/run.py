@@ -49,7 +49,10 @@ def run(
     seed: simulated.Seed = None,
     vehicle: Annotated[str | None, typer.Option(metavar="IDENTITY", help="who this vehicle is (as the bundle says)")]
     = None,
-    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
+    root: Annotated[
+        list[Path] | None,
+        typer.Option(help="the signed trust root, after those that lead to it (the key store's; repeatable)"),
+    ] = None,
     log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
     signing_key: Annotated[
@@ -138,7 +141,7 @@ def run(
             mode=mode,
             speed=speed,
             vehicle=vehicle,
-            root=root,
+            roots=tuple(root or ()),
             log_key=log_key,
             passphrase_file=passphrase_file,
             data=data_folder(),

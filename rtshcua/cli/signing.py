@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.files.signing import IN_USE, LinkKeeper, LinkKeyError, LinkStore, read_link_key
+from rtshcua.adapters.files.signing import IN_USE, LinkKeeper, LinkKeyError, LinkStore, fingerprint, read_link_key
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.policy import Policy
@@ -33,11 +33,13 @@ class Signing:
         self.trouble: str | None = None
         self.notes: list[str] = []
         self.unheard: frozenset[int] = frozenset()
+        self.name: bytes | None = None  # the fingerprint of the key
         self._link: SignedLink | None = None
         self._keeper: LinkKeeper | None = None
         if key_file is None:
             return
         key = read_link_key(key_file)
+        self.name = bytes.fromhex(fingerprint(key))
         now, link, store = clock.now(), None, None
         try:
             store = LinkStore(state, policy.vehicle.identity, key)

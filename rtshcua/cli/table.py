@@ -40,7 +40,7 @@ COMMANDS = (
     Row("init", "write", "make a project of your own, with policy, mission, tests and CI"),
     Row("lsp", "write", "serve an editor: findings while you write, hover, renaming, completion"),
     Row("completion", "write", "print a script by which bash, zsh or fish complete commands"),
-    Row("keys", "fly", "make and list signing keys and the trust root"),
+    Row("keys", "fly", "make, list, replace and revoke keys, and the trust root"),
     Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
     Row("approve", "fly", "answer a step that asks for confirmation, with your signature"),
     Row("recall", "fly", "call a flight home, with your signature"),

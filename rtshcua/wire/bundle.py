@@ -13,7 +13,7 @@ from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import artefact, binding, cose, digest, names
-from rtshcua.wire.cose import Opened
+from rtshcua.wire.cose import EnvelopeError, Opened
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.names import Artefact
 from rtshcua.wire.trust import TrustRoot, key_refusal, proposer_refusal
@@ -99,6 +99,15 @@ def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: in
     return bundle
 
 
+def claimed_vehicle(data: bytes) -> str:
+    """The identity of the vehicle that a bundle says it is for, whoever signed it: to find what is kept of that one.
+
+    Raises `BundleError`, `EnvelopeError` and `ArtefactError`.
+    """
+    first, _ = envelopes(data)
+    return parse(names.POLICY, cose.unverified(first, limit=MAX_BUNDLE).payload, Policy).vehicle.identity
+
+
 def check_bundle(bundle: Bundle, vehicle: str, now_us: int, *, after: bytes = b"") -> None:
     """Whether the parts belong together, and their keys may speak for them on this vehicle; `after` is as for `bind`.
 
@@ -126,8 +135,12 @@ def parse(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
 def open_envelope(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact, limit: int = MAX_BUNDLE) -> Opened:
     """The payload of an artefact that a key of the root signed for a duty. Raises `EnvelopeError`.
 
-    All keys of the root are offered, so that one of another duty is told apart from one that nobody knows.
+    All keys of the root are offered, so that one of another duty is told apart from one that nobody knows; and one that
+    was revoked from both.
     """
+    signer = cose.unverified(envelope, limit=limit).kid
+    if signer in root.revocations:
+        raise EnvelopeError("revoked-key", f"key {signer.hex()} was revoked by the trust root")
     keys = {key.kid: key for key in root.keys}
     return cose.open1(envelope, keys=keys, duty=duty, content_type=kind.content_type, limit=limit)
 

@@ -23,7 +23,9 @@ _SIGNATURE_BYTES: Final = 64
 
 
 class EnvelopeError(Untrusted):
-    """An envelope that is refused: `malformed`, `wrong-content-type`, `unknown-key`, `wrong-duty`, `bad-signature`."""
+    """An envelope that is refused: `malformed`, `wrong-content-type`, `unknown-key`, `wrong-duty`, `bad-signature`;
+    and `revoked-key`, where a trust root says so.
+    """
 
 
 @dataclass(frozen=True, slots=True)

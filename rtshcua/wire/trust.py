@@ -5,6 +5,7 @@ by one of them; versions only rise, one by one, and each root is signed by a key
 """
 
 import re
+from collections.abc import Sequence
 from typing import Final, Self
 
 import msgspec
@@ -18,6 +19,9 @@ HUMAN: Final = "operator"
 #: how people are named: one way to write each name, so that two names are two people
 _PERSON: Final = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
 
+#: length of the name of a link's key in bytes, as `revoked` holds it: it signs frames, and no root names it
+LINK_ID_BYTES: Final = 8
+
 #: a root larger than this is refused unread, in bytes
 MAX_ROOT: Final = 1 << 20
 
@@ -26,8 +30,8 @@ class RootError(Untrusted):
     """A trust root that is refused.
 
     `malformed`, `whose-approval`, `unsupported-threshold`, `unreachable-threshold`, `shared-key`, `development-key`,
-    `not-self-signed`, `expired`, `key-expired`, `unpinned`, `unknown-key`, `rollback`, `version-gap`,
-    `development-root`.
+    `not-self-signed`, `expired`, `key-expired`, `unpinned`, `unknown-key`, `rollback`, `fork`, `version-gap`,
+    `development-root`, `revoked-key`, `unrevoked`, `damaged`.
     """
 
 
@@ -47,7 +51,11 @@ class Thresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A root. `version` counts from 1; times are UTC in microseconds; a `development` root says so of itself."""
+    """A root. `version` counts from 1; times are UTC in microseconds; a `development` root says so of itself.
+
+    `revoked` are the names of keys that are never trusted again: the `kid` of what a root named (16 bytes), the
+    fingerprint of a link's key (8 bytes). The field came later, and a root that revokes nothing keeps its bytes.
+    """
 
     version: int
     development: bool
@@ -55,6 +63,12 @@ class TrustRoot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     expires_at_us: int
     keys: tuple[VerificationKey, ...]
     thresholds: Thresholds = Thresholds()
+    revoked: tuple[bytes, ...] | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def revocations(self) -> frozenset[bytes]:
+        """The names of the keys that are never trusted again."""
+        return frozenset() if isinstance(self.revoked, msgspec.UnsetType) else frozenset(self.revoked)
 
     def keys_for(self, duty: Duty) -> dict[bytes, VerificationKey]:
         """The keys of a duty by `kid`, expired ones included: see `key_refusal`."""
@@ -104,7 +118,7 @@ def open_root(data: bytes, *, pinned: bytes | None, now_us: int) -> TrustRoot:
         key = VerificationKey(Duty.ROOT, pinned)
         return _open(data, {key.kid: key}, now_us)
     # Nothing but the root itself holds the key: it is parsed first, by a total and strict decoder, then verified.
-    claimed = TrustRoot.decode(cose.unverified(data, limit=MAX_ROOT).payload)
+    claimed = _claimed(data)
     trusted = claimed.keys_for(Duty.ROOT)
     if pinned is None:
         if not claimed.development:
@@ -120,16 +134,47 @@ def open_successor(data: bytes, *, current: TrustRoot, now_us: int) -> TrustRoot
     """The root that replaces `current` (which may have expired): signed by a root key of both, one version higher.
 
     So a root key is changed in two steps: name old and new, signed by the old; then drop the old, signed by the new.
-    Raises `RootError`, `ArtefactError` and `EnvelopeError`.
+    What was revoked stays revoked. Raises `RootError`, `ArtefactError` and `EnvelopeError`.
     """
+    signer, claimed = cose.unverified(data, limit=MAX_ROOT).kid, _claimed(data)
+    if claimed.version > current.version + 1:  # whoever signed it: the one between may name its key
+        raise RootError("version-gap", f"root version {current.version + 1} is missing before {claimed.version}")
+    if signer in current.revocations:
+        raise RootError(
+            "revoked-key", f"root key {signer.hex()} signed it, which root version {current.version} revokes"
+        )
     root = _open(data, current.keys_for(Duty.ROOT), now_us)
+    if root.version == current.version and root != current:
+        raise RootError("fork", f"it is another root of version {root.version} than the one in force")
     if root.version <= current.version:
         raise RootError("rollback", f"root version {root.version} does not follow version {current.version}")
-    if root.version > current.version + 1:
-        raise RootError("version-gap", f"root version {current.version + 1} is missing before {root.version}")
     if root.development and not current.development:
         raise RootError("development-root", "a development root may not replace one that is not")
+    if not current.revocations <= root.revocations:
+        raise RootError("unrevoked", f"root version {root.version} trusts again what version {current.version} revokes")
     return root
+
+
+def follow(chain: Sequence[bytes], *, current: bytes, now_us: int) -> bytes:
+    """The last root of a chain, if `current`, which is trusted, leads to it: each newer one succeeds the one before.
+
+    As a client of The Update Framework goes from root to root (5.3.3 to 5.3.10): none is left out, and of those between
+    it does not matter that they have expired. Older ones at the chain's beginning are passed over. Raises `RootError`,
+    `ArtefactError` and `EnvelopeError`.
+    """
+    trusted, root = current, _claimed(current)
+    for number, data in enumerate(chain, start=1):
+        if data == trusted or (number < len(chain) and _claimed(data).version < root.version):
+            continue
+        root, trusted = open_successor(data, current=root, now_us=0), data
+    if now_us >= root.expires_at_us:
+        raise RootError("expired", f"root version {root.version} has expired")
+    return trusted
+
+
+def _claimed(data: bytes) -> TrustRoot:
+    """What a root says, whoever signed it."""
+    return TrustRoot.decode(cose.unverified(data, limit=MAX_ROOT).payload)
 
 
 def key_refusal(key: VerificationKey, *, vehicle: str, now_us: int) -> str | None:
@@ -204,8 +249,20 @@ def _check(root: TrustRoot) -> None:
         raise RootError("shared-key", "one public key is named twice: a key has one duty")
     for key in root.keys:
         _check_bound(key)
+    _check_revoked(root)
     if not root.development and any(key.development for key in root.keys):
         raise RootError("development-key", "a root that is not for development names a development key")
+
+
+def _check_revoked(root: TrustRoot) -> None:
+    revoked = root.revoked
+    if isinstance(revoked, msgspec.UnsetType):
+        return
+    if not revoked or len({*revoked}) != len(revoked) or {*map(len, revoked)} - {KID_BYTES, LINK_ID_BYTES}:
+        raise RootError("malformed", "a root that revokes names each key once, by its name")
+    for key in root.keys:
+        if key.kid in revoked:
+            raise RootError("revoked-key", f"key {key.kid.hex()} is both trusted and revoked")
 
 
 def _check_bound(key: VerificationKey) -> None:

@@ -85,7 +85,7 @@ def _open(envelope: bytes, pinned: bytes, now_us: int) -> Root:
 
 def _body(payload: bytes) -> dict:
     match _whole(payload):
-        case ["rtshcua/root", 2, {**body}] if set(body) == _ROOT_FIELDS:
+        case ["rtshcua/root", 2, {**body}] if set(body) - {"revoked"} == _ROOT_FIELDS:
             pass
         case _:
             raise Untrusted("not a trust root, version 2")
@@ -105,6 +105,15 @@ def _body(payload: bytes) -> dict:
         raise Untrusted("contradicts itself")
     if len({key["public"] for key in body["keys"]}) != len(body["keys"]):
         raise Untrusted("a key named twice")
+    revoked = body.get("revoked", [b"\0" * 8])
+    if (
+        not revoked
+        or len({*revoked}) != len(revoked)
+        or any(type(n) is not bytes or len(n) not in (8, 16) for n in revoked)
+    ):
+        raise Untrusted("revokes something else than keys, each once")
+    if any(key_id(key["duty"], key["public"]) in revoked for key in body["keys"]):
+        raise Untrusted("trusts what it revokes")
     if any(n != 1 for duty, n in body["thresholds"].items() if duty != "witness"):
         raise Untrusted("a threshold other than 1")
     return body

@@ -1,4 +1,5 @@
-"""The user's signing keys and trust root: `<data folder>/keys/`, one file a key and `root.trust`.
+"""The user's signing keys and trust root: `<data folder>/keys/`, one file a key, `root.trust`, and the roots before it,
+`root-1.trust` and so on: who missed some is given them in order. What was revoked lies there as `revoked-<kid>.key`.
 
 A mission key is for one source: `mission-agent.key` signs what agents propose, `mission-operator.key` what people do.
 An approval key is of one person in one role, as `approval-ada-supervisor.key`.
@@ -15,7 +16,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from rtshcua.adapters.store.laying import appearing
-from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
+from rtshcua.adapters.store.reading import exposed, open_regular, read_if_there, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
 from rtshcua.adapters.store.writing import replace as write_file
 from rtshcua.wire import cose
@@ -62,6 +63,21 @@ class KeyStore:
             counts[name] += 1
             found[key.kid] = self.key_path(key.duty, counts[name], whose=name[1])
         return found
+
+    def chain(self) -> list[bytes]:
+        """The signed trust roots, as many as are kept here without a gap, from the oldest to the one in force.
+
+        Raises `KeyStoreError` (`no-keys`).
+        """
+        found = [self.root()]
+        version = _claimed(found[0]).version
+        while (version := version - 1) > 0 and self.earlier_path(version).exists():
+            found.insert(0, read_root(self.earlier_path(version)))
+        return found
+
+    def earlier_path(self, version: int) -> Path:
+        """Where the signed trust root of a version is, after another took its place."""
+        return self.folder / f"root-{version}.trust"
 
     @property
     def root_path(self) -> Path:
@@ -135,11 +151,62 @@ class KeyStore:
         """
         root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
         key = SigningKey.from_seed(seed, duty=duty, development=root.development)
-        newer = replace(root, version=root.version + 1, issued_at_us=now_us, keys=(*root.keys, named(key)))
+        newer = _next(root, now_us, keys=(*root.keys, named(key)))
         if any(whose(each) == whose(newer.keys[-1]) for each in root.keys if each.duty is duty is Duty.APPROVAL):
             raise KeyStoreError("exists", f"there is a key `{whose(newer.keys[-1])}` already")
-        signed, path = newer.sign(signer), self.paths(newer)[key.kid]
-        write_new(path, dump_signing_key(key, passphrase=passphrase), mode=PRIVATE_FILE)
+        return self._put(root, newer, signer, key, passphrase)
+
+    def revoke(self, names: Sequence[bytes], *, signer: SigningKey, now_us: int) -> TrustRoot:
+        """Makes the next version of the root, which trusts none of these keys ever again: the `kid` of keys that it
+        names, or the fingerprints of links' keys. Raises as `add`; a root key is changed by `rotate` alone.
+        """
+        root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
+        keys = tuple(key for key in root.keys if key.kid not in names)
+        return self._put(root, _next(root, now_us, keys=keys, revoked=_revoked(root, names)), signer)
+
+    def renew(self, kid: bytes, seed: bytes, *, passphrase: bytes | None, signer: SigningKey, now_us: int) -> TrustRoot:
+        """Makes a key that takes the place of another, for the same duty and with the same bounds, and the next version
+        of the root, which revokes the other. Raises as `add`.
+        """
+        root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
+        old = next(key for key in root.keys if key.kid == kid)
+        key = SigningKey.from_seed(seed, duty=old.duty, development=root.development)
+        keys = tuple(replace(old, public=key.public) if each is old else each for each in root.keys)
+        newer = _next(root, now_us, keys=keys, revoked=_revoked(root, (kid,)))
+        return self._put(root, newer, signer, key, passphrase)
+
+    def rotate(
+        self, seed: bytes, *, passphrase: bytes | None, signer: SigningKey, now_us: int, expires_us: int | None = None
+    ) -> TrustRoot:
+        """Changes the root key, in two versions of the root: the first names both keys, and the old one signs it; the
+        second revokes the old one, and the new one signs it. An expired root may be changed so. Raises as `add`.
+        """
+        root = open_root(self.root(), pinned=self.pin(), now_us=0)
+        key = SigningKey.from_seed(seed, duty=Duty.ROOT, development=root.development)
+        own = key.verification()
+        expires_us = expires_us or root.expires_at_us
+        both = _next(root, now_us, keys=(*root.keys, own), expires_at_us=expires_us)
+        last = _next(
+            both, now_us, revoked=_revoked(root, (signer.kid,)), expires_at_us=expires_us,
+            keys=tuple(own if each.kid == signer.kid else each for each in root.keys),
+        )  # fmt: skip
+        self._put(root, both, signer, key, passphrase)
+        return self._put(both, last, key)
+
+    def _put(
+        self, root: TrustRoot, newer: TrustRoot, signer: SigningKey, fresh: SigningKey | None = None,
+        passphrase: bytes | None = None,
+    ) -> TrustRoot:  # fmt: skip
+        """Puts a root in the place of another, which is kept, with the file of a key that is new. Files of keys that
+        are revoked now are set aside, and those of others follow the numbers that they have in the new root.
+        """
+        signed, before, after = newer.sign(signer), self.paths(root), self.paths(newer)
+        made = None if fresh is None else dump_signing_key(fresh, passphrase=passphrase)
+        write_file(self.earlier_path(root.version), self.root(), mode=PRIVATE_FILE)
+        for kid, path in before.items():
+            _move(path, after.get(kid, self.folder / f"revoked-{kid.hex()}.key"))
+        if fresh is not None and made is not None:
+            write_new(after[fresh.kid], made, mode=PRIVATE_FILE)
         write_file(self.root_path, signed, mode=PRIVATE_FILE)
         return newer
 
@@ -163,6 +230,27 @@ class KeyStore:
     def _expect(self) -> None:
         if not self.exists():
             raise KeyStoreError("no-keys", f"there are no keys in `{self.folder}`")
+
+
+def _next(root: TrustRoot, now_us: int, **changes: object) -> TrustRoot:
+    return replace(root, version=root.version + 1, issued_at_us=now_us, **changes)
+
+
+def _revoked(root: TrustRoot, names: Sequence[bytes]) -> tuple[bytes, ...]:
+    return tuple(sorted(root.revocations.union(names)))
+
+
+def _move(path: Path, to: Path) -> None:
+    """Gives a file another name; it may not be here at all, for keys are kept elsewhere too."""
+    data = None if path == to else read_if_there(path, MAX_KEY_FILE)
+    if data is not None:
+        write_new(to, data, mode=PRIVATE_FILE)
+        path.unlink()
+
+
+def _claimed(data: bytes) -> TrustRoot:
+    """What a root says. Raises `Untrusted`."""
+    return open_root(data, pinned=cose.unverified(data, limit=MAX_ROOT).kid, now_us=0)
 
 
 def whose(key: VerificationKey) -> str:

@@ -9,7 +9,7 @@ from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.ground.agent.forms import FORMS
 from rtshcua.ground.project.settings import LEVELS
 
-_SOURCES, _BUNDLE, _LOGS = ("*.rts",), ("*.bundle",), ("*.jsonl",)
+_SOURCES, _BUNDLE, _LOGS, _ROOTS = ("*.rts",), ("*.bundle",), ("*.jsonl",), ("*.trust",)
 
 #: which files are meant, by the name of the parameter, or by command and parameter where that has a meaning of its own
 FILES: Final[dict[str, Sequence[str]]] = {
@@ -21,6 +21,8 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "compile replaces": _BUNDLE,
     "config": ("*.toml",),
     "witness paths": _LOGS,
+    "root": _ROOTS,
+    "roots": _ROOTS,
     "bundle": _BUNDLE,
     "log": _LOGS,
     "logs": _LOGS,

@@ -27,6 +27,7 @@ def show_root(page: Page, data: bytes, now_us: int) -> dict[str, object]:
         page.row(key.duty, key.kid.hex(), width=9)
         page.row("", f"public {key.public.hex()}", width=9)
         page.row("", speaks(key), width=9)
+    page.rows("revoked", [name.hex() for name in sorted(root.revocations)], width=9)
     if root.witness_threshold > 1:
         page.row("anchored", f"what {root.witness_threshold} witnesses cosigned", width=9)
     return {
@@ -37,6 +38,7 @@ def show_root(page: Page, data: bytes, now_us: int) -> dict[str, object]:
         "expires_at_us": root.expires_at_us,
         "signed_by": kid.hex(),
         "witness_threshold": root.witness_threshold,
+        "revoked": [name.hex() for name in sorted(root.revocations)],
         "keys": [as_object(key) for key in root.keys],
     }
 

@@ -62,7 +62,9 @@ def test_another_shell_is_refused_in_our_words(capsys: pytest.CaptureFixture[str
 def test_bash_completes_all_of_it(tab: Complete) -> None:
     assert set(tab("")) == {row.name for row in COMMANDS} | {"help"}
     assert tab("verify-") == ["verify-log", "verify-proof"]
-    assert tab("keys", "") == ["approver", "init", "link", "list", "mission", "show"]
+    assert set(tab("keys", "")) == {
+        "accept", "approver", "init", "link", "list", "mission", "replace", "revoke", "rotate-root", "show",
+    }  # fmt: skip
     assert "--if-missing" in tab("keys", "init", "--i")
     assert tab("check", "--deny") == ["--deny-warnings"]
     assert tab("run", "--mode", "") == ["none", "software"]

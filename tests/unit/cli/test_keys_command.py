@@ -228,3 +228,116 @@ def test_whose_key_approves(capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(Untrusted) as refused:
             unlock.unlock_person(store, person, role)
         assert refused.value.slug == slug
+
+
+def listed(capsys: pytest.CaptureFixture[str]) -> dict[str, list[str]]:
+    """The ids of the keys by duty, and what is revoked."""
+    capsys.readouterr()
+    assert app.main(["keys", "list", "--json"]) == ExitCode.OK
+    told = json.loads(capsys.readouterr().out)
+    found: dict[str, list[str]] = {"revoked": told["revoked"]}
+    for key in told["keys"]:
+        found.setdefault(key["duty"], []).append(key["kid"])
+        assert Path(key["file"]).is_file()
+    return found
+
+
+def test_a_key_is_revoked_by_id_by_its_first_digits_or_by_its_file(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init", "--witnesses", "3"])
+    app.main(["keys", "approver", "ada", "--role", "supervisor"])
+    before = listed(capsys)
+    first, second, third = before["witness"]
+    assert app.main(["keys", "revoke", first, second[:8], "approval-ada-supervisor"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "rtshcua keys accept" in out
+    after = listed(capsys)
+    assert after["witness"] == [third]
+    assert after["approval"] == before["approval"][:1]
+    assert set(after["revoked"]) == {first, second, before["approval"][1]}
+    store = KeyStore(data_folder())
+    assert store.signing_key(Duty.WITNESS).kid.hex() == third, "its file follows its number"
+    assert app.main(["keys", "revoke", "witness"]) == ExitCode.OK, "the name is that of the third now"
+    assert listed(capsys).get("witness") is None
+    assert [open_root(each, pinned=store.pin(), now_us=0).version for each in store.chain()] == [1, 2, 3, 4]
+    store.earlier_path(2).unlink()
+    assert len(store.chain()) == 2, "what lies before a gap leads nowhere"
+
+
+def test_a_key_is_replaced_by_one_with_its_bounds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "passphrase"
+    file.write_text(PASSPHRASE)
+    words = ["--passphrase-file", str(file)]
+    app.main(["keys", "init", "--encrypted", "--policy", "field", *words])
+    store = KeyStore(data_folder())
+    (old,) = (key for key in open_root(store.root(), pinned=store.pin(), now_us=0).keys if key.duty is Duty.APPROVAL)
+    assert app.main(["keys", "replace", "approval-owner-operator", *words]) == ExitCode.USAGE, (
+        "and none for the new one"
+    )
+    assert listed(capsys)["revoked"] == []
+    assert app.main(["keys", "replace", old.kid.hex(), *words, "--own-passphrase-file", str(file)]) == ExitCode.OK
+    (new,) = (key for key in open_root(store.root(), pinned=store.pin(), now_us=0).keys if key.duty is Duty.APPROVAL)
+    assert new.public != old.public
+    assert (new.person, new.roles, new.sources, new.vehicles) == (old.person, old.roles, old.sources, old.vehicles)
+    assert listed(capsys)["revoked"] == [old.kid.hex()]
+    assert unlock.unlock_person(store, "owner", "operator", passphrase_file=file).kid == new.kid
+    assert app.main(["keys", "rotate-root", *words]) == ExitCode.USAGE
+    assert app.main(["keys", "rotate-root", *words, "--own-passphrase-file", str(file)]) == ExitCode.OK
+    assert unlock.unlock(store, Duty.ROOT, passphrase_file=file).kid == store.pin()
+
+
+def test_an_expired_root_is_renewed_by_another_root_key(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app.main(["keys", "init", "--days", "1"])
+    now_us = keys.time.time_ns() + 2 * 86_400 * 10**9
+    monkeypatch.setattr(keys.time, "time_ns", lambda: now_us)
+    assert app.main(["keys", "revoke", "log"]) == ExitCode.UNTRUSTED
+    assert "expired" in capsys.readouterr().err
+    assert app.main(["keys", "rotate-root", "--days", "3"]) == ExitCode.OK
+    assert app.main(["keys", "replace", "log"]) == ExitCode.OK
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["revoke"], "no key was named"),
+        (["revoke", "root"], "rotate-root"),
+        (["replace", "root"], "rotate-root"),
+        (["revoke", "0123456789"], "is no key that the trust root names"),
+        (["replace", "nobody"], "is no key that the trust root names"),
+        (["revoke", "--link", "0123"], "no such file"),
+        (["revoke", "--link", "no.key"], "is no link key"),
+    ],
+)
+def test_keys_that_are_none_are_not_revoked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str], text: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("no.key").touch(0o600)
+    app.main(["keys", "init"])
+    assert app.main(["keys", *words]) == (ExitCode.INPUT if "no such" in text else ExitCode.USAGE)
+    assert text in capsys.readouterr().err
+    assert not KeyStore(data_folder()).earlier_path(1).exists()
+
+
+def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    app.main(["keys", "revoke", "witness"])
+    root = str(KeyStore(data_folder()).root_path)
+    capsys.readouterr()
+    accept = ["keys", "accept", root, "--vehicle", "quad-07", "--state-dir", str(tmp_path)]
+    assert app.main(accept) == ExitCode.OK
+    assert "trust root version 2 is in force on `quad-07`" in capsys.readouterr().out
+    assert app.main([*accept, "--json"]) == ExitCode.OK
+    told = json.loads(capsys.readouterr().out)
+    assert (told["vehicle"], told["version"], len(told["revoked"])) == ("quad-07", 2, 1)
+    (tmp_path / "trust").rename(tmp_path / "away")
+    (tmp_path / "trust").mkdir()
+    (tmp_path / "trust" / "vehicle-quad-07").mkdir()
+    assert app.main(accept) == ExitCode.INPUT
+    assert "no regular file" in capsys.readouterr().err
+    damaged = tmp_path / "damaged.trust"
+    damaged.write_bytes(b"nothing")
+    accept[2] = str(damaged)
+    (tmp_path / "trust" / "vehicle-quad-07").rmdir()
+    assert app.main(accept) == ExitCode.INPUT

@@ -12,6 +12,7 @@ from rtshcua.wire.trust import (
     RootError,
     Thresholds,
     TrustRoot,
+    follow,
     key_refusal,
     open_root,
     open_successor,
@@ -279,6 +280,82 @@ def test_versions_rise_one_by_one():
     assert succession(SIGNED) == "rollback"
     assert succession(SIGNED, current=changed(version=3)) == "rollback"
     assert succession(changed(version=3).sign(ROOT)) == "version-gap"
+
+
+def test_another_root_of_the_same_version_is_a_fork():
+    assert succession(changed(expires_at_us=2000).sign(ROOT)) == "fork"
+    assert succession(changed(expires_at_us=2000).sign(ROOT), current=changed(version=2)) == "rollback"
+
+
+def revoking(*names, **fields):
+    return changed(**{"version": 2, "revoked": names, "keys": (ROOT.verification(), NEXT.verification())} | fields)
+
+
+def test_what_is_revoked_stays_revoked():
+    second = open_successor(revoking(AGENT.kid).sign(ROOT), current=TRUST, now_us=200)
+    assert (TRUST.revocations, second.revocations) == (frozenset(), {AGENT.kid})
+    assert succession(revoking(POLICY.kid, version=3).sign(ROOT), current=second) == "unrevoked"
+    assert succession(changed(version=3).sign(ROOT), current=second) == "unrevoked"
+    third = revoking(AGENT.kid, POLICY.kid, version=3)
+    assert open_successor(third.sign(NEXT), current=second, now_us=200) == third
+
+
+def test_a_revoked_root_key_signs_no_root_more():
+    second = revoking(ROOT.kid, keys=(NEXT.verification(),))
+    assert refusal(second.sign, ROOT) == "not-self-signed"
+    both = revoking(ROOT.kid, version=3)  # names it again
+    assert succession(envelope(both.encode(), NEXT), current=second) == "revoked-key"
+    assert succession(changed(version=3).sign(ROOT), current=second) == "revoked-key"
+
+
+@rows(
+    ("names", "slug"),
+    [
+        ((), "malformed"),
+        ((AGENT.kid, AGENT.kid), "malformed"),
+        ((b"short",), "malformed"),
+        ((NEXT.kid,), "revoked-key"),
+        ((bytes(8), bytes(7)), "malformed"),
+    ],
+)
+def test_a_root_revokes_keys_each_once_and_trusts_none_of_them(names, slug):
+    assert refusal(revoking(*names).sign, ROOT) == slug
+    assert opening(envelope(revoking(*names).encode())) == slug
+
+
+def test_a_link_key_is_revoked_by_its_fingerprint():
+    root = revoking(bytes(8))
+    assert open_root(root.sign(ROOT), pinned=ROOT.kid, now_us=200) == root
+    assert TrustRoot.decode(root.encode()) == root
+
+
+SECOND, THIRD = (changed(version=number, keys=(*KEYS, NEXT.verification())).sign(ROOT) for number in (2, 3))
+FOURTH = changed(version=4, expires_at_us=9000, keys=(NEXT.verification(),), revoked=(ROOT.kid,)).sign(NEXT)
+
+
+def following(*chain, current=SIGNED, now_us=200):
+    return refusal(follow, chain, current=current, now_us=now_us)
+
+
+@rows("begun", range(4))
+def test_a_chain_is_followed_from_wherever_one_stands(begun):
+    chain = (SIGNED, SECOND, THIRD, FOURTH)
+    assert follow(chain, current=chain[begun], now_us=5000) == FOURTH, "those between may have expired"
+    assert follow(chain[begun + 1 :], current=chain[begun], now_us=5000 if begun < 3 else 200) == FOURTH
+    assert follow((), current=FOURTH, now_us=200) == FOURTH
+
+
+def test_a_chain_with_a_hole_a_fork_or_an_old_end_is_not_followed():
+    assert following(THIRD) == following(SECOND, FOURTH, current=SIGNED) == "version-gap"
+    assert following(FOURTH) == following(SECOND, FOURTH) == "version-gap"
+    assert following(changed(version=2, keys=(NEXT.verification(),)).sign(NEXT)) == "unknown-key"
+    assert following(SECOND, current=THIRD) == following(SIGNED, SECOND, current=THIRD) == "rollback"
+    fork = changed(version=3, expires_at_us=2000, keys=(*KEYS, NEXT.verification())).sign(ROOT)
+    assert following(fork, FOURTH, current=THIRD) == following(SECOND, THIRD, fork) == "fork"
+    late = envelope(changed(version=5).encode())
+    assert following(late, current=FOURTH) == "revoked-key"
+    assert following(SECOND, THIRD, now_us=5000) == "expired"
+    assert following(SIGNED, now_us=5000) == "expired"
 
 
 def test_development_is_never_a_successor():

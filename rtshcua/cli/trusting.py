@@ -1,0 +1,116 @@
+"""Under which trust root a vehicle flies: the one that it accepted last, or one that follows from it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rtshcua.adapters.files.keystore import KeyStore, read_root
+from rtshcua.adapters.files.roots import RootStore, in_force, opened
+from rtshcua.cli.faults import code_of, exit_code_of, untrusted, words_of
+from rtshcua.cli.refused import Refused
+from rtshcua.wire import cose
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
+from rtshcua.wire.untrusted import Untrusted
+
+REVOKED: Final = "revoked-key"
+#: what to do where a root is refused, by slug
+HELPS = {
+    "version-gap": "give the roots between too, from the oldest to the newest: `root-N.trust` of the key store",
+    "rollback": "the vehicle accepted a newer root: leave `--root` out, or give that one",
+    "fork": "whoever has the root key signed two roots of one version: find out who, and change it",
+    "unknown-key": "a root follows from the one before; another fleet's root takes another `--state-dir`",
+    REVOKED: "sign it again, with the key that took its place; `rtshcua keys list` shows what is trusted",
+    "damaged": "put `trust/` of the state folder right; without it, whatever root is named is trusted",
+}
+
+
+class Trusted(NamedTuple):
+    """The root to fly under, with its signed bytes, and the `others` that lead to it or were accepted before it, newest
+    first. `store` is where it is kept from this flight on, if it is to be, and `news` what there is to tell then.
+
+    `distrust` says why nothing may fly under it that is not in the air already.
+    """
+
+    root: TrustRoot
+    signed: bytes
+    others: tuple[bytes, ...] = ()
+    store: RootStore | None = None
+    news: str = ""
+    distrust: Refused | None = None
+
+    def before(self, refused: Refused, now_us: int) -> Iterator["Trusted"]:
+        """The roots under which the bundle may have begun to fly, where this one revokes a key since."""
+        if refused.slug == REVOKED:
+            for signed in self.others:
+                with suppress(Untrusted):
+                    yield Trusted(_open(signed, now_us), signed, distrust=self.distrust or refused)
+
+    def expect(self) -> None:
+        """Raises `Refused` where nothing may fly under it."""
+        if self.distrust is not None:
+            raise self.distrust
+
+    def settle(self, *, resumed: bool) -> str:
+        """What there is to tell. The vehicle accepts the root, unless it is in the air and comes down as it began.
+
+        Raises `Refused`, and OSError where that cannot be kept.
+        """
+        if resumed:
+            return f"{self.distrust}; it is brought down all the same" if self.distrust is not None else ""
+        self.expect()
+        if self.store is not None:
+            self.store.keep(self.signed)
+        return self.news
+
+
+def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, now_us: int) -> Trusted:
+    """The trust root for a vehicle, of those that were named, else of the key store's.
+
+    Raises `Untrusted` and OSError; but what is the matter with the root that was accepted last, or does not follow from
+    it, is `distrust`.
+    """
+    store = None if vehicle is None else RootStore(state, vehicle)
+    kept, distrust = None, None
+    try:
+        kept = None if store is None else store.kept()
+    except (Untrusted, OSError) as error:
+        distrust = _refused(error)
+    chain = _given(roots, data, needed=kept is None)
+    try:
+        signed = in_force(kept, chain, named=bool(roots), now_us=now_us)
+    except Untrusted as error:
+        if kept is None or not chain:
+            raise
+        signed, distrust = chain[-1], _refused(error)
+    root = _open(signed, now_us)
+    others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
+    if distrust is not None or signed == kept or (kept is None and root.development):
+        return Trusted(root, signed, others, distrust=distrust)
+    return Trusted(root, signed, others, store, "" if kept is None else told(opened(kept), root))
+
+
+def _given(roots: Sequence[Path], data: Path, *, needed: bool) -> list[bytes]:
+    """The roots that were named, else those of the key store, if it is there or needed."""
+    if roots:
+        return [read_root(path) for path in roots]
+    store = KeyStore(data)
+    return store.chain() if needed or store.exists() else []
+
+
+def _refused(error: Untrusted | OSError) -> Refused:
+    if isinstance(error, OSError):
+        return Refused(exit_code_of(error), "unread", f"{words_of(error)}: `{error.filename}`", HELPS["damaged"])
+    _, text, help = untrusted(error)
+    return Refused(code_of(error.slug), f"root-{error.slug}", text, HELPS.get(error.slug) or help)
+
+
+def _open(signed: bytes, now_us: int) -> TrustRoot:
+    return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
+
+
+def told(before: TrustRoot, root: TrustRoot) -> str:
+    """What a vehicle accepted, in a line."""
+    gone = len(root.revocations - before.revocations)
+    revoked = f"; it revokes {gone} key{'s' * (gone > 1)} more" if gone else ""
+    return f"trust root version {root.version} is accepted in the place of version {before.version}{revoked}"

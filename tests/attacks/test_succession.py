@@ -1,0 +1,251 @@
+"""Threats to succession: a key that was revoked speaks on, and a trust root that does not follow is taken for the next.
+
+The attacker holds keys that were trusted once, the root's among them, and every root and bundle that was ever signed.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace as altered
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from reference.documents import approval, low, presented, recall, replacement
+from reference.world import APPROVAL_KEY, LOG_KEY, MISSION_KEY, POLICY_KEY, ROOT, START, VEHICLE, renewed, sealed_again
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.files.folders import data_folder, state_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.files.roots import RootStore, opened
+from rtshcua.adapters.files.signing import fingerprint, read_link_key
+from rtshcua.cli import launch
+from rtshcua.cli.app import main
+from rtshcua.cli.refused import Refused
+from rtshcua.cli.signing import Signing
+from rtshcua.cli.trusting import trust
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.library import root as library
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot
+from virtual.policy import POLICY
+
+QUAD = "quad-07"
+PATROL = library() / "missions" / "short.rts"
+
+
+def revoking(*keys: SigningKey) -> TrustRoot:
+    """The root after this world's, by which these keys are revoked."""
+    names = tuple(key.kid for key in keys)
+    return replace(ROOT, version=2, keys=tuple(key for key in ROOT.keys if key.kid not in names), revoked=names)
+
+
+@pytest.mark.parametrize(
+    ("document", "key"), [(approval, APPROVAL_KEY), (recall, APPROVAL_KEY), (replacement, MISSION_KEY)]
+)
+def test_what_a_revoked_key_signs_is_refused_in_flight(document: Callable[..., bytes], key: SigningKey) -> None:
+    of = low()
+    assert presented(of, document(of)).slug == "accepted"
+    of = renewed(low(), revoking(key))
+    assert presented(of, document(of)).slug == "revoked-key"
+    of = renewed(low(), revoking(LOG_KEY))
+    assert presented(of, document(of)).slug == "accepted"
+
+
+@pytest.mark.parametrize("key", [POLICY_KEY, MISSION_KEY])
+def test_a_bundle_of_a_revoked_key_is_not_loaded(key: SigningKey) -> None:
+    found = load(
+        sealed_again(low()), root=revoking(key), vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, flight=bytes(16),
+        session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
+    )  # fmt: skip
+    assert isinstance(found, Refusal)
+    assert found.slug == "revoked-key"
+
+
+@pytest.fixture
+def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> KeyStore:
+    """A key store, whose first root a vehicle accepted, and a bundle for it."""
+    monkeypatch.chdir(tmp_path)
+    store = KeyStore(data_folder())
+    assert main(["keys", "init"]) == ExitCode.OK
+    (tmp_path / "first.trust").write_bytes(store.root())
+    assert main(["keys", "accept", "first.trust", "--vehicle", QUAD]) == ExitCode.OK
+    assert main(["compile", str(PATROL), "-o", "old.bundle"]) == ExitCode.OK
+    capsys.readouterr()
+    return store
+
+
+def version() -> int:
+    """Of the root that the vehicle accepted last."""
+    kept = RootStore(state_folder(), QUAD).kept()
+    assert kept is not None
+    return opened(kept).version
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The slug of what a command refuses."""
+    capsys.readouterr()
+    assert main([*words, "--json"]) == ExitCode.UNTRUSTED
+    said = json.loads(capsys.readouterr().out)
+    slug = said["slug"] if words[0] == "run" else said["error"]["slug"]
+    assert isinstance(slug, str)
+    return slug
+
+
+def order(**changed: object) -> launch.Launch:
+    usual = launch.Launch(
+        bundle=Path("old.bundle"), link=None, simulator=(), mode=Mode.SOFTWARE, speed=1, vehicle=None, roots=(),
+        log_key=None, passphrase_file=None, data=data_folder(), state=state_folder(), runs=Path("runs"), style="json",
+    )  # fmt: skip
+    return altered(usual, **changed)  # type: ignore[arg-type]
+
+
+def test_a_vehicle_that_missed_two_roots_takes_those_between_too(
+    fleet: KeyStore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for words in (["replace", "mission-agent"], ["rotate-root"]):
+        assert main(["keys", *words]) == ExitCode.OK
+    chain = [str(fleet.earlier_path(2)), str(fleet.earlier_path(3)), str(fleet.root_path)]
+    accept = ("keys", "accept", "--vehicle", QUAD)
+    assert refused(capsys, *accept, chain[-1]) == "root-version-gap"
+    assert refused(capsys, *accept, chain[0], chain[-1]) == "root-version-gap"
+    assert version() == 1
+    assert main([*accept, *chain]) == ExitCode.OK
+    assert "version 4 is accepted in the place of version 1; it revokes 2 keys more" in capsys.readouterr().out
+    assert version() == 4
+    for older in ("first.trust", *chain[:2]):  # and the key that signed them is revoked since
+        assert refused(capsys, *accept, older) == "root-revoked-key"
+    assert main([*accept, "first.trust", *chain]) == ExitCode.OK, "the same for every vehicle of a fleet"
+    assert refused(capsys, "run", "old.bundle", "--root", "first.trust") == "root-revoked-key"
+    assert refused(capsys, "run", "old.bundle", "--root", chain[0]) == "root-revoked-key"
+    assert version() == 4
+
+
+def test_a_bundle_of_before_is_refused_once_its_key_is_revoked(
+    fleet: KeyStore, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["keys", "replace", "mission-agent"]) == ExitCode.OK
+    assert refused(capsys, "run", "old.bundle") == "revoked-key"
+    assert not Path("runs").exists()
+    assert main(["compile", str(PATROL), "-o", "new.bundle"]) == ExitCode.OK, "the new key has the old one's place"
+    trusted, _, loaded = launch._trusting(order(), Path("new.bundle").read_bytes(), SystemClock())
+    assert (trusted.distrust, trusted.root.version, loaded.vehicle) == (None, 2, QUAD)
+    assert "version 2 is accepted in the place of version 1" in trusted.settle(resumed=False)
+    assert version() == 2
+    fleet.root_path.write_bytes(Path("first.trust").read_bytes())  # the key store is set back
+    assert refused(capsys, "run", "old.bundle") == "revoked-key"
+    assert version() == 2
+
+
+def test_two_roots_of_one_version_are_a_fork(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+    key, first = fleet.signing_key(Duty.ROOT), opened(fleet.root())
+    assert main(["keys", "revoke", "approval-owner-operator"]) == ExitCode.OK
+    assert main(["keys", "accept", str(fleet.root_path), "--vehicle", QUAD]) == ExitCode.OK
+    Path("fork.trust").write_bytes(replace(first, version=2).sign(key))
+    assert refused(capsys, "keys", "accept", "fork.trust", "--vehicle", QUAD) == "root-fork"
+    Path("unrevoked.trust").write_bytes(replace(first, version=3).sign(key))
+    assert refused(capsys, "keys", "accept", "unrevoked.trust", "--vehicle", QUAD) == "root-unrevoked"
+    foreign = SigningKey.from_seed(bytes(32), duty=Duty.ROOT, development=True)
+    keys = (*first.keys, foreign.verification())
+    Path("foreign.trust").write_bytes(replace(first, version=3, keys=keys).sign(foreign))
+    assert refused(capsys, "run", "old.bundle", "--root", "foreign.trust") == "root-unknown-key"
+    assert version() == 2
+
+
+def test_a_revoked_root_key_signs_no_root_that_is_taken(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+    stolen, first = fleet.signing_key(Duty.ROOT), opened(fleet.root())
+    assert main(["keys", "rotate-root", "--days", "7"]) == ExitCode.OK
+    chain = [str(fleet.earlier_path(2)), str(fleet.root_path)]
+    assert main(["keys", "accept", *chain, "--vehicle", QUAD]) == ExitCode.OK
+    for number in (3, 4):
+        Path("stolen.trust").write_bytes(replace(first, version=number).sign(stolen))
+        assert refused(capsys, "keys", "accept", "stolen.trust", "--vehicle", QUAD) == "root-revoked-key"
+        assert refused(capsys, "run", "old.bundle", "--root", "stolen.trust") == "root-revoked-key"
+    assert version() == 3
+
+
+def test_the_log_key_that_was_revoked_signs_no_log_more(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+    stolen = fleet.key_path(Duty.LOG).read_bytes()
+    assert main(["keys", "replace", "log"]) == ExitCode.OK
+    Path("stolen.key").touch(0o600)
+    Path("stolen.key").write_bytes(stolen)
+    assert refused(capsys, "run", "old.bundle", "--log-key", "stolen.key") == "revoked-key"
+    launch._trusting(order(), Path("old.bundle").read_bytes(), SystemClock())
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
+    fleet: KeyStore, capsys: pytest.CaptureFixture[str], resumed: bool
+) -> None:
+    assert main(["keys", "link", "link.key"]) == ExitCode.OK
+    name = fingerprint(read_link_key(Path("link.key")))
+    assert name in capsys.readouterr().out
+    assert main(["keys", "revoke", "--link", "link.key"]) == ExitCode.OK
+    assert f"{name:<33} the key of a link" in capsys.readouterr().out
+    root = opened(fleet.root())
+    signing = Signing(Path("link.key"), POLICY, FrameSession(), Path("state"), SystemClock(), unsigned_radio=True)
+    if resumed:
+        launch._expect_link_key(signing, root, resumed=True)
+        assert "brought down all the same" in signing.notes[-1]
+    else:
+        with pytest.raises(Refused, match=name) as found:
+            launch._expect_link_key(signing, root, resumed=False)
+        assert (found.value.code, found.value.slug) == (ExitCode.UNTRUSTED, "link-key-revoked")
+    launch._expect_link_key(signing, opened(Path("first.trust").read_bytes()), resumed=False)
+    signing.close()
+
+
+@pytest.mark.parametrize("what", ["mission-agent", "policy", "log", "damaged", "set-back"])
+def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, what: str) -> None:
+    """A run is killed in the air, a key of its bundle is revoked, and it is started again with the old command line."""
+    of = launched(order())
+    store = FileReplayStore(state_folder(), QUAD)
+    store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
+    old_key, again = fleet.key_path(Duty.LOG).read_bytes(), order()
+    if what == "damaged":
+        RootStore(state_folder(), QUAD).path.write_bytes(b"{")
+    elif what == "set-back":
+        assert main(["keys", "revoke", "approval-owner-operator"]) == ExitCode.OK
+        assert main(["keys", "accept", str(fleet.root_path), "--vehicle", QUAD]) == ExitCode.OK
+        again = order(roots=(Path("first.trust"),))
+    else:
+        assert main(["keys", "replace", what]) == ExitCode.OK
+        assert main(["keys", "accept", str(fleet.root_path), "--vehicle", QUAD]) == ExitCode.OK
+        Path("old.key").touch(0o600)
+        Path("old.key").write_bytes(old_key)
+        again = order(log_key=Path("old.key"))
+    trusted, _, loaded = launch._trusting(again, Path("old.bundle").read_bytes(), SystemClock())
+    assert loaded.bundle.mission_digest == of.bundle.mission_digest
+    assert "brought down all the same" in trusted.settle(resumed=True)
+    with pytest.raises(Refused) as grounded:
+        trusted.settle(resumed=False)
+    assert grounded.value.slug in ("revoked-key", "root-damaged", "root-rollback")
+    with pytest.raises(Refused):
+        launch._trusting(altered(again, dry_run=True), Path("old.bundle").read_bytes(), SystemClock())
+    store.give_back(of.bundle.mission_digest)
+    with pytest.raises(Refused):  # nothing of it is in the air
+        launch._trusting(again, Path("old.bundle").read_bytes(), SystemClock())
+
+
+def launched(of: launch.Launch) -> Loaded:
+    return launch._trusting(of, of.bundle.read_bytes(), SystemClock())[2]
+
+
+def test_a_root_in_earnest_is_accepted_by_flying_under_it_and_one_for_development_is_not(tmp_path: Path) -> None:
+    key = SigningKey.from_seed(bytes([7]) * 32, duty=Duty.ROOT)
+    earnest = TrustRoot(1, False, 0, 1 << 60, (key.verification(),))
+    path = tmp_path / "earnest.trust"
+    path.write_bytes(earnest.sign(key))
+    found = trust((path,), tmp_path, tmp_path, QUAD, 1)
+    assert RootStore(tmp_path, QUAD).kept() is None, "not before it flies"
+    assert found.settle(resumed=False) == ""
+    assert RootStore(tmp_path, QUAD).kept() == path.read_bytes()
+    developer = SigningKey.from_seed(bytes([8]) * 32, duty=Duty.ROOT, development=True)
+    path.write_bytes(TrustRoot(2, True, 0, 1 << 60, (developer.verification(),)).sign(developer))
+    again = trust((path,), tmp_path, tmp_path, QUAD, 1)
+    assert again.distrust is not None
+    assert again.distrust.slug == "root-unknown-key"
+    assert trust((path,), tmp_path, tmp_path / "else", QUAD, 1).store is None

@@ -417,7 +417,7 @@ class Autopilot:
 
     def send(self, message: Message | None) -> None:
         """Queues a message for the link."""
-        if message is not None:
+        if message is not None and not self.reports.is_silent(message.get_msgId()):
             self.outbox.append(message)
 
     def say(self, severity: int, text: str) -> None:

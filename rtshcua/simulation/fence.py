@@ -119,10 +119,13 @@ class FenceLimits:
     """For targets alone: on the ground every vehicle is below it."""
     return_under: float = inf
     """The height above home under which a return stays."""
+    across: float = inf
+    """How far from home flying is allowed, whatever the areas say."""
 
     def holds(self, point: Point) -> bool:
         """Whether flying is allowed there."""
-        return point.up <= self.ceiling and self.area.holds(point.north, point.east)
+        near = hypot(point.north, point.east) <= self.across
+        return point.up <= self.ceiling and near and self.area.holds(point.north, point.east)
 
 
 LOADED_US = 100_000

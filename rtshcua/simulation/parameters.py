@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isfinite
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -67,11 +68,17 @@ class Parameters:
         return self._message(name)
 
     def write(self, name: str, raw: float, type_: int) -> Message | None:
-        """Sets one, and gives PARAM_VALUE with what it is now; None if there is none of that name."""
+        """Sets one, and gives PARAM_VALUE with what it is now; None for what is passed over without an answer.
+
+        PX4 does so with a type that is not the parameter's ("param types mismatch", on its console alone), ArduPilot
+        with NaN and infinity, and both with a name that they do not have (`mavlink_parameters.cpp`, `GCS_Param.cpp`).
+        """
         parameter = self._table.get(name)
-        if parameter is None:
+        if parameter is None or (self._bytewise and type_ != parameter.type):
             return None
         value = self._decode(raw, type_)
+        if not self._bytewise and not isfinite(value):
+            return None
         if value == value and abs(value) < 1e9:  # NaN and nonsense change nothing
             self._store(parameter, value)
         return self._message(name)

@@ -90,6 +90,10 @@ class Reports:
             return self._delayed(number)
         return self._build[number]()
 
+    def is_silent(self, number: int) -> bool:
+        """Whether a fault keeps this message from coming, as a report or as an answer."""
+        return number in self._silent
+
     def silence(self, number: int, silent: bool) -> None:
         """From now on this message does not come, or comes again."""
         (self._silent.add if silent else self._silent.discard)(number)

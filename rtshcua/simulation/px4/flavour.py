@@ -17,7 +17,7 @@ from rtshcua.model.faults import Mode
 from rtshcua.simulation.answers import Delays, Lanes
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
-from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
+from rtshcua.simulation.fence import Area, Breach, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.place import Home, Point
@@ -56,9 +56,8 @@ def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
     across, high = value("GF_MAX_HOR_DIST"), value("GF_MAX_VER_DIST")
     if area == Area() and not across > 0 and not high > 0:
         return None
-    if across > 0 and not area.included:  # with areas, the places allowed are those of the areas
-        area = Area((Circle((0.0, 0.0), across),), area.excluded)
-    return FenceLimits(area, high if high > 0 else inf)
+    # all of them count: `Geofence::checkPointAgainstAllGeofences`
+    return FenceLimits(area, high if high > 0 else inf, across=across if across > 0 else inf)
 
 
 def _acts(value: Callable[[str], float]) -> bool:

@@ -314,3 +314,16 @@ def test_the_fence_shows_in_the_vehicles_status(pilot: Pilots) -> None:
 
 def test_no_ceiling_is_infinite() -> None:
     assert FenceLimits().ceiling == inf
+
+
+def test_px4s_own_circle_counts_beside_the_areas(pilot: Pilots) -> None:
+    """`Geofence::checkPointAgainstAllGeofences`."""
+    a = fenced(pilot("px4"), p.square(500), GF_MAX_HOR_DIST=40)
+    a.take_off(10)
+    assert ordered_out(a) == [0]
+    a.wait(5)
+    assert a.truth.north_mm < 2_000
+    set_param(a, "GF_MAX_HOR_DIST", 400)
+    a.wait(0.5)
+    assert ordered_out(a) == [0]
+    a.until(lambda: a.truth.north_mm > 20_000)

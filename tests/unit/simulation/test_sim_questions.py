@@ -1,5 +1,6 @@
 """What a ground station asks when it connects: there is an answer, and for what is not there a refusal, at once."""
 
+import math
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -8,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.dialects.v20 import development
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import MessageSilence, Mode
 from virtual import plans as p
 
 Pilots = Callable[..., Any]
@@ -132,3 +133,24 @@ def test_the_target_is_told_when_it_is_asked_for_if_there_is_one(pilot: Pilots, 
     told = a.send(asked)
     assert {frame.name for frame in told} == {"POSITION_TARGET_GLOBAL_INT", "COMMAND_ACK"}
     assert [frame.message.result for frame in told if frame.name == "COMMAND_ACK"] == [0]
+
+
+def test_a_write_that_the_real_one_passes_over_is_not_answered(pilot: Pilots, flavour: str) -> None:
+    """PX4: another type than the parameter's; ArduPilot: no number. Both: a name that they do not have."""
+    a = pilot(flavour).ready()
+    name, was = ("GF_ACTION", 2.0) if a.px4 else ("FENCE_RADIUS", 300.0)
+    for parameter, value, kind in ((name, 3.0, 9) if a.px4 else (name, math.nan, 9), (name + "X", 1.0, 9)):
+        replies = a.send(mavlink.MAVLink_param_set_message(1, 1, parameter.encode(), value, kind))
+        assert [each.name for each in replies if each.name == "PARAM_VALUE"] == []
+    a.send(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
+    value = a.last("PARAM_VALUE").param_value
+    assert (struct.unpack("<i", struct.pack("<f", value))[0] if a.px4 else value) == was
+
+
+def test_answers_can_be_lost_as_reports_can(pilot: Pilots, flavour: str) -> None:
+    fault = MessageSilence(at_us=2_000_000, message="PARAM_VALUE", for_us=2_000_000)
+    a = pilot(flavour, faults=(fault,))
+    ask = mavlink.MAVLink_param_request_read_message(1, 1, b"RTL_RETURN_ALT" if a.px4 else b"RTL_ALT", -1)
+    for at_s, answers in ((1, 1), (3, 0), (5, 1)):
+        a.wait(at_s - a.simulation.now_us / 1_000_000)
+        assert len([each for each in a.send(ask) if each.name == "PARAM_VALUE"]) == answers

@@ -1,4 +1,5 @@
-"""How the payloads of messages are laid out that leave for a vehicle, and of those that tell the gate where it is.
+"""How the payloads of messages are laid out that leave for a vehicle, and of those that tell the gate where
+it is, whether it flies, and what its parameters are.
 
 Fields stand by falling size, extensions behind them (https://mavlink.io/en/guide/serialization.html).
 """
@@ -13,6 +14,7 @@ from rtshcua.mavlink.framing import HEADER
 HEARTBEAT: Final = 0
 PARAM_REQUEST_READ: Final = 20
 PARAM_REQUEST_LIST: Final = 21
+PARAM_VALUE: Final = 22
 PARAM_SET: Final = 23
 GLOBAL_POSITION_INT: Final = 33
 MISSION_REQUEST: Final = 40
@@ -26,6 +28,7 @@ COMMAND_INT: Final = 75
 COMMAND_LONG: Final = 76
 SET_POSITION_TARGET_GLOBAL_INT: Final = 86
 TIMESYNC: Final = 111
+EXTENDED_SYS_STATE: Final = 245
 STATUSTEXT: Final = 253
 
 TEXT_OCTETS: Final = 50  # in one STATUSTEXT
@@ -68,6 +71,7 @@ LAYOUTS: Final = {
     HEARTBEAT: _layout(50, "<IBBBBB", "custom_mode type autopilot base_mode system_status mavlink_version"),
     PARAM_REQUEST_READ: _layout(214, "<hBB16s", f"param_index {_TARGET} param_id"),
     PARAM_REQUEST_LIST: _layout(159, "<BB", _TARGET),
+    PARAM_VALUE: _layout(220, "<fHH16sB", "param_value param_count param_index param_id param_type"),
     PARAM_SET: _layout(168, "<fBB16sB", f"param_value {_TARGET} param_id param_type"),
     GLOBAL_POSITION_INT: _layout(104, "<IiiiihhhH", "time_boot_ms lat lon alt relative_alt vx vy vz hdg"),
     MISSION_REQUEST: _layout(230, "<HBBB", f"seq {_TARGET} mission_type"),
@@ -86,6 +90,7 @@ LAYOUTS: Final = {
         f"time_boot_ms lat_int lon_int alt vx vy vz afx afy afz yaw yaw_rate type_mask {_TARGET} coordinate_frame",
     ),
     TIMESYNC: _layout(34, "<qq", "tc1 ts1"),
+    EXTENDED_SYS_STATE: _layout(130, "<BB", "vtol_state landed_state"),
     STATUSTEXT: _layout(83, f"<B{TEXT_OCTETS}sHB", "severity text id chunk_seq"),
 }  # fmt: skip
 

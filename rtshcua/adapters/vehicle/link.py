@@ -22,7 +22,7 @@ _NOBODY: Final = 255
 #: the system id that both autopilots are delivered with (`MAV_SYS_ID`, `SYSID_THISMAV`)
 _DELIVERED: Final = 1
 #: what the boundary learns of the vehicle from
-_OBSERVED: Final = ("HEARTBEAT", "GLOBAL_POSITION_INT")
+_OBSERVED: Final = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE", "PARAM_VALUE"})
 
 
 def is_radio(frame: Received) -> bool:
@@ -109,7 +109,7 @@ class VehicleLink:
                 continue
             received.append(each)
             if name in _OBSERVED:
-                self._frames.observe(unsigned(each.frame))
+                self._frames.observe(unsigned(each.frame), now_us)
             elif name == "RADIO_STATUS" and not each.signed and isinstance(self._verifier, UnsignedRadio):
                 self._verifier.temper(each.message, now_us)
         return received

@@ -2,24 +2,20 @@
 
 An unknown name is answered by silence, in both flavours, so after a few times it counts as not there; it is asked for
 again now and then.
-PX4 carries integers as their bytes inside the float, ArduPilot casts them.
 """
 
-import struct
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Final
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.mavlink.parameters import decode, encode
 
 RETRY_US: Final = 1_000_000
 RETRIES: Final = 5
 #: How often one that did not answer is asked for again.
 AGAIN_US: Final = 10_000_000
-
-#: MAV_PARAM_TYPE of integers, and the bytes that they are in a float's place
-_INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 
 
 @dataclass(slots=True)
@@ -84,7 +80,7 @@ class VehicleParameters:
 
     def take(self, message: Any) -> None:
         """A PARAM_VALUE."""
-        name, value = message.param_id, self._decode(message)
+        name, value = message.param_id, decode(message.param_value, message.param_type, bytewise=self._bytewise)
         wanted = self._wanted.get(name)
         if wanted is None and name not in self.values:
             return
@@ -105,19 +101,6 @@ class VehicleParameters:
                 out.append(messages.parameter_read(system, name))
             else:
                 kind = self._types[name]
-                out.append(messages.parameter_set(system, name, self._encode(wanted.value, kind), kind))
+                raw = encode(wanted.value, kind, bytewise=self._bytewise)
+                out.append(messages.parameter_set(system, name, raw, kind))
         return out
-
-    def _decode(self, message: Any) -> float:
-        shape = self._shape(message.param_type)
-        if shape is None:
-            return float(message.param_value)
-        return float(struct.unpack(shape, struct.pack("<f", message.param_value))[0])
-
-    def _encode(self, value: float, kind: int) -> float:
-        shape = self._shape(kind)
-        return value if shape is None else struct.unpack("<f", struct.pack(shape, int(value)))[0]
-
-    def _shape(self, kind: int) -> str | None:
-        """The bytes of a value in a float's place; None where it is the float."""
-        return _INTEGERS.get(kind) if self._bytewise else None

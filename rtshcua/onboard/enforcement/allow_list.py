@@ -1,9 +1,9 @@
 """The allow-list of frames: which ones may leave without a permit, and which carry out the command that is permitted.
 
 Housekeeping moves nothing. Questions, telemetry rates, texts and our own heartbeat pass always. A geofence may be
-handed over before the flight, never during it. What is not here is not housekeeping: no mission is uploaded, no
-parameter written but the two that switch ArduCopter's fence on, no signing key set, no file opened, no manual control
-given.
+handed over before the flight, never during it; so are the two parameters that switch ArduCopter's fence on, and nothing
+but on. What is not here is not housekeeping: no mission is uploaded, no signing key set, no file opened, no manual
+control given. Another parameter is set only as a preparation lists it (`written`, `frames.py`).
 
 A frame carries out a command if every field that the autopilot acts on has the value that the command gives it: the
 number, each parameter, the frame of reference, the point, the height, the speed, the mode. Nothing is "about right" but
@@ -19,6 +19,7 @@ from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.framing import CHECKSUM, HEAD, HEADER, MARKER
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, HEARTBEAT, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
+from rtshcua.mavlink.parameters import bits_of, decode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import meridian
 from rtshcua.onboard.ports import Command
@@ -63,13 +64,14 @@ def read_frame(octets: bytes) -> Frame | None:
 # ---------------------------------------------------------------- housekeeping
 
 _OWN_HEARTBEAT: Final = (enums.MAV_TYPE_ONBOARD_CONTROLLER, enums.MAV_AUTOPILOT_INVALID, 0)
-_POLYGONS_TOO: Final = tuple(bits for bits in range(16) if bits & 4)  # FENCE_TYPE is a set of bits
+_AREAS: Final = 4  # a bit of FENCE_TYPE
 _FENCE_ITEMS: Final = range(enums.MAV_CMD_NAV_FENCE_RETURN_POINT, enums.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION + 1)
 
 _identity: Final = LAYOUTS[layouts.HEARTBEAT].getter("type autopilot base_mode")
 _command_number: Final = LAYOUTS[COMMAND_LONG].getter("command")
 _parameters: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7")
-_setting: Final = LAYOUTS[layouts.PARAM_SET].getter("param_id param_value")
+_setting: Final = LAYOUTS[layouts.PARAM_SET].getter("param_id param_value param_type")
+_told: Final = LAYOUTS[layouts.PARAM_VALUE].getter("param_id param_value param_type")
 _item: Final = LAYOUTS[layouts.MISSION_ITEM_INT].getter("command current mission_type")
 
 
@@ -88,10 +90,31 @@ def is_greeting(frame: Frame) -> bool:
     return frame.message == HEARTBEAT and _is_own(frame.fields) and frame.system != _GROUND_STATION
 
 
-def is_of_fence(frame: Frame) -> bool:
-    """Whether the frame is part of handing over a fence: it moves nothing, and may leave before the flight."""
+def is_of_fence(frame: Frame, types: float | None) -> bool:
+    """Whether the frame is part of handing over a fence: it moves nothing, and may leave before the flight.
+
+    `types` is the FENCE_TYPE that was heard last, None before: it is set to the same with the areas, not without what
+    its owner has in it.
+    """
+    if frame.message == layouts.PARAM_SET:
+        return _switches_fence_on(frame.fields, types)
     rule = _BEFORE_FLIGHT.get(frame.message)
     return rule is not None and rule(frame.fields)
+
+
+def written(frame: Frame, *, bytewise: bool) -> tuple[str, int | None] | None:
+    """The parameter that a frame sets, and the 32 bits of the value that it gets; None if it sets none."""
+    return _named(_setting(frame.fields), bytewise=bytewise) if frame.message == layouts.PARAM_SET else None
+
+
+def told(frame: Frame, *, bytewise: bool) -> tuple[str, int | None]:
+    """The parameter that a PARAM_VALUE tells of, and the bits of its value."""
+    return _named(_told(frame.fields), bytewise=bytewise)
+
+
+def _named(setting: tuple[bytes, float, int], *, bytewise: bool) -> tuple[str, int | None]:
+    name, raw, kind = setting
+    return name.rstrip(b"\0").decode("latin-1"), bits_of(decode(raw, kind, bytewise=bytewise))
 
 
 def _any(fields: _Fields) -> bool:
@@ -111,14 +134,14 @@ def _asks(fields: _Fields) -> bool:
     return number in (enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE)
 
 
-def _switches_fence_on(fields: _Fields) -> bool:
-    """FENCE_ENABLE on; FENCE_TYPE with polygons among what it heeds. Nothing else of the vehicle is set from here."""
-    name, value = _setting(fields)
+def _switches_fence_on(fields: _Fields, types: float | None) -> bool:
+    """FENCE_ENABLE on; the areas switched on in FENCE_TYPE, which stays as it is else."""
+    name, value, _ = _setting(fields)
     match name.rstrip(b"\0"):
         case b"FENCE_ENABLE":
             return bool(value == 1)
         case b"FENCE_TYPE":
-            return value in _POLYGONS_TOO
+            return types is not None and bool(value == (int(types) | _AREAS))
     return False
 
 
@@ -147,7 +170,6 @@ _AT_ANY_TIME: Final[dict[int, Callable[[_Fields], bool]]] = {
     layouts.STATUSTEXT: _any,
 }
 _BEFORE_FLIGHT: Final[dict[int, Callable[[_Fields], bool]]] = {
-    layouts.PARAM_SET: _switches_fence_on,
     layouts.MISSION_COUNT: _about_fence(layouts.MISSION_COUNT),
     layouts.MISSION_CLEAR_ALL: _about_fence(layouts.MISSION_CLEAR_ALL),
     layouts.MISSION_ITEM_INT: _is_fence_item,

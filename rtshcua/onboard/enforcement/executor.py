@@ -19,6 +19,7 @@ from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Dispatch
 from rtshcua.wire.permit import AGAIN, Permit, open_permit
+from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
 #: a command but for its token
@@ -36,6 +37,7 @@ NOT_COVERED: Final = Refusal("permit/not-covered", "the link does not stand behi
 LAPSED: Final = Refusal("permit/lapsed", "it is standing, but its step is over or its flight has landed")
 OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "it is for a step while another runs, or for one behind it")
 MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was recalled")
+NOT_DOWN: Final = Refusal("permit/not-down", "the vehicle is not known to stand on the ground, disarmed")
 BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
 
 
@@ -111,6 +113,7 @@ class Executor:
         self._commands = commands
         self.frames = FrameSession()
         self._used: set[int] = set()
+        self._prepared: set[int] = set()  # the serials of preparations that were begun
         self._step = -1  # the last step that was sent,
         self._serial = 0  # its permit,
         self._running = False  # and whether it still runs
@@ -144,6 +147,27 @@ class Executor:
             again = range(serial, serial + AGAIN)
             serial = next((each for each in again if each not in self._used), serial + AGAIN)
         return self._dispatch(Permit(kind, step, link, serial, 0, 0, _ALWAYS), now_us)
+
+    def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
+        """What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on
+        the ground, until `prepared`, a dispatch, or its time is over.
+        """
+        permit = open_preparation(sealed, self._key)
+        if permit is None:
+            return FORGED
+        if permit.serial in self._prepared:
+            return USED
+        if now_us > permit.not_after_us:
+            return LATE
+        if not self.frames.stands(now_us):
+            return NOT_DOWN
+        self._prepared.add(permit.serial)
+        self.frames.prepare(permit.writes, permit.not_after_us)
+        return permit
+
+    def prepared(self) -> None:
+        """What was to be set is set, or was given up."""
+        self.frames.prepared()
 
     def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
         if permit.serial in self._used:

@@ -2,24 +2,28 @@
 
 Every frame that an adapter wants to send goes through `seal`, and only what `seal` gives back may be sent. A permit
 that the executor dispatches opens a session for its one command; until that command ends, frames that carry it out
-pass, no others. Housekeeping passes always. Whatever is on neither list (`allow_list`) is refused. With a signer each
+pass, no others. A preparation opens it for the parameters that it lists, each with its value, on the ground alone.
+Housekeeping passes always. Whatever is on neither list (`allow_list`) is refused. With a signer each
 frame that passes is signed; the key is the signer's, and nothing else can use it.
 
 A rule needs to know which autopilot it speaks to and how high its home lies. Both are read here from frames that came
 in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
-from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
+from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
 from rtshcua.mavlink.modes import KNOWN
+from rtshcua.mavlink.parameters import is_bytewise, value_of
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement import allow_list
 from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
 from rtshcua.onboard.ports import Command
+from rtshcua.wire.preparation import ParameterWrite
 
 #: who we are, in the vehicle's own system, and whom we speak to
 OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
@@ -29,6 +33,10 @@ AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
 #: sent above sea would move with it.
 HOME_MOVES: Final = 10_000
 
+#: us: how old a heartbeat, and a word of the ground, may be of a vehicle that counts as standing there
+STANDS_US: Final = 3_000_000
+
+_LANDED: Final = LAYOUTS[EXTENDED_SYS_STATE].at("landed_state")
 _KIND: Final = LAYOUTS[HEARTBEAT].at("autopilot")
 _BASE_MODE: Final = LAYOUTS[HEARTBEAT].at("base_mode")
 _position: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("lat lon alt relative_alt")
@@ -41,6 +49,10 @@ WRONG_TARGET: Final = Refusal("frame/wrong-target", "it is to another system or 
 FORCED_ARMING: Final = Refusal("frame/forced-arming", "it arms or disarms past the autopilot's own checks")
 AFTER_START: Final = Refusal(
     "frame/after-start", "it is about a fence, once anything flew or while the motors are armed"
+)
+NOT_LISTED: Final = Refusal("frame/not-listed", "it sets a parameter to what no preparation lists")
+NOT_DOWN: Final = Refusal(
+    "frame/not-down", "it sets a parameter of a vehicle that flies, is armed, or is not known to stand on the ground"
 )
 NO_SESSION: Final = Refusal("frame/no-session", "it moves the vehicle, and nothing that was permitted does so now")
 NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command that was permitted")
@@ -60,8 +72,10 @@ class Signer(Protocol):
 class Gate(Protocol):
     """What an adapter gets of a `FrameSession`: it may ask, and tell what it heard. It opens nothing."""
 
-    def observe(self, frame: bytes) -> None:
-        """Take in one good frame from the link."""
+    def observe(self, frame: bytes, now_us: int = 0) -> None:
+        """Take in one good frame from the link, at a monotonic time; without one, it is too old for what has to be
+        recent.
+        """
         ...
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
@@ -89,7 +103,12 @@ class FrameSession:
         self._started = False  # a session was opened: fences stay as they are
         self._system = 0
         self._autopilot = 0  # MAV_AUTOPILOT
-        self._armed = False  # as its last heartbeat says
+        self._armed = False  # as its last heartbeat says,
+        self._armed_us = 0  # and when it came
+        self._stands_us = 0  # it last said that it is on the ground; 0 once it said otherwise
+        self._types: float | None = None  # FENCE_TYPE
+        self._prepared: frozenset[tuple[str, int | None]] = frozenset()  # parameters that may be set, and to what,
+        self._prepared_us = 0  # up to when
         self._home_amsl: int | None = None  # mm
         self._settled_amsl: int | None = None  # the same, when the takeoff was permitted
 
@@ -102,6 +121,7 @@ class FrameSession:
     def open(self, command: Command, not_after_us: int) -> None:
         """Let out the frames of one command, in place of whatever was let out before."""
         self._session, self._started = _Session(command, not_after_us), True
+        self.prepared()
         if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
             self._settled_amsl = self._home_amsl
 
@@ -109,7 +129,21 @@ class FrameSession:
         """Let out nothing more that moves the vehicle."""
         self._session = None
 
-    def observe(self, frame: bytes) -> None:
+    def prepare(self, writes: Iterable[ParameterWrite], not_after_us: int) -> None:
+        """Let these parameters be set, as long as the vehicle stands on the ground."""
+        self._prepared = frozenset((each.name, each.value) for each in writes)
+        self._prepared_us = not_after_us
+
+    def prepared(self) -> None:
+        """Let no parameter be set any more."""
+        self._prepared = frozenset()
+
+    def stands(self, now_us: int) -> bool:
+        """Whether it is known to be on the ground, disarmed, and nothing that was permitted is under way."""
+        recent = min(self._armed_us, self._stands_us) > max(0, now_us - STANDS_US)
+        return recent and not self._armed and self._session is None
+
+    def observe(self, frame: bytes, now_us: int = 0) -> None:
         """Take in one good frame from the link. The first heartbeat of an autopilot that is known settles whose."""
         heard = read_frame(frame)
         if heard is None or heard.component != AUTOPILOT:
@@ -120,12 +154,19 @@ class FrameSession:
                 self._system, self._autopilot = heard.system, autopilot
             if heard.system == self._system:
                 self._armed = bool(heard.fields[_BASE_MODE] & enums.MAV_MODE_FLAG_SAFETY_ARMED)
+                self._armed_us = now_us
         elif heard.message == GLOBAL_POSITION_INT and heard.system == self._system:
             latitude, longitude, amsl, above_home = _position(heard.fields)
             self._here = latitude, longitude
             home_amsl, settled = amsl - above_home, self._settled_amsl  # mm
             if settled is None or abs(home_amsl - settled) <= HOME_MOVES:
                 self._home_amsl = home_amsl
+        elif heard.message == EXTENDED_SYS_STATE and heard.system == self._system:
+            self._stands_us = now_us if heard.fields[_LANDED] == enums.MAV_LANDED_STATE_ON_GROUND else 0
+        elif heard.message == PARAM_VALUE and heard.system == self._system:
+            name, bits = allow_list.told(heard, bytewise=is_bytewise(self._autopilot))
+            if name == "FENCE_TYPE":
+                self._types = 0.0 if bits is None else value_of(bits)
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
         """The octets to send for a frame at a monotonic time, or why it is not sent."""
@@ -152,8 +193,13 @@ class FrameSession:
         # 3. always, or before the flight
         if allow_list.is_housekeeping(frame):
             return None
-        if allow_list.is_of_fence(frame):
+        setting = allow_list.written(frame, bytewise=is_bytewise(self._autopilot))
+        if setting is not None and setting in self._prepared and now_us <= self._prepared_us:
+            return None if self.stands(now_us) else NOT_DOWN
+        if allow_list.is_of_fence(frame, self._types):
             return AFTER_START if self._started or self._armed else None
+        if setting is not None:
+            return NOT_LISTED
         # 4. what is permitted now
         return self._refuse_motion(frame, now_us)
 

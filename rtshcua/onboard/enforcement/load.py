@@ -5,7 +5,9 @@ may speak for its duty, vehicle, role and source, the format versions, and every
 policy and mission make sense, and that the mission only tightens; last that the requests of this policy fit the wire.
 """
 
+from collections.abc import Mapping
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -16,6 +18,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.executor import Commands, Executor
+from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.bundle import Bundle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
@@ -42,6 +45,7 @@ class Loaded(msgspec.Struct, frozen=True):
     policy: PreparedPolicy
     vehicle: str
     mode: Mode
+    preparation: PreparationIssuer
 
     @property
     def bundle(self) -> Bundle:
@@ -71,9 +75,12 @@ def load(
     session_key: bytes,
     flight: bytes,
     peer_is_own_simulator: bool,
+    settings: Mapping[str, int] = MappingProxyType({}),
+    owed: Mapping[str, Owed] = MappingProxyType({}),
 ) -> Loaded | Refusal:
     """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
-    `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log.
+    `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log. `settings` are
+    the parameters that an operator has set before it, `owed` what earlier flights left to be put back.
 
     `now` is when the bundle was received (paper symbol `t_r`).
 
@@ -98,13 +105,18 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
+    issuer = PreparationIssuer(session_key, settings, owed)
     in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
-    return session(in_force, policy, vehicle, mode, session_key)
+    return session(in_force, policy, vehicle, mode, session_key, issuer)
 
 
-def session(in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes) -> Loaded:
-    """A session of a verified and prepared bundle, nothing of it decided yet."""
+def session(
+    in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes,
+    issuer: PreparationIssuer | None = None,
+) -> Loaded:  # fmt: skip
+    """A session of a verified and prepared bundle, nothing of it decided yet. Without an `issuer` nothing is set."""
     commands = Commands(policy.policy, in_force.bundle.mission)
     enforced = mode is not Mode.NONE
     boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, enforced=enforced)
-    return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode)
+    issuer = issuer or PreparationIssuer(session_key, {}, {})
+    return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode, issuer)

@@ -1,5 +1,6 @@
 """The frame session: what leaves, by tables written by hand, and by turning every octet of what may leave."""
 
+import struct
 from collections.abc import Iterable
 from math import inf, nan
 from random import Random
@@ -11,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.layouts import LAYOUTS
+from rtshcua.mavlink.parameters import bits_of
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import (
     AFTER_START,
@@ -19,13 +21,17 @@ from rtshcua.onboard.enforcement.frames import (
     NO_SESSION,
     NO_VEHICLE,
     NOT_COVERED,
+    NOT_DOWN,
+    NOT_LISTED,
     NOT_ONE_FRAME,
     NOT_OURS,
     OUT_OF_ORDER,
+    STANDS_US,
     WRONG_TARGET,
     FrameSession,
 )
 from rtshcua.onboard.ports import Command
+from rtshcua.wire.preparation import ParameterWrite
 from virtual.rows import rows
 
 SYSTEM, HOME_AMSL = 3, 488_000
@@ -52,10 +58,15 @@ def height(above_sea: int, above_home: int) -> Any:
     return m.MAVLink_global_position_int_message(0, 0, 0, above_sea, above_home, 0, 0, 0, 0)
 
 
+def parameter(name: str, value: float, kind: int = 9) -> Any:
+    return m.MAVLink_param_value_message(name.encode(), value, kind, 1, 0)
+
+
 def session(autopilot: int, of: Command | None = None) -> FrameSession:
     made = FrameSession()
     made.observe(pack(heartbeat(autopilot), component=1))
     made.observe(pack(height(HOME_AMSL + 5_000, 5_000), component=1))
+    made.observe(pack(parameter("FENCE_TYPE", 3), component=1))
     if of is not None:
         made.open(of, LATEST)
     return made
@@ -152,6 +163,9 @@ NEVER: list[Any] = [
     m.MAVLink_mission_set_current_message(SYSTEM, 1, 0),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_ENABLE", 0, 2),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 3, 2),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 4, 2),  # its own circle and ceiling are not taken away
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 15, 2),
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_RADIUS", 300, 9),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", nan, 2),
     m.MAVLink_param_set_message(SYSTEM, 1, b"ARMING_CHECK", 0, 2),
     m.MAVLink_setup_signing_message(SYSTEM, 1, bytes(32), 0),
@@ -347,6 +361,7 @@ def test_a_fence_is_not_handed_to_a_vehicle_that_is_armed(message: Any) -> None:
     """Whoever armed it: a run may begin while it flies."""
     gate = FrameSession()
     gate.observe(pack(heartbeat(PX4), component=1))
+    gate.observe(pack(parameter("FENCE_TYPE", 7), component=1))
     assert not isinstance(gate.seal(pack(message), NOW), Refusal)
     gate.observe(pack(m.MAVLink_heartbeat_message(2, PX4, 128, 0, 4, 3), component=1))
     assert gate.seal(pack(message), NOW) is AFTER_START
@@ -513,3 +528,107 @@ def test_what_passes_is_signed_and_nothing_else() -> None:
     assert gate.seal(land, NOW) == b"signed " + land
     assert gate.seal(pack(long(176, 1, 4, 5)), NOW) is NOT_COVERED
     assert signer.asked == [(land, NOW)]
+
+
+# ---------------------------------------------------------------- parameters that a preparation lists
+
+
+def bits(value: float) -> int:
+    found = bits_of(value)
+    assert found is not None
+    return found
+
+
+def setting(name: str, value: float, kind: int = 9) -> Any:
+    return m.MAVLink_param_set_message(SYSTEM, 1, name.encode(), value, kind)
+
+
+def down(gate: FrameSession, autopilot: int, at_us: int = NOW, *, landed: int = 1, mode: int = 0) -> None:
+    gate.observe(pack(m.MAVLink_heartbeat_message(2, autopilot, mode, 0, 4, 3), component=1), at_us)
+    gate.observe(pack(m.MAVLink_extended_sys_state_message(0, landed), component=1), at_us)
+
+
+def prepared(autopilot: int, name: str, value: float) -> FrameSession:
+    gate = session(autopilot)
+    down(gate, autopilot)
+    gate.prepare([ParameterWrite(name, 0, bits(value))], LATEST)
+    return gate
+
+
+def test_a_listed_parameter_is_set_to_its_listed_value_and_nothing_else_is() -> None:
+    gate = prepared(ARDUPILOT, "FENCE_RADIUS", 300.0)
+    assert covers(gate, setting("FENCE_RADIUS", 300.0))
+    assert covers(gate, setting("FENCE_RADIUS", 300.0, 4)), "ArduPilot has the type of its own"
+    for other in (
+        setting("FENCE_RADIUS", 300.0001),
+        setting("FENCE_RADIUS", 50.0),
+        setting("FENCE_RADIUS", nan),
+        setting("FENCE_RADIUSX", 300.0),
+        setting("FENCE_ALT_MAX", 300.0),
+    ):
+        assert gate.seal(pack(other), NOW) is NOT_LISTED
+    gate.prepared()
+    assert gate.seal(pack(setting("FENCE_RADIUS", 300.0)), NOW) is NOT_LISTED
+
+
+def test_px4s_integers_are_listed_by_their_number() -> None:
+    gate = prepared(PX4, "GF_ACTION", 3.0)
+    three = struct.unpack("<f", struct.pack("<i", 3))[0]
+    assert covers(gate, setting("GF_ACTION", three, 6))
+    assert gate.seal(pack(setting("GF_ACTION", 3.0, 6)), NOW) is NOT_LISTED, "as an integer these octets are another"
+    assert gate.seal(pack(setting("GF_ACTION", three, 9)), NOW) is NOT_LISTED
+
+
+@pytest.mark.parametrize(("landed", "mode", "age_us"), [
+    (2, 0, 0), (3, 0, 0), (4, 0, 0), (0, 0, 0), (1, 128, 0), (1, 0, STANDS_US),
+], ids=["in the air", "takes off", "lands", "does not say", "armed", "said so long ago"])  # fmt: skip
+def test_a_listed_parameter_is_not_set_unless_it_is_known_to_stand(landed: int, mode: int, age_us: int) -> None:
+    at_us = NOW + 10 * STANDS_US
+    gate = session(ARDUPILOT)
+    gate.prepare([ParameterWrite("FENCE_RADIUS", 0, bits(300.0))], at_us)
+    down(gate, ARDUPILOT, at_us - age_us, landed=landed, mode=mode)
+    assert gate.seal(pack(setting("FENCE_RADIUS", 300.0)), at_us) is NOT_DOWN
+    down(gate, ARDUPILOT, at_us)
+    assert covers_at(gate, setting("FENCE_RADIUS", 300.0), at_us)
+    assert gate.seal(pack(setting("FENCE_RADIUS", 300.0)), at_us + 1) is NOT_LISTED, "its time is over"
+
+
+def covers_at(gate: FrameSession, message: Any, at_us: int) -> bool:
+    return isinstance(gate.seal(pack(message), at_us), bytes)
+
+
+def test_what_never_said_when_it_stood_does_not_stand() -> None:
+    gate = session(ARDUPILOT)
+    gate.observe(pack(heartbeat(ARDUPILOT), component=1))
+    gate.observe(pack(m.MAVLink_extended_sys_state_message(0, 1), component=1))
+    assert not gate.stands(0)
+    assert not gate.stands(NOW)
+
+
+def test_another_vehicle_tells_nothing_of_where_this_one_is() -> None:
+    gate = session(ARDUPILOT)
+    other = SYSTEM + 1
+    gate.observe(pack(heartbeat(ARDUPILOT), component=1), NOW)
+    gate.observe(pack(m.MAVLink_extended_sys_state_message(0, 1), system=other, component=1), NOW)
+    gate.observe(pack(parameter("FENCE_TYPE", 15), system=other, component=1), NOW)
+    gate.observe(pack(parameter("FENCE_RADIUS", 15), component=1), NOW)
+    assert not gate.stands(NOW)
+    assert not covers(gate, setting("FENCE_TYPE", 15))
+
+
+def test_a_command_ends_a_preparation() -> None:
+    gate = prepared(ARDUPILOT, "FENCE_RADIUS", 300.0)
+    gate.open(command(K.CLIMB), LATEST)
+    assert not gate.stands(NOW)
+    assert gate.seal(pack(setting("FENCE_RADIUS", 300.0)), NOW) is NOT_LISTED
+    gate.close()
+    assert gate.seal(pack(setting("FENCE_RADIUS", 300.0)), NOW) is NOT_LISTED
+    gate.prepare([ParameterWrite("FENCE_RADIUS", 0, bits(300.0))], LATEST)
+    assert covers(gate, setting("FENCE_RADIUS", 300.0)), "down again, it may be put back"
+
+
+def test_a_type_of_fence_that_is_no_number_is_none() -> None:
+    gate = session(ARDUPILOT)
+    gate.observe(pack(parameter("FENCE_TYPE", nan), component=1))
+    assert covers(gate, setting("FENCE_TYPE", 4))
+    assert gate.seal(pack(setting("FENCE_TYPE", 7)), NOW) is NOT_LISTED

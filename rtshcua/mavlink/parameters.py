@@ -1,0 +1,68 @@
+"""How the value of an autopilot's parameter stands in PARAM_SET and PARAM_VALUE, and how it is written as text.
+
+Both messages have a 32-bit float for it. PX4 puts the octets of an integer there, ArduPilot its number
+(https://mavlink.io/en/services/parameter.html, "Parameter encoding").
+"""
+
+import re
+from math import isfinite
+from struct import pack, unpack
+from typing import Final
+
+from rtshcua.mavlink.modes import PX4
+
+#: octets of a parameter's name
+NAME_OCTETS: Final = 16
+
+#: MAV_PARAM_TYPE of integers, and the bytes that they are in a float's place
+_INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
+_NAME: Final = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
+
+
+def is_name(text: str) -> bool:
+    """Whether it could be the name of a parameter."""
+    return _NAME.fullmatch(text) is not None
+
+
+def is_bytewise(autopilot: int) -> bool:
+    """Whether this MAV_AUTOPILOT has integers as their bytes."""
+    return autopilot == PX4
+
+
+def decode(raw: float, kind: int, *, bytewise: bool) -> float:
+    """The value in a message, by its MAV_PARAM_TYPE."""
+    shape = _INTEGERS.get(kind) if bytewise else None
+    return float(raw) if shape is None else float(unpack(shape, pack("<f", raw))[0])
+
+
+def encode(value: float, kind: int, *, bytewise: bool) -> float:
+    """What stands in a message for a value."""
+    shape = _INTEGERS.get(kind) if bytewise else None
+    found: float = value if shape is None else unpack("<f", pack(shape, int(value)))[0]
+    return found
+
+
+def bits_of(value: float) -> int | None:
+    """A value as the 32 bits of the float that is nearest to it; None for what is no number, or too large for one."""
+    if not isfinite(value):
+        return None
+    try:
+        (bits,) = unpack("<I", pack("<f", value + 0.0))  # -0 is 0
+    except OverflowError:
+        return None
+    return int(bits)
+
+
+def value_of(bits: int) -> float:
+    """The number that 32 bits are."""
+    return float(unpack("<f", pack("<I", bits))[0])
+
+
+def shown(bits: int) -> str:
+    """The number that 32 bits are, in as few digits as tell it from all others: 0.1, and not 0.100000001."""
+    value = value_of(bits)
+    for digits in range(6, 9):
+        text = f"{value:.{digits}g}"
+        if bits_of(float(text)) == bits:
+            return text
+    return f"{value:.9g}"

@@ -12,6 +12,7 @@ BUNDLE: Final = Domain(b"rtshcua/bundle")  # a whole bundle
 BINDING: Final = Domain(b"rtshcua/binding")  # paper symbol `B`: an invocation and all that it rests on
 ROOT: Final = Domain(b"rtshcua/root")  # the payload of a trust root
 KEY: Final = Domain(b"rtshcua/key")  # a duty and a public key
+PARAMETERS: Final = Domain(b"rtshcua/parameters")  # names of a vehicle's parameters, and their values
 
 #: length of a digest in bytes
 DIGEST_BYTES: Final = 32

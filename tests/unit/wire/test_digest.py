@@ -8,7 +8,7 @@ DOMAINS = [value for name, value in vars(digest).items() if name.isupper() and i
 
 
 def test_labels_differ_and_hold_no_separator():
-    assert len(DOMAINS) == 6
+    assert len(DOMAINS) == 7
     assert len(set(DOMAINS)) == len(DOMAINS)
     assert all(b"\0" not in label for label in DOMAINS)
 

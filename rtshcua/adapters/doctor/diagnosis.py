@@ -1,6 +1,6 @@
 """The whole diagnosis: every finding of an examination, in the order in which a person would look."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Final
 
@@ -363,11 +363,18 @@ def _settings(
     """A finding for each parameter that the vehicle has."""
     if vehicle.parameters is None:
         return
-    values, seen = vehicle.parameters.values, vehicle.seen
+    seen = vehicle.seen
     reach = Reach()
     if flown is not None and seen.located:
         here = project(policy.projection, seen.latitude, seen.longitude)
         reach = reach_of(flown.invocations, policy, here)
+    yield from settings_told(flavour, vehicle.parameters.values, policy, reach)
+
+
+def settings_told(
+    flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach = Reach()
+) -> Iterator[VehicleFinding]:
+    """A finding for each of the parameters that were read, which a mission of that reach is to fly with."""
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
     for setting in told:
         yield _setting(setting, values[setting.parameter], setting.needs(policy, reach))

@@ -284,6 +284,11 @@ class Fencing:
         return self._failure() or self._problem or "its fence is being set"
 
     @property
+    def read_back(self) -> bool:
+        """Whether the vehicle has it, item by item."""
+        return self._state is UploadState.DONE
+
+    @property
     def note(self) -> str:
         """What became of it, once nothing is outstanding."""
         fence = self._fence

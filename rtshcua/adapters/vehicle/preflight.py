@@ -92,6 +92,11 @@ class Preflight:
         ]
 
     @property
+    def fencing(self) -> Fencing:
+        """What becomes of its fence."""
+        return self._fencing
+
+    @property
     def unready(self) -> str | None:
         """What is not settled, in words."""
         return self.unplaced or self.astray or self.unread or self._fencing.unready

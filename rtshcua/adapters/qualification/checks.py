@@ -1,0 +1,495 @@
+"""The checks of a qualification: what was observed, against what the adapters and the signed vehicle take for granted.
+
+Pure: the same observations give the same checks. Each says what was expected and what was measured; one for which
+nothing was observed is unchecked, with the reason. The table of them is in docs/flying/qualify.md.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from math import hypot
+from typing import Final
+
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict
+from rtshcua.adapters.qualification.observed import (
+    ObservedCommand,
+    ObservedQualification,
+    ObservedSilence,
+    ObservedSortie,
+    ObservedTakeover,
+    Sample,
+    TakeoverKind,
+)
+from rtshcua.adapters.qualification.sortie import SILENCES_US, SORTIES
+from rtshcua.adapters.vehicle.effects import STILL, apart
+from rtshcua.adapters.vehicle.manoeuvre import RESULTS, RETRY_US
+from rtshcua.adapters.vehicle.streams import AT_TIMES, SLOW
+from rtshcua.adapters.vehicle.supervision import Brakes
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.onboard.ports import Ending
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.wire.qualification import CheckOutcome, QualificationCheck
+
+HELD, FAILED, TOLD, UNCHECKED = CheckOutcome
+_SECOND: Final = 1_000_000
+_US, _MM, _MM_S = "us", "mm", "mm/s"
+
+
+def judge(observed: ObservedQualification, policy: Policy) -> list[QualificationCheck]:
+    """Every check, in the order of the flights."""
+    return [
+        _firmware(observed),
+        *_fence(observed),
+        *_settings(observed),
+        *[_sortie(each) for each in observed.sorties],
+        *_speeds(observed, policy.vehicle),
+        *_stops(observed, policy.vehicle),
+        *_ends(observed, policy.vehicle),
+        *_answers(observed),
+        _heartbeat(observed),
+        *_takeovers(observed),
+        *_silences(observed),
+        *_streams(observed),
+    ]
+
+
+def _check(
+    slug: str, holds: bool, expected: str, measured: str, limit: int | None = None, found: int | None = None,
+    unit: str = "", advice: str = "",
+) -> QualificationCheck:  # fmt: skip
+    outcome = int(HELD if holds else FAILED)
+    return QualificationCheck(slug, outcome, expected, measured, limit, found, unit, "" if holds else advice)
+
+
+def _unchecked(slug: str, expected: str, why: str) -> QualificationCheck:
+    return QualificationCheck(slug, int(UNCHECKED), expected, why)
+
+
+def _why(observed: ObservedQualification, sortie: str) -> str:
+    """Why something of a sortie was not seen."""
+    return observed.missing.get(sortie, "it did not come to that")
+
+
+def _metres(mm: int) -> str:
+    return f"{mm / 1_000:.1f} m"
+
+
+def _speed(mm_s: int) -> str:
+    return f"{mm_s / 1_000:.1f} m/s"
+
+
+def _time(us: int) -> str:
+    return f"{us / 1_000:.0f} ms" if us < 10 * _SECOND else f"{us / _SECOND:.1f} s"
+
+
+# ---------------------------------------------------------------- what it is, and how it is set up
+
+
+def _firmware(observed: ObservedQualification) -> QualificationCheck:
+    firmware = observed.firmware
+    told = "it does not tell its version" if firmware is None else firmware.text
+    return _check("firmware/told", firmware is not None, "AUTOPILOT_VERSION", told)
+
+
+def _fence(observed: ObservedQualification) -> Iterator[QualificationCheck]:
+    slug, expected = "fence/read-back", "the airspace is uploaded, and read back the same"
+    flown = next(iter(observed.sorties), None)
+    if flown is None or flown.fence is None:
+        why = "nothing was flown" if flown is None else "its fence was left as it is"
+        yield _unchecked(slug, expected, why)
+        yield _unchecked("fence/on", "switched on in the air", why)
+        return
+    yield _check(slug, flown.fence_read, expected, flown.fence)
+    off = [
+        f"`{name}` is {'not told' if value is None else f'{value:g}'}"
+        for name, (bits, value) in flown.switches.items()
+        if value is None or int(value) & bits != bits
+    ]
+    idle = [each for each in observed.settings if each.slug in _FENCE_ACTIONS and each.verdict is not MissionVerdict.OK]
+    found = [*off, *[each.found for each in idle]]
+    advice = idle[0].advice if idle else "look at what else sets it: a switch of the remote control, a script, a mission"
+    expected = "switched on in the air, and does something"
+    yield _check("fence/on", not found, expected, "; ".join(found) or "so it is", advice=advice)
+
+
+_FENCE_ACTIONS: Final = ("settings/gf_action", "settings/fence_action")
+
+
+def _settings(observed: ObservedQualification) -> Iterator[QualificationCheck]:
+    """What the doctor finds; nothing rests on what it warns of."""
+    well = 0
+    for each in observed.settings:
+        if each.verdict is MissionVerdict.OK:
+            well += 1
+            continue
+        if each.slug == "settings/fence_enable":
+            continue  # a flight of ours switches it on
+        outcome = FAILED if each.verdict is MissionVerdict.STOP else TOLD
+        yield QualificationCheck(each.slug, int(outcome), each.needed, each.found, advice=each.advice)
+    if well:
+        yield _check("settings/others", True, "nothing that interferes", f"{well} more parameters, of which none does")
+    elif not observed.settings:
+        yield _unchecked("settings/others", "nothing that interferes", "none of its parameters was told")
+
+
+# ---------------------------------------------------------------- how a sortie went
+
+_PLANNED: Final = {
+    each.name: Ending.COMPLETED if each.takeover is None else Ending.STOOD_DOWN for each in SORTIES
+}  # fmt: skip
+
+
+def _sortie(flown: ObservedSortie) -> QualificationCheck:
+    """Whether it went as planned: each of its commands did what it reported, and it is down."""
+    failed = [each for each in flown.commands if each.how not in ("succeeded", "replaced", "taken-over", "")]
+    planned = _PLANNED[flown.name]
+    pauses = flown.takeover is not None and flown.takeover.kind is TakeoverKind.PAUSE
+    well = flown.down and flown.ending == planned and (pauses or not failed)
+    words = [f"`{each.skill}` {each.how}" for each in failed] + ([] if flown.down else ["it was not seen to be down"])
+    measured = "; ".join([flown.ending, *words])
+    return _check(f"sortie/{flown.name}", well, f"{planned}, and down", measured)
+
+
+# ---------------------------------------------------------------- speeds
+
+#: 1/100 of what was declared or asked for, and mm/s more, that gusts and reports may make of a speed
+_MORE, _NOISE = 110, 300
+#: the least, in 1/100: of the climb that is declared, by which climbs are timed; of the speed that was asked for
+_CLIMBS, _FLIES = 33, 50
+_RISES: Final = 300  # mm/s
+
+
+def _speeds(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
+    climbs = [pair for pair in _flown(observed, MotionKind.CLIMB) if len(pair[1]) > 1]
+    most, least = vehicle.climb * _MORE // 100 + _NOISE, vehicle.climb * _CLIMBS // 100
+    expected = f"{_speed(least)} to {_speed(most)} (the policy: at most {_speed(vehicle.climb)})"
+    if climbs:
+        peak = max(sample.climb for _, samples in climbs for sample in samples)
+        mean = min(_mean_climb(samples) for _, samples in climbs)
+        slow = mean < least
+        measured = f"{_speed(mean)} on average, {_speed(peak)} at the most"
+        advice = "declare the `climb` that it has, or raise the autopilot's (`rtshcua doctor` names the parameter)"
+        limit, found = (least, mean) if slow else (most, peak)
+        yield _check("climb/speed", not slow and peak <= most, expected, measured, limit, found, _MM_S, advice)
+    else:
+        yield _unchecked("climb/speed", expected, _why(observed, "climb"))
+    legs = [pair for pair in _flown(observed, MotionKind.FLY) if len(pair[1]) > 1]
+    if not legs:
+        yield _unchecked("fly/speed", f"at most {_speed(vehicle.speed)}", _why(observed, "leg"))
+        return
+    asked = legs[0][0].speed
+    peak = max(sample.speed for _, samples in legs for sample in samples)
+    most = min(asked or vehicle.speed, vehicle.speed) * _MORE // 100 + _NOISE
+    least = asked * _FLIES // 100
+    advice = "the path of a flight and what it can still stop within are worked out from these speeds"
+    expected = f"{_speed(least)} to {_speed(most)} (asked for: {_speed(asked)})"
+    yield _check("fly/speed", least <= peak <= most, expected, _speed(peak), most, peak, _MM_S, advice)
+
+
+def _mean_climb(samples: Sequence[Sample]) -> int:
+    rising = [each for each in samples if each.climb >= _RISES] or list(samples)
+    passed = rising[-1].at_us - rising[0].at_us
+    return (rising[-1].height - rising[0].height) * _SECOND // passed if passed else 0
+
+
+def _flown(observed: ObservedQualification, kind: MotionKind) -> list[tuple[ObservedCommand, list[Sample]]]:
+    """The commands of a kind that were sent, and the samples while each flew."""
+    return [
+        (command, _while(sortie, command))
+        for sortie in observed.sorties
+        for command in sortie.commands
+        if command.kind == kind and command.sent_us is not None
+    ]
+
+
+def _while(sortie: ObservedSortie, command: ObservedCommand) -> list[Sample]:
+    since, until = command.sent_us or command.begun_us, command.ended_us
+    return [each for each in sortie.samples if since <= each.at_us and (until is None or each.at_us <= until)]
+
+
+# ---------------------------------------------------------------- stopping, and staying there
+
+#: us of way that reports are late, and mm that they are off
+_LATE_US: Final = 200_000
+_OFF: Final = 500
+#: mm that a vehicle which holds may stray in any case
+_STRAYS: Final = 2_000
+
+
+def _stops(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
+    brakes = Brakes.of(vehicle)
+    for name, motion in (("climb", MotionKind.CLIMB), ("leg", MotionKind.FLY)):
+        slug = f"stop/{motion.name.lower()}"
+        flown, hold = observed.sortie(name), None
+        if flown is not None:
+            hold = next(
+                (
+                    after
+                    for before, after in pairwise(flown.commands)
+                    if before.kind == motion and before.shortened and after.kind == MotionKind.HOLD
+                ),
+                None,
+            )
+        if flown is None or hold is None or hold.sent_us is None or not _while(flown, hold):
+            yield _unchecked(slug, "stops as `brakes` declares", _why(observed, name))
+            yield _unchecked(f"hold/{motion.name.lower()}", "stays where it stopped", _why(observed, name))
+            continue
+        yield _stop(slug, flown, hold, brakes, declared=bool(vehicle.braking))
+        yield _hold(f"hold/{motion.name.lower()}", _while(flown, hold), max(vehicle.position_error, _STRAYS))
+
+
+def _stop(
+    slug: str, flown: ObservedSortie, hold: ObservedCommand, brakes: Brakes, *, declared: bool
+) -> QualificationCheck:
+    told_us, samples = hold.sent_us or 0, _while(flown, hold)
+    begins_us = told_us + brakes.reaction_us
+    near = [each for each in flown.samples if told_us - 2 * _LATE_US <= each.at_us <= begins_us]
+    speed = max(map(_whole_speed, near or samples[:1]))
+    limit = speed * brakes.reaction_us // _SECOND + speed * speed // (2 * brakes.braking)
+    limit += speed * _LATE_US // _SECOND + _OFF
+    within_us = brakes.stands_us(speed)
+    stood = _stood(samples)
+    until = samples if stood is None else samples[: stood + 1]
+    way = max(_way(samples[0], each) for each in until)
+    whose = "`brakes`" if declared else "no `brakes` declared: taken for 1 m/s^2 after 1 s"
+    expected = f"within {_metres(limit)} and {_time(within_us)} from {_speed(speed)} ({whose})"
+    advice = "declare `brakes` a little worse than the worst that was measured, in a new version of the policy"
+    if stood is None:
+        measured = f"it does not stop: {_metres(way)} on, it flies at {_speed(_whole_speed(samples[-1]))}"
+        return _check(slug, False, expected, measured, limit, way, _MM, "nothing may rest on its hold: do not fly it")
+    took_us = samples[stood].at_us - told_us
+    holds = way <= limit and took_us <= within_us
+    return _check(slug, holds, expected, f"{_metres(way)} in {_time(took_us)}", limit, way, _MM, advice)
+
+
+def _stood(samples: Sequence[Sample]) -> int | None:
+    """From which sample on it stands; None where it does not."""
+    moving = [number for number, each in enumerate(samples) if _whole_speed(each) > STILL]
+    stood = moving[-1] + 1 if moving else 0
+    return stood if stood < len(samples) else None
+
+
+def _hold(slug: str, samples: Sequence[Sample], limit: int) -> QualificationCheck:
+    expected, stood = f"stays within {_metres(limit)} of where it stopped", _stood(samples)
+    if stood is None:
+        return _check(slug, False, expected, "it does not come to stand")
+    strays = max(_way(samples[stood], each) for each in samples[stood:])
+    return _check(slug, strays <= limit, expected, _metres(strays), limit, strays, _MM)
+
+
+def _whole_speed(sample: Sample) -> int:
+    return round(hypot(sample.speed, sample.climb))
+
+
+def _way(one: Sample, other: Sample) -> int:
+    return round(hypot(_across(one, other), one.height - other.height))
+
+
+def _across(one: Sample, other: Sample) -> int:
+    return round(apart(other.latitude, other.longitude, one.latitude, one.longitude))
+
+
+# ---------------------------------------------------------------- return and landing
+
+#: mm that a return may end from home, and a landing from where it began, on top of the position error
+_ENDS: Final = 2_000
+
+
+def _ends(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
+    limit = vehicle.position_error + _ENDS
+    yield _ended(
+        observed, "return/home", "leg", MotionKind.HOME, limit, f"lands within {_metres(limit)} of home, and disarms",
+        lambda flown, _: flown.samples[0],
+    )
+    yield _highest(observed, vehicle)
+    yield _ended(
+        observed, "land/down", "climb", MotionKind.LAND, limit,
+        f"lands within {_metres(limit)} of where it began to, and disarms", lambda _, samples: samples[0],
+    )  # fmt: skip
+
+
+def _ended(
+    observed: ObservedQualification, slug: str, name: str, kind: MotionKind, limit: int, expected: str,
+    to: Callable[[ObservedSortie, Sequence[Sample]], Sample],
+) -> QualificationCheck:  # fmt: skip
+    flown = observed.sortie(name)
+    command = None if flown is None else next((each for each in flown.commands if each.kind == kind), None)
+    samples = [] if flown is None or command is None else _while(flown, command)
+    if flown is None or command is None or not samples:
+        return _unchecked(slug, expected, _why(observed, name))
+    off = _across(samples[-1], to(flown, samples))
+    took = _time(samples[-1].at_us - samples[0].at_us)
+    down = command.how == "succeeded" and flown.down
+    measured = f"{_metres(off)} off, after {took}" if down else f"{command.how or 'not ended'}, {_metres(off)} off"
+    advice = "the last links of every chain rest on it: do not fly it"
+    return _check(slug, down and off <= limit, expected, measured, limit, off, _MM, advice)
+
+
+def _highest(observed: ObservedQualification, vehicle: Vehicle) -> QualificationCheck:
+    slug, flown = "return/height", observed.sortie("leg")
+    command = None if flown is None else next((each for each in flown.commands if each.kind == MotionKind.HOME), None)
+    samples = [] if flown is None or command is None else _while(flown, command)
+    if not vehicle.return_altitude or not samples:
+        why = _why(observed, "leg") if vehicle.return_altitude else "the policy declares no `return at`"
+        return _unchecked(slug, "returns no higher than declared", why)
+    limit = max(vehicle.return_altitude, samples[0].height) + _ENDS
+    highest = max(each.height for each in samples)
+    expected = f"no higher than {_metres(limit)} (`return at {vehicle.return_altitude / 1_000:g} m`)"
+    return _check(slug, highest <= limit, expected, _metres(highest), limit, highest, _MM)
+
+
+# ---------------------------------------------------------------- answers
+
+
+def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
+    answers = [each for sortie in observed.sorties for each in sortie.answers]
+    if not answers:
+        yield _unchecked("answers/come", "each command is acknowledged", "nothing was commanded")
+        return
+    silent = sorted({each.command for each in answers if each.answered_us is None})
+    expected, words = "each command is acknowledged", f"{len(answers)} of {len(answers)}"
+    lost = sum(each.answered_us is None for each in answers)
+    if silent:
+        words = f"{len(answers) - lost} of {len(answers)}; none for MAV_CMD {', '.join(map(str, silent))}"
+    advice = "commands are sent again, and their failure is told later: look at the link first"
+    yield _check("answers/come", not silent, expected, words, 0, lost, "", advice)
+    times = [each.answered_us - each.sent_us for each in answers if each.answered_us is not None]
+    if times:
+        latest = max(times)
+        expected = f"within {_time(RETRY_US)}: then it is sent again"
+        yield _check("answers/late", latest <= RETRY_US, expected, _time(latest), RETRY_US, latest, _US)
+    refused = sorted({(each.command, each.result) for each in answers if each.result})
+    told = ", ".join(f"MAV_CMD {command} {RESULTS.get(result or 0, result)}" for command, result in refused)
+    yield _check("answers/accepted", not refused, "accepted", told or "all")
+
+
+# ---------------------------------------------------------------- who flies it
+
+#: of 100 gaps between heartbeats so many are no longer than the limit: a frame may be lost
+_MOST_GAPS: Final = 95
+#: us without progress after which a leg counts as stopped short, and by when that is told
+_STALLS_US: Final = 8 * _SECOND
+
+
+def _heartbeat(observed: ObservedQualification) -> QualificationCheck:
+    slug, limit = "heartbeat/asked", _within_us(observed)
+    gaps = [
+        later - earlier
+        for sortie in observed.sorties
+        for earlier, later in pairwise(sortie.beats)
+        if not any(_overlaps(each, earlier, later) for each in sortie.silences)
+    ]
+    expected = f"every {_time(limit)} while it flies, asked for"
+    if not gaps:
+        return _unchecked(slug, expected, "none came in the air")
+    most = sorted(gaps)[-(-len(gaps) * _MOST_GAPS // 100) - 1]
+    advice = "no frame that begins a motion leaves before the mode was told: it flies on, and each step begins late"
+    return _check(slug, most <= limit, expected, f"{_MOST_GAPS} % within {_time(most)}", limit, most, _US, advice)
+
+
+def _overlaps(silence: ObservedSilence, since: int, until: int) -> bool:
+    end = silence.ended_us if silence.fresh_us is None else silence.fresh_us
+    return since <= (end or until) and until >= silence.began_us
+
+
+def _within_us(observed: ObservedQualification) -> int:
+    """W: by when a takeover shows, with the link's delay (docs/adr/0034)."""
+    return observed.mode_within_us + (observed.round_trip_us or 0)
+
+
+def _takeovers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
+    for kind in TakeoverKind:
+        slug, flown = f"takeover/{kind}", observed.sortie(kind)
+        takeover = None if flown is None else flown.takeover
+        if flown is None or takeover is None:
+            yield _unchecked(slug, "it shows, and nothing more is sent", _why(observed, kind))
+        else:
+            yield _takeover(slug, flown, takeover, observed)
+
+
+def _takeover(
+    slug: str, flown: ObservedSortie, takeover: ObservedTakeover, observed: ObservedQualification
+) -> QualificationCheck:
+    sent, shown = takeover.sent_us, takeover.shown_us
+    if sent is None:  # by a pilot: nobody knows when
+        found = "it did not show" if shown is None else f"it showed, as {takeover.how}; how late is not known"
+        return _check(slug, shown is not None and flown.ending == Ending.STOOD_DOWN, "it shows", found)
+    limit = _within_us(observed)
+    stalls = takeover.kind is TakeoverKind.PAUSE and takeover.how == "stopped-short"
+    if stalls:  # ArduCopter's pause changes neither mode nor target: it is no progress (docs/adr/0034)
+        limit = _STALLS_US + 2 * _SECOND + observed.mode_within_us
+    expected = f"it shows within {_time(limit)}, and nothing that moves it is sent after"
+    advice = "a pilot would be flown over: do not fly it"
+    if shown is None:
+        return _check(slug, False, expected, "it did not show", limit, None, _US, advice)
+    late = shown - sent
+    if takeover.kind is TakeoverKind.MODE:
+        late = max(late, (takeover.mode_us or shown + limit) - sent)
+    moved = takeover.moved_us is not None and takeover.moved_us - sent > limit and not stalls
+    measured = f"after {_time(late)}, as {takeover.how}"
+    if takeover.kind is TakeoverKind.MODE and takeover.mode_us is None:
+        measured = f"as {takeover.how} alone: no heartbeat told the mode"
+    if moved:
+        measured += f"; something that moves it was sent {_time((takeover.moved_us or 0) - sent)} after"
+    return _check(slug, late <= limit and not moved, expected, measured, limit, late, _US, advice)
+
+
+# ---------------------------------------------------------------- silences
+
+#: us after which a link counts as silent, and what looking for it takes
+_SILENT_US: Final = _SECOND
+_LOOKS_US: Final = 300_000
+
+
+def _silences(observed: ObservedQualification) -> Iterator[QualificationCheck]:
+    flown = observed.sortie("leg")
+    found = {} if flown is None else {each.for_us: each for each in flown.silences}
+    fresh_us = Limits().fresh_us
+    for for_us in SILENCES_US:
+        slug = f"silence/{for_us // _SECOND}s"
+        expected = f"it goes on holding, and all is fresh within {_time(fresh_us)}"
+        silence = found.get(for_us)
+        if silence is None:
+            yield _unchecked(slug, expected, _why(observed, "leg"))
+            continue
+        ended = silence.ended_us
+        if ended is None or silence.fresh_us is None:
+            yield _check(slug, False, expected, "not all that came before came again")
+            continue
+        late = silence.fresh_us - ended
+        told = for_us <= _SILENT_US + _LOOKS_US or (
+            silence.lost_us is not None
+            and silence.lost_us - silence.began_us <= _SILENT_US + _LOOKS_US
+            and silence.back_us is not None
+        )
+        words = ["" if silence.kept else "it does not hold any more", "" if told else "it was not told"]
+        measured = "; ".join([f"fresh after {_time(late)}", *filter(None, words)])
+        yield _check(slug, silence.kept and told and late <= fresh_us, expected, measured, fresh_us, late, _US)
+
+
+# ---------------------------------------------------------------- streams
+
+
+def _streams(observed: ObservedQualification) -> Iterator[QualificationCheck]:
+    """What comes at less than half the rate asked for; the heartbeat is asked for besides, and has a check of its own."""
+    slow: dict[str, tuple[int, int | None]] = {}
+    measured = 0
+    for sortie in observed.sorties:
+        if not any(came for _, came in sortie.streams.values()):
+            continue
+        measured += 1
+        for name, (asked, came) in sortie.streams.items():
+            if name in AT_TIMES or name == "HEARTBEAT":
+                continue
+            if came is None or came > SLOW * asked:
+                slow[name] = asked, came
+    expected = "each at half the rate asked for, at the least"
+    if not measured:
+        yield _unchecked("streams/delivered", expected, "not measured")
+        return
+    found = [
+        f"{name} {'never' if came is None else f'every {came // 1_000} ms'}, asked for every {asked // 1_000} ms"
+        for name, (asked, came) in sorted(slow.items())
+    ]
+    advice = "docs/flying/link.md: what limits the rates"
+    yield _check("streams/delivered", not found, expected, "; ".join(found) or "all", advice=advice)

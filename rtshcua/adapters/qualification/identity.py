@@ -1,0 +1,76 @@
+"""What an autopilot is: its version, and the parameters that matter, asked for on the ground."""
+
+import struct
+from collections.abc import Mapping
+from typing import Any, Final
+
+from rtshcua.adapters.doctor.settings import SETTINGS
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour
+from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.wire.qualification import Firmware
+
+_ASK_US: Final = 1_000_000
+#: one that is not answered so often is not told
+_TRIES: Final = 5
+
+
+def firmware_of(flavour: str, version: Any) -> Firmware:
+    """What AUTOPILOT_VERSION tells."""
+    return Firmware(flavour, version.flight_sw_version, bytes(version.flight_custom_version))
+
+
+def as_octets(value: float) -> bytes:
+    """The value of a parameter as a record has it: no float is signed."""
+    return struct.pack(">d", value)
+
+
+def those_that_matter(flavour: AutopilotFlavour, values: Mapping[str, float]) -> dict[str, bytes]:
+    """Of the parameters that were read those that a qualification is about. What a run itself switches is none."""
+    switched = {name for name, _ in flavour.fence.switches}
+    named = [setting.parameter for setting in SETTINGS[flavour.name] if setting.parameter not in switched]
+    return {name: as_octets(values[name]) for name in sorted(named) if name in values}
+
+
+class IdentityQuestions:
+    """Asks for them, one request each until it is answered."""
+
+    def __init__(self, flavour: AutopilotFlavour, slack: int = 1) -> None:
+        self._flavour = flavour
+        self._slack = slack
+        self.values = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
+        for setting in SETTINGS[flavour.name]:
+            self.values.read(setting.parameter)
+        self._asked_us: int | None = None
+        self._asked = 0
+        #: None before it was told
+        self.firmware: Firmware | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether all was answered, or asked for often enough."""
+        told = self.firmware is not None or self._asked > _TRIES
+        each = (setting.parameter for setting in SETTINGS[self._flavour.name])
+        return told and all(self.values.is_settled(name) or self.values.is_absent(name) for name in each)
+
+    @property
+    def parameters(self) -> dict[str, bytes]:
+        """Those that matter, as far as they were told."""
+        return those_that_matter(self._flavour, self.values.values)
+
+    def due(self, system: int, now_us: int) -> list[Message]:
+        """What to ask now."""
+        out = self.values.due(system, now_us)
+        again = self._asked_us is None or now_us - self._asked_us >= _ASK_US * self._slack
+        if self.firmware is None and self._asked <= _TRIES and again:
+            self._asked_us, self._asked = now_us, self._asked + 1
+            out.append(messages.request(system, "AUTOPILOT_VERSION"))
+        return out
+
+    def take(self, name: str, message: Any) -> None:
+        """A message of the autopilot."""
+        if name == "PARAM_VALUE":
+            self.values.take(message)
+        elif name == "AUTOPILOT_VERSION":
+            self.firmware = firmware_of(self._flavour.name, message)

@@ -1,0 +1,56 @@
+"""A second ground station, which takes the vehicle over in a simulation: what a pilot would do, as frames of its own.
+
+It is not ours: its frames have its own system and component, and pass no gate, as those of any ground station do. It is
+made for a simulation alone, where whoever runs it said so. It sends no heartbeat, so that no loss is hidden.
+"""
+
+from typing import Any, Final
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from rtshcua.adapters.qualification.observed import TakeoverKind
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.modes import PX4, CopterMode, Px4Mode
+
+_SYSTEM: Final = 255
+_COMPONENT: Final = dialect.MAV_COMP_ID_MISSIONPLANNER
+_PAUSE: Final = 0.0  # of DO_PAUSE_CONTINUE
+
+
+class GroundStation:
+    """Speaks to one autopilot."""
+
+    def __init__(self, autopilot: int, system: int) -> None:
+        self._autopilot = autopilot
+        self._system = system
+        self._codec = Codec(_SYSTEM, _COMPONENT)
+
+    def takes_over(self, kind: TakeoverKind, home: tuple[int, int], seen: ObservedVehicle) -> list[bytes]:
+        """The frames that take it over; to a target: back home, at the height that it has."""
+        match kind:
+            case TakeoverKind.MODE:
+                return self._sets(Px4Mode.RETURN if self._autopilot == PX4 else CopterMode.RTL)
+            case TakeoverKind.PAUSE:
+                return [self._codec.pack(self._pause())]
+            case TakeoverKind.TARGET:
+                return [self._codec.pack(self._target(home, seen))]
+
+    def lands(self) -> list[bytes]:
+        """The frames that have it land where it is."""
+        return self._sets(Px4Mode.LAND if self._autopilot == PX4 else CopterMode.LAND)
+
+    def _sets(self, mode: Px4Mode | CopterMode) -> list[bytes]:
+        return [self._codec.pack(messages.set_mode(self._system, mode))]
+
+    def _pause(self) -> Any:
+        """PX4's ground stations pause with a reposition to no place, ArduPilot's with the command for it."""
+        if self._autopilot == PX4:
+            return messages.stop_here(self._system)
+        return messages.command(self._system, dialect.MAV_CMD_DO_PAUSE_CONTINUE, _PAUSE)
+
+    def _target(self, home: tuple[int, int], seen: ObservedVehicle) -> Any:
+        if self._autopilot == PX4:
+            return messages.reposition_amsl(self._system, *home, seen.amsl(seen.height) / 1_000, 0)
+        return messages.position_target(self._system, *home, seen.height / 1_000)

@@ -150,6 +150,16 @@ def _sortie(flown: ObservedSortie) -> QualificationCheck:
     return _check(f"sortie/{flown.name}", well, f"{planned}, and down", measured)
 
 
+def ends_after(flown: ObservedSortie) -> str | None:
+    """Why no other sortie is flown after this one, in words; None where it went as planned. What did not is not tried
+    further: somebody took over, something failed, or it is not down.
+    """
+    check = _sortie(flown)
+    if check.outcome == HELD:
+        return None
+    return f"not flown, for sortie `{flown.name}` did not go as planned: {check.measured}"
+
+
 # ---------------------------------------------------------------- speeds
 
 #: 1/100 of what was declared or asked for, and mm/s more, that gusts and reports may make of a speed

@@ -30,6 +30,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.effects import Effect, apart
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
 from rtshcua.adapters.vehicle.link import Heard
+from rtshcua.adapters.vehicle.manoeuvre import LATE_US
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
@@ -236,7 +237,9 @@ class QualifyingDriver(Driver):
         came = {} if requests.measured is None else requests.measured[1]
         found.streams = {name: (us, came.get(name)) for name, us in requests.plan.intervals.items()}
         fencing = self.preflight.fencing
-        found.fence, found.fence_read = fencing.note if self._fenced else None, fencing.read_back
+        found.fence, found.fence_read = None, fencing.read_back
+        if self._fenced:
+            found.fence = fencing.unready or fencing.note
         values = None if self.questions is None else self.questions.values.values
         found.switches = {
             name: (bits, None if values is None else values.get(name)) for name, bits in self.flavour.fence.switches
@@ -311,9 +314,13 @@ class QualifyingDriver(Driver):
                 self._silent.fresh_us = now_us
 
     def _answered(self, command: int, result: int, now_us: int) -> None:
-        waiting = [each for each in self.found.answers if each.command == command and each.answered_us is None]
+        waiting = [
+            each
+            for each in self.found.answers
+            if each.command == command and each.answered_us is None and now_us - each.sent_us <= LATE_US
+        ]
         if waiting and result != _IN_PROGRESS:
-            waiting[-1].answered_us, waiting[-1].result = now_us, result
+            waiting[0].answered_us, waiting[0].result = now_us, result
 
     def _note(self, events: Sequence[Event], now_us: int) -> None:
         for event in events:

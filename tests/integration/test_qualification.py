@@ -1,0 +1,111 @@
+"""`qualify` in virtual time: the right vehicles hold each check, and each wrong one fails the check made for it."""
+
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from rtshcua.adapters.qualification.sortie import SILENCES_US, SORTIES
+from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
+from rtshcua.wire.qualification import CheckOutcome, QualificationCheck
+from virtual import wrong_vehicles as wrong
+from virtual.qualifying import Qualifying
+
+FLAVOURS = ("px4", "ardupilot")
+NAMED = {each.name: each for each in SORTIES}
+#: no longer than this in the air, in seconds
+MOST_S = 300
+
+
+@cache
+def right(flavour: str) -> tuple[Qualifying, dict[str, QualificationCheck]]:
+    """The whole of it, once for all that is asked of it."""
+    flown = Qualifying(flavour)
+    return flown, {each.slug: each for each in flown.fly()}
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_right_vehicle_holds_every_check(flavour: str) -> None:
+    _, checks = right(flavour)
+    failed = {slug: each for slug, each in checks.items() if each.outcome in (CheckOutcome.FAILED, CheckOutcome.UNCHECKED)}
+    assert not failed
+    assert len(checks) >= 28
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_it_takes_less_than_five_minutes_of_flight(flavour: str) -> None:
+    flown, _ = right(flavour)
+    assert sum(each.airborne_us for each in flown.observed.sorties) < MOST_S * SECOND
+    # nor does it stand about: from the first heartbeat to the last landing
+    assert flown.elapsed_us < MOST_S * SECOND
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_each_sortie_is_a_flight_with_a_log_that_verifies(flavour: str) -> None:
+    """What moved the vehicle was permitted and recorded: the audit decides each record again."""
+    flown, _ = right(flavour)
+    assert len(flown.flights) == len(SORTIES)
+    for flight in flown.flights:
+        assert flight.audit().report.failure is None
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_it_measures_what_flew(flavour: str) -> None:
+    """The figures are the simulated vehicle's own: it flies at 5 m/s, returns at 30 m, and is silenced thrice."""
+    flown, checks = right(flavour)
+    assert checks["return/height"].found == pytest.approx(30_000, abs=500)
+    assert checks["fly/speed"].found == pytest.approx(4_800, abs=300)
+    leg = flown.observed.sortie("leg")
+    assert leg is not None
+    assert [each.for_us for each in leg.silences] == list(SILENCES_US)
+    assert [each.lost_us is None for each in leg.silences] == [True, False, False]
+
+
+WRONG: tuple[tuple[Callable[[VirtualVehicle], None], str, str, str], ...] = (
+    (wrong.hold_that_does_not_stop, "px4", "leg", "stop/fly"),
+    (wrong.hold_that_does_not_stop, "ardupilot", "leg", "stop/fly"),
+    (wrong.hold_that_does_not_stop, "ardupilot", "climb", "stop/climb"),
+    (wrong.hold_that_drifts, "px4", "climb", "hold/climb"),
+    (wrong.late_heartbeat, "px4", "mode", "takeover/mode"),
+    (wrong.seldom_heartbeat, "ardupilot", "climb", "heartbeat/asked"),
+    (wrong.fence_switched_off, "ardupilot", "climb", "fence/on"),
+    (wrong.fence_that_keeps_other_items, "px4", "climb", "fence/read-back"),
+    (wrong.silent_mode_change, "px4", "mode", "takeover/mode"),
+    (wrong.silent_mode_change, "ardupilot", "mode", "takeover/mode"),
+    (wrong.target_never_told, "px4", "pause", "takeover/pause"),
+    (wrong.target_never_told, "ardupilot", "target", "takeover/target"),
+    (wrong.slow_climb, "px4", "climb", "climb/speed"),
+    (wrong.fast_leg, "ardupilot", "leg", "fly/speed"),
+    (wrong.return_that_does_not_move, "px4", "leg", "return/home"),
+    (wrong.landing_that_does_not_descend, "ardupilot", "climb", "land/down"),
+    (wrong.answers_that_never_come, "ardupilot", "climb", "answers/come"),
+    (wrong.answers_that_come_late, "px4", "climb", "answers/late"),
+    (wrong.stream_at_a_third, "px4", "climb", "streams/delivered"),
+    (wrong.returns_when_we_are_silent, "px4", "leg", "silence/3s"),
+    (wrong.silent_version, "px4", "climb", "firmware/told"),
+)
+
+
+@pytest.mark.parametrize(("habit", "flavour", "sortie", "slug"), WRONG, ids=lambda each: getattr(each, "__name__", each))
+def test_a_wrong_vehicle_is_noticed(
+    habit: Callable[[VirtualVehicle], None], flavour: str, sortie: str, slug: str
+) -> None:
+    flown = Qualifying(flavour, habit)
+    checks = {each.slug: each for each in flown.fly([NAMED[sortie]])}
+    assert checks[slug].outcome == CheckOutcome.FAILED, checks[slug]
+    assert right(flavour)[1][slug].outcome == CheckOutcome.HELD
+    assert flown.observed.sorties[0].down, "whatever is wrong with it, it was brought down"
+
+
+def test_a_fence_that_does_nothing_is_noticed() -> None:
+    checks = {each.slug: each for each in Qualifying("px4", parameters=(("GF_ACTION", 0),)).fly([NAMED["climb"]])}
+    assert checks["fence/on"].outcome == CheckOutcome.FAILED
+    assert "set `GF_ACTION` to 2" in checks["fence/on"].advice
+
+
+def test_nothing_is_flown_after_a_sortie_that_did_not_go_as_planned() -> None:
+    flown = Qualifying("px4", wrong.landing_that_does_not_descend)
+    checks = {each.slug: each for each in flown.fly(SORTIES)}
+    assert [each.name for each in flown.observed.sorties] == ["climb"]
+    assert checks["return/home"].outcome == CheckOutcome.UNCHECKED
+    assert "sortie `climb` did not go as planned" in checks["return/home"].measured

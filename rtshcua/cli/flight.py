@@ -164,6 +164,11 @@ class Flight:
         """Whether the bundle may not fly any more, after the flight."""
         return self._runtime.used_up
 
+    @property
+    def final_hash(self) -> str:
+        """The hash of the last line of its log."""
+        return self._recorder.final_hash
+
     def _plan(self) -> Plan:
         bundle = self._loaded.bundle
         return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._speed)

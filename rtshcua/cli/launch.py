@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore
@@ -42,6 +42,8 @@ from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.ports import Ending
 from rtshcua.onboard.rehearsal import stranded
@@ -63,13 +65,27 @@ _TOO_SLOW = "a faster link, or longer deadlines and times to stale in the policy
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
 
 
+class Sortied(Protocol):
+    """A flight of a qualification: a driver of its own, and what is done before the link is closed."""
+
+    def driver(self, policy: Policy, frames: Gate, slack: int, **more: Any) -> Driver:
+        """The driver that flies it."""
+        ...
+
+    def after(
+        self, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, ending: Ending, final_hash: str
+    ) -> None:
+        """The flight ended so, and its log ends in the line of this hash."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Launch:
     """What `run` was asked for. `link` None: the simulated vehicle is started with the options in `simulator`.
 
     `roots`: the trust root, and before it those that lead to it from the one that the vehicle accepted last; none for
     the key store's. `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
-    `utc_error_us`: what the operator says that UTC is off by at most.
+    `utc_error_us`: what the operator says that UTC is off by at most. `sortie`: it is one of a qualification.
     """
 
     bundle: Path
@@ -94,6 +110,7 @@ class Launch:
     witnesses: tuple[Address, ...] = ()
     incidents: "Incidents | None" = None
     utc_error_us: int | None = None
+    sortie: Sortied | None = None
 
 
 def launch(order: Launch) -> ExitCode:
@@ -157,6 +174,8 @@ def launch(order: Launch) -> ExitCode:
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
             code, summary = flight.fly()
+            if order.sortie is not None:
+                order.sortie.after(vehicle, clock, interrupts, Ending(summary.ending), flight.final_hash)
             if not resumed and (kept := give_back(order.state, loaded, flight)) is not None:
                 feed.post(Note(kept))
             if order.incidents is not None:
@@ -347,7 +366,8 @@ def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driv
     except BrokenPack as error:
         raise Refused(ExitCode.REFUSED, "broken-pack", error.text) from None
     try:
-        return Driver(
+        make = Driver if order.sortie is None else order.sortie.driver
+        return make(
             policy,
             loaded.executor.frames,
             slack,

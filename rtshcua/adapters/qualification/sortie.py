@@ -123,7 +123,8 @@ def _is_under_way(start: tuple[int, int], command: Command, seen: ObservedVehicl
     if not seen.located or seen.speed is None:
         return False
     flown = apart(seen.latitude, seen.longitude, *start)
-    whole = apart(*command.geo[-2:], *start)
+    latitude, longitude = command.geo[-2:]
+    whole = apart(latitude, longitude, *start)
     fast = bool(command.speed) and 100 * seen.speed >= _FAST * command.speed
     return (fast and flown >= min(_FLOWN, whole * _MOST / 100)) or flown >= whole * _MOST / 100
 

@@ -1,0 +1,422 @@
+"""`rtshcua qualify`: a flight test of the autopilot itself, and the signed record of it."""
+
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import msgspec
+import typer
+
+from rtshcua import __version__
+from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.doctor.diagnosis import settings_told
+from rtshcua.adapters.files.folders import data_folder, state_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.qualifications import keep_record
+from rtshcua.adapters.qualification.checks import ends_after, judge
+from rtshcua.adapters.qualification.missions import NAME, Trial, source_of, trials
+from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
+from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
+from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import Address, AddressError, Way
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.cli.clock_error import duration_us, utc_error_text
+from rtshcua.cli.faults import code_of, fail, misaddressed, tell, untrusted
+from rtshcua.cli.findings import Findings, exit_code
+from rtshcua.cli.flight import EXIT_CODES
+from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.launch import Launch, Refused, launch
+from rtshcua.cli.sources import compile_sources, read_text
+from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
+from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.compiler.program import Compiled, compile_program
+from rtshcua.ground.compiler.sign import sign
+from rtshcua.mavlink import dialect
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.enforcement.frames import Gate
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import Ending
+from rtshcua.wire.bundle import policy_digest, policy_payload
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.qualification import (
+    CheckOutcome,
+    Firmware,
+    Qualification,
+    QualificationCheck,
+    parameters_digest,
+    sign_qualification,
+)
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+#: s that a vehicle which somebody else flies is watched until it is down
+_LANDS_S: Final = 180.0
+_POLL_S: Final = 0.05
+#: nothing is recorded of a qualification that ends so: it says nothing of the autopilot
+_BROKEN_OFF: Final = (
+    Ending.INTERRUPTED, Ending.REFUSED, Ending.LINK_LOST, Ending.EVIDENCE_LOST, Ending.RECALLED, Ending.STOOD_DOWN,
+)  # fmt: skip
+_CONSENT_HELP: Final = (
+    "`--sitl`: it is a simulation, and a second ground station takes it over; `--pilot NAME`: it is a real vehicle, and "
+    "this pilot consents, with the mode switch in hand"
+)
+
+
+@app.command()
+def qualify(
+    source: Annotated[Path, typer.Argument(help="a source with a mission (.rts): the sorties fly under its policy")],
+    connect: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="the vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
+        ),
+    ],
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is, as its policy says")],
+    sitl: Annotated[
+        bool, typer.Option("--sitl", help="it is a simulation: a second ground station takes it over")
+    ] = False,
+    pilot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="it is a real vehicle, and this pilot consents, switch in hand")
+    ] = None,
+    takeover: Annotated[
+        bool, typer.Option("--takeover", help="with --pilot: ask the pilot to take over, and wait for it")
+    ] = False,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="SORTIE", help="fly these sorties alone (repeatable)")
+    ] = None,
+    mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
+    speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")] = None,
+    signing_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="the link's key: sign what is sent, believe nothing unsigned")
+    ] = None,
+    unsigned_radio: Annotated[
+        bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, as for `run`")
+    ] = False,
+    system: Annotated[
+        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
+    ] = None,
+    no_fence: Annotated[bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is")] = False,
+    utc_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", callback=utc_error_text, help="how far UTC is off here, if neither kernel nor vehicle says"
+        ),
+    ] = None,
+    runs: Annotated[Path, typer.Option(help="where the folders of the sorties are made")] = Path("runs"),
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the record last")] = False,
+) -> ExitCode:  # fmt: skip
+    """Fly a short sequence that tests what is taken for granted of this autopilot, and sign a record of what held.
+
+    It flies. Somebody has to consent: `--sitl` or `--pilot NAME`. Ends with 0 when all that was checked holds, with 13
+    when something does not.
+    """
+    if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
+        return fail(ExitCode.USAGE, "who consents to this flight? `--sitl` or `--pilot NAME`, one of them", _CONSENT_HELP)
+    if takeover and sitl:
+        return fail(ExitCode.USAGE, "`--takeover` goes with `--pilot`: in a simulation it is always tried")
+    if unsigned_radio and signing_key is None:
+        return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+    try:
+        link = address.parse(connect)
+    except AddressError as error:
+        return misaddressed("--connect", error)
+    if sitl and link.way is Way.SERIAL:
+        return fail(ExitCode.USAGE, f"`{link}` is no simulation: whatever is at a serial line may be real", _CONSENT_HELP)
+    if speed != 1 and not (sitl and link.is_loopback):
+        return fail(ExitCode.USAGE, "`--speed` is for a simulated vehicle; a real one lives as fast as we do")
+    planned, missing = _planned(sitl=sitl, takeover=takeover, keyed=signing_key is not None)
+    named = {each.name: each for each in planned}
+    unknown = sorted(set(only or ()) - named.keys())
+    if unknown:
+        return fail(ExitCode.USAGE, f"there is no sortie `{unknown[0]}` here", f"accepted: {', '.join(named)}")
+    if only:
+        missing |= {name: "not asked for (`--only`)" for name in named if name not in only}
+        planned = [each for each in planned if each.name in only]
+    found = Findings(json=False)
+    compiled, sources = compile_sources([source], mission=mission, issued_at_us=time.time_ns() // 1_000)
+    if found.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
+        return exit_code(compiled.diagnostics)
+    if compiled.policy.vehicle.identity != vehicle:
+        text = f"the policy is for `{compiled.policy.vehicle.identity}`, this vehicle is `{vehicle}`"
+        return fail(ExitCode.REFUSED, text, slug="wrong-vehicle")
+    plan = Qualifying(
+        source, compiled.policy, compiled.mission, planned, missing, pilot=pilot or "", passphrase_file=passphrase_file
+    )
+    try:
+        plan.prepare()
+        with tempfile.TemporaryDirectory(prefix="rtshcua-") as folder:
+            order = Launch(
+                bundle=Path(folder), link=link, simulator=(), mode=Mode.SOFTWARE, speed=speed, vehicle=vehicle, roots=(),
+                log_key=None, passphrase_file=passphrase_file, data=data_folder(), state=state_folder(), runs=runs,
+                style="json" if as_json else "lines", fence=not no_fence, signing_key=signing_key,
+                unsigned_radio=unsigned_radio, system=system, utc_error_us=duration_us(utc_error),
+            )  # fmt: skip
+            ended = plan.fly(order, as_json=as_json)
+        return plan.finish(ended, as_json=as_json)
+    except Refused as refused:
+        if as_json:
+            said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
+            print(msgspec.json.encode(said).decode())
+        return (tell if as_json else fail)(refused.code, str(refused), refused.help)
+
+
+_REAL: Final = "on a real vehicle nobody sends it: a second ground station takes over in a simulation alone"
+_UNASKED: Final = "not asked for: `--takeover` has the pilot take over"
+_KEYED: Final = "the link is signed, and a second ground station has no key"
+
+
+def _planned(*, sitl: bool, takeover: bool, keyed: bool) -> tuple[list[Sortie], dict[str, str]]:
+    """The sorties, and why others are not flown."""
+    alone = [each for each in SORTIES if each.takeover is None]
+    if sitl and not keyed:
+        return list(SORTIES), {}
+    if sitl:
+        return alone, {str(kind): _KEYED for kind in TakeoverKind}
+    missing = {str(kind): _REAL for kind in TakeoverKind if kind is not TakeoverKind.MODE}
+    return ([*alone, BY_PILOT], missing) if takeover else (alone, missing | {str(TakeoverKind.MODE): _UNASKED})
+
+
+# ---------------------------------------------------------------- one sortie of it
+
+
+@dataclass
+class _Flown:
+    """One sortie, as `launch` flies it."""
+
+    sortie: Sortie
+    sends: bool
+    driven: QualifyingDriver | None = None
+    observed: ObservedSortie | None = None
+    final_hash: str = ""
+    slack: int = 1
+
+    def driver(self, policy: Policy, frames: Gate, slack: int, **more: Any) -> Driver:
+        """Its driver, which observes it."""
+        self.slack = slack
+        self.driven = QualifyingDriver(policy, frames, slack, sortie=self.sortie, sends=self.sends, ask=_ask, **more)
+        return self.driven
+
+    def after(
+        self, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, ending: Ending, final_hash: str
+    ) -> None:
+        """Whoever took it over lands it: watch until it is down."""
+        assert self.driven is not None
+        if ending is Ending.STOOD_DOWN and not self.sends:
+            _ask("PILOT: the vehicle is yours; land it")
+        until_s = time.monotonic() + _LANDS_S
+        while not self.driven.seen.down and ending is Ending.STOOD_DOWN and time.monotonic() < until_s:
+            if interrupts.wish() is not None:
+                break
+            vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+        self.observed, self.final_hash = self.driven.finish(ending), final_hash
+
+
+def _ask(text: str) -> None:
+    print(f">>> {text}", file=sys.stderr, flush=True)
+
+
+# ---------------------------------------------------------------- all of it
+
+
+@dataclass
+class Qualifying:
+    """The sorties of one qualification, from compiling their missions to the record."""
+
+    source: Path
+    policy: Policy
+    mission: Mission
+    sorties: Sequence[Sortie]
+    missing: dict[str, str]
+    pilot: str
+    passphrase_file: Path | None
+    trial: Trial | None = None
+    keys: dict[Duty, SigningKey] = field(default_factory=dict)
+    flown: list[_Flown] = field(default_factory=list)
+
+    def prepare(self) -> None:
+        """Find a leg that the policy permits, and unlock the keys. Raises `Refused`."""
+        first: Compiled | None = None
+        for trial in trials():
+            legs = [self._compiled(sortie, trial) for sortie in self.sorties]
+            first = first or next(each for each in legs if each.mission is None or each is legs[-1])
+            if all(each.mission is not None for each in legs):
+                self.trial = trial
+                break
+        if self.trial is None:
+            assert first is not None
+            Findings(json=False).report(first.diagnostics, first.sources)
+            text = f"`{self.policy.name}` permits none of the legs that were tried: of the first one, see above"
+            raise Refused(ExitCode.REFUSED, "not-permitted", text, _PERMIT_HELP)
+        store = KeyStore(data_folder())
+        try:
+            for duty in (Duty.POLICY, Duty.LOG):
+                self.keys[duty] = unlock(store, duty, passphrase_file=self.passphrase_file)
+            self.keys[Duty.MISSION] = unlock_for(store, self.mission, passphrase_file=self.passphrase_file)
+            check_trusted(store, self.keys[Duty.MISSION], self.policy, self.mission)
+        except Untrusted as error:
+            raise Refused(code_of(error.slug), *untrusted(error)) from None
+
+    def fly(self, order: Launch, *, as_json: bool) -> Ending:
+        """Fly one after the other, until one does not go as planned; how the last one ended."""
+        folder = order.bundle
+        for sortie in self.sorties:
+            _announce(sortie, as_json=as_json)
+            flown = _Flown(sortie, sends=not self.pilot)
+            bundle = folder / f"{NAME}-{sortie.name}.bundle"
+            bundle.write_bytes(self._bundle(sortie))
+            launch(replace(order, bundle=bundle, sortie=flown))
+            assert flown.observed is not None
+            self.flown.append(flown)
+            why = ends_after(flown.observed)
+            if why is not None:
+                left = self.sorties[len(self.flown) :]
+                self.missing |= {each.name: why for each in left}
+                break
+        return Ending(self.flown[-1].observed.ending) if self.flown[-1].observed is not None else Ending.REFUSED
+
+    def finish(self, ended: Ending, *, as_json: bool) -> ExitCode:
+        """Judge, print the table, and keep the record, unless it was broken off."""
+        observed = self._observed()
+        checks = judge(observed, self.policy)
+        record = self._record(observed, checks)
+        last = self.flown[-1]
+        planned = last.observed is not None and ends_after(last.observed) is None
+        broken = ended in _BROKEN_OFF and not planned
+        path = None
+        if not broken:
+            signed = sign_qualification(record, self.keys[Duty.LOG])
+            path = keep_record(data_folder(), record.vehicle, signed)
+        if broken or ended is Ending.CRASHED:
+            code = EXIT_CODES[ended]
+        else:
+            code = ExitCode.OK if record.qualifies else ExitCode.TESTS
+        if as_json:
+            print(msgspec.json.encode(_described(record, path, code)).decode())
+        else:
+            for line in told(record, ended if broken else None):
+                print(visible(line))
+            if path is not None:
+                print(f"the record is in {path}")
+        return code
+
+    def _compiled(self, sortie: Sortie, trial: Trial) -> Compiled:
+        by_pilot = sortie is BY_PILOT
+        try:
+            text = source_of(sortie, trial, self.source.name, self.policy, self.mission, by_pilot=by_pilot)
+        except LookupError as error:
+            text = f"`{self.policy.name}` has no skill whose motion is `{error.args[0]}`"
+            raise Refused(ExitCode.REFUSED, "no-skill", text, "import the skills that ship: `lib:skills/goto.rts`") from None
+        reading = read_text(str(self.source.parent / f"{NAME}.rts"), text)
+        return compile_program(
+            reading.program, dialect.load(), mission=NAME, issued_at_us=time.time_ns() // 1_000
+        )
+
+    def _bundle(self, sortie: Sortie) -> bytes:
+        assert self.trial is not None
+        compiled = self._compiled(sortie, self.trial)
+        assert compiled.policy is not None
+        assert compiled.mission is not None
+        return sign(
+            compiled.policy, compiled.mission, policy_key=self.keys[Duty.POLICY], mission_key=self.keys[Duty.MISSION]
+        )
+
+    def _observed(self) -> ObservedQualification:
+        driven = [each.driven for each in self.flown if each.driven is not None]
+        first, flavour = driven[0], driven[0].flavour
+        questions = first.questions
+        sorties = tuple(each.observed for each in self.flown if each.observed is not None)
+        if flavour is None or questions is None:
+            return ObservedQualification(None, 0, None, sorties, (), self.missing)
+        trips = [each.source.clock.round_trip_us for each in driven]
+        return ObservedQualification(
+            questions.firmware,
+            flavour.mode_within_us * self.flown[0].slack,
+            max((each for each in trips if each is not None), default=None),
+            sorties,
+            tuple(settings_told(flavour.name, questions.values.values, self.policy)),
+            self.missing,
+        )
+
+    def _record(self, observed: ObservedQualification, checks: Sequence[QualificationCheck]) -> Qualification:
+        driven = self.flown[0].driven
+        questions = None if driven is None else driven.questions
+        parameters = tuple(sorted({} if questions is None else questions.parameters.items()))
+        return Qualification(
+            vehicle=self.policy.vehicle.identity,
+            firmware=observed.firmware or Firmware("", 0, b""),
+            parameters=parameters,
+            digest=parameters_digest(parameters),
+            policy=policy_digest(policy_payload(self.policy)),
+            pilot=self.pilot,
+            release=__version__,
+            issued_at_us=time.time_ns() // 1_000,
+            flown_us=sum(each.airborne_us for each in observed.sorties),
+            logs=tuple(each.final_hash for each in self.flown),
+            checks=tuple(checks),
+        )
+
+
+_PERMIT_HELP: Final = "the sorties take off to 6 or 10 m, and fly 25 to 50 m from home at 2 to 5 m/s: permit that, and a hover"
+
+
+def _announce(sortie: Sortie, *, as_json: bool) -> None:
+    if as_json:
+        said = {"event": "sortie", "name": sortie.name, "about": sortie.about}
+        print(msgspec.json.encode(said).decode(), flush=True)
+    else:
+        print(f"sortie {sortie.name}: {sortie.about}", flush=True)
+
+
+_MARKS: Final[Mapping[int, str]] = {
+    CheckOutcome.HELD: "ok",
+    CheckOutcome.FAILED: "FAIL",
+    CheckOutcome.TOLD: "note",
+    CheckOutcome.UNCHECKED: "-",
+}
+
+
+def told(record: Qualification, broken: Ending | None) -> Iterator[str]:
+    """The table: a line a check; what does not hold, with what was expected and what to do about it."""
+    width = max(len(each.slug) for each in record.checks)
+    yield f"{record.vehicle}: {record.firmware.text}, parameters {record.digest.hex()[:16]}"
+    for each in record.checks:
+        yield f"{_MARKS[each.outcome]:<5} {each.slug:<{width}}  {each.measured}"
+        wanted = each.outcome in (CheckOutcome.FAILED, CheckOutcome.TOLD)
+        for label, text in (("expected", each.expected), ("help", each.advice)):
+            if wanted and text:
+                yield f"{'':<5} {'':<{width}}  {label}: {text}"
+    counts = {mark: sum(each.outcome == outcome for each in record.checks) for outcome, mark in _MARKS.items()}
+    flown = f"{record.flown_us // 1_000_000} s of flight"
+    if broken is not None:
+        yield f"broken off ({broken}) after {flown}: no record is made"
+        return
+    end = "qualified" if record.qualifies else "NOT qualified"
+    yield f"{end}: {counts['ok']} hold, {counts['FAIL']} do not, {counts['-']} not checked, in {flown}"
+
+
+def _described(record: Qualification, path: Path | None, code: ExitCode) -> dict[str, Any]:
+    return {
+        "event": "qualification",
+        "vehicle": record.vehicle,
+        "firmware": record.firmware.text,
+        "parameters": record.digest.hex(),
+        "pilot": record.pilot,
+        "flown_us": record.flown_us,
+        "qualified": record.qualifies,
+        "record": None if path is None else str(path),
+        "checks": [
+            msgspec.structs.asdict(each) | {"outcome": CheckOutcome(each.outcome).name.lower()}
+            for each in record.checks
+        ],
+        "exit_code": int(code),
+    }

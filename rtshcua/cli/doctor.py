@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.signing import LinkKeyError
+from rtshcua.adapters.qualification.standing import standing
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.utc import kernel_error_us
 from rtshcua.adapters.vehicle import address
@@ -26,6 +28,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.meeting import unmet, unopened
+from rtshcua.cli.qualified import record_of
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out, out_json
@@ -35,7 +38,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
-from rtshcua.wire.trust import MAX_ROOT, open_root
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -75,7 +78,7 @@ def doctor(
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
     clock = SystemClock()
     try:
-        policy, mission = _wanted(bundle, clock.now().utc_us)
+        policy, mission, root = _wanted(bundle, clock.now().utc_us)
     except Untrusted as error:
         return distrust(error)
     frames = FrameSession()
@@ -103,6 +106,7 @@ def doctor(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
                 unheard=signing.unheard, named=system is not None,
+                qualified=None if root is None else partial(standing, record_of(policy.vehicle.identity, root)),
             )
         )  # fmt: skip
     code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
@@ -113,17 +117,19 @@ def doctor(
     return code
 
 
-def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None]:
-    """The policy whose signals count, and the mission to fly. Raises Untrusted, and OSError."""
+def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, TrustRoot | None]:
+    """The policy whose signals count, the mission to fly, and the root that it is trusted by. Raises Untrusted, and
+    OSError.
+    """
     if bundle is None:
         compiled, _ = compile_sources([library.root() / _EXAMPLE], mission=None, issued_at_us=utc_us)
         assert compiled.policy is not None
-        return compiled.policy, None
+        return compiled.policy, None, None
     data = read_regular(bundle, MAX_BUNDLE)
     signed = KeyStore(data_folder()).root()
     root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
     opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)
-    return opened.policy, opened.mission
+    return opened.policy, opened.mission, root
 
 
 def _listen(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:

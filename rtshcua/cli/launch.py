@@ -32,6 +32,7 @@ from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened
 from rtshcua.cli.past import Past
+from rtshcua.cli.qualified import record_of, unqualified
 from rtshcua.cli.refused import Refused as Refused
 from rtshcua.cli.showing.document import HANDED_IN, kind_of_document
 from rtshcua.cli.signing import Signing
@@ -143,6 +144,10 @@ def launch(order: Launch) -> ExitCode:
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
             _hold_trust(bundle, signed_root, loaded, clock)
+            if order.link is not None and order.sortie is None:
+                note, meanwhile = unqualified(record_of(loaded.vehicle, root, order.data), vehicle, clock)
+                events += meanwhile
+                signing.notes += [note] if note is not None else []
             if order.dry_run:
                 from rtshcua.cli.dry_run import dry_run  # shows what would pass as `why` does, which is of the ground
 

@@ -22,7 +22,8 @@ from rtshcua.adapters.qualification.missions import NAME, Trial, source_of, tria
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import Address, AddressError, Way
+from rtshcua.adapters.vehicle.address import AddressError, Way
+from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.cli.clock_error import duration_us, utc_error_text
@@ -65,8 +66,8 @@ _BROKEN_OFF: Final = (
     Ending.INTERRUPTED, Ending.REFUSED, Ending.LINK_LOST, Ending.EVIDENCE_LOST, Ending.RECALLED, Ending.STOOD_DOWN,
 )  # fmt: skip
 _CONSENT_HELP: Final = (
-    "`--sitl`: it is a simulation, and a second ground station takes it over; `--pilot NAME`: it is a real vehicle, and "
-    "this pilot consents, with the mode switch in hand"
+    "`--sitl`: it is a simulation, and a second ground station takes it over; `--pilot NAME`: it is a real vehicle, "
+    "and this pilot consents, with the mode switch in hand"
 )
 
 
@@ -121,7 +122,9 @@ def qualify(
     when something does not.
     """
     if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
-        return fail(ExitCode.USAGE, "who consents to this flight? `--sitl` or `--pilot NAME`, one of them", _CONSENT_HELP)
+        return fail(
+            ExitCode.USAGE, "who consents to this flight? `--sitl` or `--pilot NAME`, one of them", _CONSENT_HELP
+        )
     if takeover and sitl:
         return fail(ExitCode.USAGE, "`--takeover` goes with `--pilot`: in a simulation it is always tried")
     if unsigned_radio and signing_key is None:
@@ -131,7 +134,9 @@ def qualify(
     except AddressError as error:
         return misaddressed("--connect", error)
     if sitl and link.way is Way.SERIAL:
-        return fail(ExitCode.USAGE, f"`{link}` is no simulation: whatever is at a serial line may be real", _CONSENT_HELP)
+        return fail(
+            ExitCode.USAGE, f"`{link}` is no simulation: whatever is at a serial line may be real", _CONSENT_HELP
+        )
     if speed != 1 and not (sitl and link.is_loopback):
         return fail(ExitCode.USAGE, "`--speed` is for a simulated vehicle; a real one lives as fast as we do")
     planned, missing = _planned(sitl=sitl, takeover=takeover, keyed=signing_key is not None)
@@ -156,8 +161,9 @@ def qualify(
         plan.prepare()
         with tempfile.TemporaryDirectory(prefix="rtshcua-") as folder:
             order = Launch(
-                bundle=Path(folder), link=link, simulator=(), mode=Mode.SOFTWARE, speed=speed, vehicle=vehicle, roots=(),
-                log_key=None, passphrase_file=passphrase_file, data=data_folder(), state=state_folder(), runs=runs,
+                bundle=Path(folder), link=link, simulator=(), mode=Mode.SOFTWARE, speed=speed, vehicle=vehicle,
+                roots=(), log_key=None, passphrase_file=passphrase_file, data=data_folder(),
+                state=state_folder(), runs=runs,
                 style="json" if as_json else "lines", fence=not no_fence, signing_key=signing_key,
                 unsigned_radio=unsigned_radio, system=system, utc_error_us=duration_us(utc_error),
             )  # fmt: skip
@@ -315,11 +321,11 @@ class Qualifying:
             text = source_of(sortie, trial, self.source.name, self.policy, self.mission, by_pilot=by_pilot)
         except LookupError as error:
             text = f"`{self.policy.name}` has no skill whose motion is `{error.args[0]}`"
-            raise Refused(ExitCode.REFUSED, "no-skill", text, "import the skills that ship: `lib:skills/goto.rts`") from None
+            raise Refused(
+                ExitCode.REFUSED, "no-skill", text, "import the skills that ship: `lib:skills/goto.rts`"
+            ) from None
         reading = read_text(str(self.source.parent / f"{NAME}.rts"), text)
-        return compile_program(
-            reading.program, dialect.load(), mission=NAME, issued_at_us=time.time_ns() // 1_000
-        )
+        return compile_program(reading.program, dialect.load(), mission=NAME, issued_at_us=time.time_ns() // 1_000)
 
     def _bundle(self, sortie: Sortie) -> bytes:
         assert self.trial is not None
@@ -343,7 +349,7 @@ class Qualifying:
             flavour.mode_within_us * self.flown[0].slack,
             max((each for each in trips if each is not None), default=None),
             sorties,
-            tuple(settings_told(flavour.name, questions.values.values, self.policy)),
+            tuple(settings_told(flavour.name, questions.values.values, self.policy, Reach())),
             self.missing,
         )
 
@@ -366,7 +372,9 @@ class Qualifying:
         )
 
 
-_PERMIT_HELP: Final = "the sorties take off to 6 or 10 m, and fly 25 to 50 m from home at 2 to 5 m/s: permit that, and a hover"
+_PERMIT_HELP: Final = (
+    "the sorties take off to 6 or 10 m, and fly 25 to 50 m from home at 2 to 5 m/s: permit that, and a hover"
+)
 
 
 def _announce(sortie: Sortie, *, as_json: bool) -> None:

@@ -1,4 +1,4 @@
-"""Qualification records: what was found when a vehicle's autopilot was flown against what its adapter takes for granted.
+"""Qualification records: what was found when an autopilot was flown against what its adapter takes for granted.
 
 A record is about one vehicle as it then was: its autopilot, the version, and the parameters that matter. The log key
 signs it, as it signs what else this vehicle's runtime saw (docs/adr/0043). It permits nothing.
@@ -66,8 +66,8 @@ class Qualification(Flat, frozen=True):
     """A record. `parameters` are those that matter, by name in ascending order, each the eight octets of its value as
     a double (big-endian); `digest` is over them. `policy` is the digest of the policy that bounded the flights.
 
-    `pilot` is who consented, empty for a simulation. `logs` are the final hashes of the flights' logs. `flown_us` is how
-    long it was in the air; `issued_at_us` is UTC.
+    `pilot` is who consented, empty for a simulation. `logs` are the final hashes of the flights' logs. `flown_us` is
+    how long it was in the air; `issued_at_us` is UTC.
     """
 
     vehicle: str

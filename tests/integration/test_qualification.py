@@ -27,7 +27,9 @@ def right(flavour: str) -> tuple[Qualifying, dict[str, QualificationCheck]]:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_right_vehicle_holds_every_check(flavour: str) -> None:
     _, checks = right(flavour)
-    failed = {slug: each for slug, each in checks.items() if each.outcome in (CheckOutcome.FAILED, CheckOutcome.UNCHECKED)}
+    failed = {
+        slug: each for slug, each in checks.items() if each.outcome in (CheckOutcome.FAILED, CheckOutcome.UNCHECKED)
+    }
     assert not failed
     assert len(checks) >= 28
 
@@ -86,7 +88,9 @@ WRONG: tuple[tuple[Callable[[VirtualVehicle], None], str, str, str], ...] = (
 )
 
 
-@pytest.mark.parametrize(("habit", "flavour", "sortie", "slug"), WRONG, ids=lambda each: getattr(each, "__name__", each))
+@pytest.mark.parametrize(
+    ("habit", "flavour", "sortie", "slug"), WRONG, ids=lambda each: getattr(each, "__name__", each)
+)
 def test_a_wrong_vehicle_is_noticed(
     habit: Callable[[VirtualVehicle], None], flavour: str, sortie: str, slug: str
 ) -> None:

@@ -11,6 +11,7 @@ from rtshcua.adapters.qualification.checks import ends_after, judge
 from rtshcua.adapters.qualification.missions import NAME, Trial, source_of
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie
 from rtshcua.adapters.qualification.sortie import SORTIES, QualifyingDriver, Sortie
+from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.cli.sources import compile_sources, read_text
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.mavlink import dialect
@@ -110,6 +111,6 @@ class Qualifying:
         questions, flavour = first.questions, first.flavour
         assert questions is not None
         assert flavour is not None
-        settings = tuple(settings_told(flavour.name, questions.values.values, self._policy))
+        settings = tuple(settings_told(flavour.name, questions.values.values, self._policy, Reach()))
         within, trip = flavour.mode_within_us, first.source.clock.round_trip_us
         return ObservedQualification(questions.firmware, within, trip, tuple(sorties), settings, missing)

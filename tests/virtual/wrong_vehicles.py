@@ -114,7 +114,8 @@ def fence_that_keeps_other_items(vehicle: VirtualVehicle) -> None:
 def silent_mode_change(vehicle: VirtualVehicle) -> None:
     """Its heartbeat never tells of a return."""
     reports = _of(vehicle).reports
-    build, kept = reports._build[HEARTBEAT], []
+    build = reports._build[HEARTBEAT]
+    kept: list[int] = []
 
     def heartbeat() -> Any:
         told = copy(build())
@@ -146,12 +147,12 @@ def fast_leg(vehicle: VirtualVehicle) -> None:
 
 def return_that_does_not_move(vehicle: VirtualVehicle) -> None:
     body = _of(vehicle).vehicle
-    body.return_home = lambda: body.hold()
+    body.return_home = body.hold
 
 
 def landing_that_does_not_descend(vehicle: VirtualVehicle) -> None:
     body = _of(vehicle).vehicle
-    body.land_here = lambda: body.hold()
+    body.land_here = body.hold
 
 
 def answers_that_never_come(vehicle: VirtualVehicle) -> None:

@@ -1,6 +1,6 @@
 """The whole diagnosis: every finding of an examination, in the order in which a person would look."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Final
 
@@ -8,6 +8,8 @@ import msgspec
 
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.doctor.settings import SETTINGS, Need, Setting
+from rtshcua.adapters.qualification.identity import firmware_of, those_that_matter
+from rtshcua.adapters.qualification.standing import Standing
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
 from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.source_time import VehicleClock
@@ -21,6 +23,7 @@ from rtshcua.model.flat.signal import Signal
 from rtshcua.model.flat.zone import project
 from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.rehearsal import needed
+from rtshcua.wire.qualification import Firmware
 
 
 class MissionVerdict(StrEnum):
@@ -50,12 +53,14 @@ class VehicleFinding(msgspec.Struct, frozen=True):
 def diagnose(
     vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, utc_error_us: int | None,
     unheard: frozenset[int] = frozenset(), named: bool = False,
+    qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None = None,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
     """What was found. `flown` is the mission that the vehicle is to fly, None where only signals were asked about.
 
     `keyed`: a link key was given, and what is not signed with it was dropped. `unheard` are the slots of signals that
     cannot come on this link, for nobody signs what carries them. `utc_error_us` is what the kernel says that
     this machine's UTC is off by at most, None where it does not say. `named`: the operator said which system is meant.
+    `qualified` says how this vehicle stands to its qualification record; None where it is not known which one it is.
 
     Before a heartbeat of an autopilot was heard there is nothing to say.
     """
@@ -71,6 +76,8 @@ def diagnose(
     yield _streams(vehicle, flavour)
     yield _kind(vehicle)
     yield from _version(vehicle, flavour)
+    if qualified is not None:
+        yield _qualification(vehicle, flavour, qualified)
     yield from _readiness(vehicle)
     yield from _signals(vehicle, policy, flown, unheard)
     if flown is not None:
@@ -225,6 +232,18 @@ def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]
         yield VehicleFinding("autopilot/capability", OK, ", ".join(name for name, _ in wanted.values()))
 
 
+def _qualification(
+    vehicle: ExaminingDriver, flavour: str, qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing]
+) -> VehicleFinding:
+    """Whether a flight test of this autopilot, as it is set up now, held what the adapters take for granted."""
+    message = vehicle.latest("AUTOPILOT_VERSION")
+    values = {} if vehicle.parameters is None or vehicle.flavour is None else vehicle.parameters.values
+    known = {} if vehicle.flavour is None else those_that_matter(vehicle.flavour, values)
+    stands = qualified(None if message is None else firmware_of(flavour, message), known)
+    advice = "`rtshcua qualify` flies a short test of it, and records what holds (docs/flying/qualify.md)"
+    return _graded("autopilot/qualified", stands.text, "qualified, as it is now", advice, warns=not stands.qualified)
+
+
 # ---------------------------------------------------------------- the vehicle as it stands, whatever it is to fly
 
 _ACCURATE_MM: Final = 5_000
@@ -372,7 +391,7 @@ def _settings(
 
 
 def settings_told(
-    flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach = Reach()
+    flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach
 ) -> Iterator[VehicleFinding]:
     """A finding for each of the parameters that were read, which a mission of that reach is to fly with."""
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]

@@ -1,5 +1,5 @@
-"""The qualification records of the user's vehicles: `<data folder>/qualifications/vehicle-<identity>.cbor`, the last one
-of each.
+"""The qualification records of the user's vehicles, the last one of each:
+`<data folder>/qualifications/vehicle-<identity>.cbor`.
 """
 
 from pathlib import Path

@@ -107,7 +107,9 @@ def _fence(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     ]
     idle = [each for each in observed.settings if each.slug in _FENCE_ACTIONS and each.verdict is not MissionVerdict.OK]
     found = [*off, *[each.found for each in idle]]
-    advice = idle[0].advice if idle else "look at what else sets it: a switch of the remote control, a script, a mission"
+    advice = (
+        idle[0].advice if idle else "look at what else sets it: a switch of the remote control, a script, a mission"
+    )
     expected = "switched on in the air, and does something"
     yield _check("fence/on", not found, expected, "; ".join(found) or "so it is", advice=advice)
 
@@ -308,7 +310,12 @@ _ENDS: Final = 2_000
 def _ends(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
     limit = vehicle.position_error + _ENDS
     yield _ended(
-        observed, "return/home", "leg", MotionKind.HOME, limit, f"lands within {_metres(limit)} of home, and disarms",
+        observed,
+        "return/home",
+        "leg",
+        MotionKind.HOME,
+        limit,
+        f"lands within {_metres(limit)} of home, and disarms",
         lambda flown, _: flown.samples[0],
     )
     yield _highest(observed, vehicle)
@@ -481,7 +488,7 @@ def _silences(observed: ObservedQualification) -> Iterator[QualificationCheck]:
 
 
 def _streams(observed: ObservedQualification) -> Iterator[QualificationCheck]:
-    """What comes at less than half the rate asked for; the heartbeat is asked for besides, and has a check of its own."""
+    """What comes at less than half the rate asked for; the heartbeat has a check of its own."""
     slow: dict[str, tuple[int, int | None]] = {}
     measured = 0
     for sortie in observed.sorties:

@@ -1,7 +1,7 @@
 """What an autopilot is: its version, and the parameters that matter, asked for on the ground."""
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from rtshcua.adapters.doctor.settings import SETTINGS
@@ -34,25 +34,24 @@ def those_that_matter(flavour: AutopilotFlavour, values: Mapping[str, float]) ->
 
 
 class IdentityQuestions:
-    """Asks for them, one request each until it is answered."""
+    """Asks for them, one request each until it is answered; of parameters, for those of `names`."""
 
-    def __init__(self, flavour: AutopilotFlavour, slack: int = 1) -> None:
+    def __init__(self, flavour: AutopilotFlavour, slack: int = 1, names: Iterable[str] | None = None) -> None:
         self._flavour = flavour
         self._slack = slack
         self.values = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
-        for setting in SETTINGS[flavour.name]:
-            self.values.read(setting.parameter)
+        self._names = [each.parameter for each in SETTINGS[flavour.name]] if names is None else [*names]
+        for name in self._names:
+            self.values.read(name)
         self._asked_us: int | None = None
         self._asked = 0
         #: None before it was told
         self.firmware: Firmware | None = None
 
     @property
-    def settled(self) -> bool:
-        """Whether all was answered, or asked for often enough."""
-        told = self.firmware is not None or self._asked > _TRIES
-        each = (setting.parameter for setting in SETTINGS[self._flavour.name])
-        return told and all(self.values.is_settled(name) or self.values.is_absent(name) for name in each)
+    def told(self) -> bool:
+        """Whether all was answered."""
+        return self.firmware is not None and all(map(self.values.is_settled, self._names))
 
     @property
     def parameters(self) -> dict[str, bytes]:

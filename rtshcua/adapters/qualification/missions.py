@@ -1,7 +1,7 @@
 """The missions of the sorties, as sources under the user's own policy: the compiler proves them as it does any other.
 
-A step is the policy's own skill of its kind of motion. How far, how fast and which way a leg goes is tried out: the first
-of `trials` that the policy permits, within its airspace, is flown.
+A step is the policy's own skill of its kind of motion. How far, how fast and which way a leg goes is tried out: the
+first of `trials` that the policy permits, within its airspace, is flown.
 """
 
 from collections.abc import Iterator, Sequence
@@ -9,6 +9,7 @@ from itertools import groupby, product
 from math import cos, radians, sin
 from typing import Final, NamedTuple
 
+from rtshcua.adapters.qualification.observed import TakeoverKind
 from rtshcua.adapters.qualification.sortie import Sortie
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, Parameter, SourceKind
 from rtshcua.model.flat.mission import Mission
@@ -60,14 +61,20 @@ def source_of(sortie: Sortie, trial: Trial, imported: str, policy: Policy, missi
     first = mission.invocations[0]
     source, role = SourceKind(first.source).name.lower(), policy.roles[first.role]
     speaker = f"agent {mission.proposer}" if source == "agent" else f"{source} {mission.proposer}"
+    # a vehicle that was taken over lands where it is: the next one flies back over home, or it would wander off
+    way = trial._replace(bearing=(trial.bearing + 180) % 360) if sortie.takeover is TakeoverKind.PAUSE else trial
     steps = []
     for kind in sortie.steps:
         contract = skill_of(policy, kind)
         if contract is None:
             raise LookupError(kind.name.lower())
         phase = contract.phases[0] if contract.phases else NAME
-        steps.append((phase, _step(contract, _held(sortie, by_pilot=by_pilot), trial, policy)))
-    lines = [f'import "{imported}"', "", f"mission {NAME} under {policy.name}@{policy.version} on {policy.vehicle.name} {{"]
+        steps.append((phase, _step(contract, _held(sortie, by_pilot=by_pilot), way, policy)))
+    lines = [
+        f'import "{imported}"',
+        "",
+        f"mission {NAME} under {policy.name}@{policy.version} on {policy.vehicle.name} {{",
+    ]
     lines += [f'  intent   "Qualification: {sortie.about}."', f"  proposed by {speaker.strip()} for role {role}", ""]
     for phase, those in groupby(steps, key=lambda each: each[0]):
         lines += [f"  phase {phase} {{", *[f"    {text}" for _, text in those], "  }"]

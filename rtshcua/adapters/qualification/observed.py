@@ -33,8 +33,8 @@ class Sample(NamedTuple):
 
 @dataclass(slots=True)
 class ObservedCommand:
-    """A command that was begun: what it was, when its first frame left, and when and how it ended. `how` is `succeeded`,
-    a reason of failure, `replaced`, or empty while it flies. `shortened`: it was to end on its way.
+    """A command that was begun: what it was, when its first frame left, and when and how it ended. `how` is
+    `succeeded`, a reason of failure, `replaced`, or empty while it flies. `shortened`: it was to end on its way.
     """
 
     kind: int
@@ -45,8 +45,6 @@ class ObservedCommand:
     sent_us: int | None = None
     ended_us: int | None = None
     how: str = ""
-    obeyed_us: int | None = None
-    """When its frame was acknowledged, or sent where nothing is: from then on something must follow."""
 
 
 @dataclass(slots=True)
@@ -62,7 +60,7 @@ class ObservedAnswer:
 @dataclass(slots=True)
 class ObservedTakeover:
     """Somebody else took over. `sent_us` None: a pilot did, and nobody knows when. `mode_us`: another mode showed in a
-    heartbeat; `shown_us`: the driver told of it, as `how`; `moved_us`: a frame of ours that moves the vehicle left last.
+    heartbeat; `shown_us`: the driver told of it, as `how`; `moved_us`: the last frame of ours that moves it left.
     """
 
     kind: TakeoverKind
@@ -75,8 +73,8 @@ class ObservedTakeover:
 
 @dataclass(slots=True)
 class ObservedSilence:
-    """Nothing was let through for `for_us`, in either direction, while it held. `fresh_us`: all that came before had come
-    again. `kept`: the command was still in force then, and the mode the same.
+    """Nothing was let through for `for_us`, in either direction, while it held. `fresh_us`: all that came before had
+    come again. `kept`: the command was still in force then, and the mode the same.
     """
 
     for_us: int
@@ -117,8 +115,8 @@ class ObservedSortie:
 
 @dataclass(frozen=True, slots=True)
 class ObservedQualification:
-    """All that was observed. `mode_within_us`: the W that is declared for the flavour; `settings`: what the doctor finds
-    of its parameters; `missing`: why sorties were not flown, by their name.
+    """All that was observed. `mode_within_us`: the W that is declared for the flavour; `settings`: what the doctor
+    finds of its parameters; `missing`: why sorties were not flown, by their name.
     """
 
     firmware: Firmware | None

@@ -1,9 +1,9 @@
 """The sorties of a qualification, and the driver that flies and observes one: the real one, which is the only way that
 anything of ours reaches the vehicle, with two habits of its own.
 
-A motion that is to be stopped on its way ends early: the manoeuvre counts as done once the vehicle is under way, so that
-the mission's next step, a hover, stops it. And in a silence nothing is let through for a while, in either direction.
-Every frame that moves the vehicle is still of a permitted command, and passes the gate.
+A motion that is to be stopped on its way ends early: the manoeuvre counts as done once the vehicle is under way, so
+that the mission's next step, a hover, stops it. And in a silence nothing is let through for a while, in either
+direction. Every frame that moves the vehicle is still of a permitted command, and passes the gate.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -123,8 +123,7 @@ def _is_under_way(start: tuple[int, int], command: Command, seen: ObservedVehicl
     if not seen.located or seen.speed is None:
         return False
     flown = apart(seen.latitude, seen.longitude, *start)
-    latitude, longitude = command.geo[-2:]
-    whole = apart(latitude, longitude, *start)
+    whole = apart(command.geo[-2], command.geo[-1], *start)
     fast = bool(command.speed) and 100 * seen.speed >= _FAST * command.speed
     return (fast and flown >= min(_FLOWN, whole * _MOST / 100)) or flown >= whole * _MOST / 100
 
@@ -138,7 +137,7 @@ _BETWEEN_US: Final = 3_000_000
 _SHOWS_US: Final = 15_000_000
 _AGAIN_US: Final = 2_000_000
 #: mm flown before somebody takes over
-_FAR: Final = 6_000
+_FAR: Final = 4_000
 _IN_PROGRESS: Final = 5
 #: what is asked, and not what is commanded
 _QUESTIONS: Final = frozenset({messages.SET_INTERVAL, messages.RUN_PREARM_CHECKS, enums.MAV_CMD_REQUEST_MESSAGE})
@@ -265,16 +264,14 @@ class QualifyingDriver(Driver):
         """Its identity on the ground; and in the air, whether its fence is switched on."""
         assert self.flavour is not None
         if self.questions is None:
-            self.questions = IdentityQuestions(self.flavour, self._slack)
+            self.asks = self.questions = IdentityQuestions(self.flavour, self._slack)
         if self.seen.airborne and not self._air_asked:
             self._air_asked = True
             for name, _ in self.flavour.fence.switches:
                 self.questions.values.forget(name)
                 self.questions.values.read(name)
         out = self._asks_mode(now_us)
-        if self.seen.airborne or self.seen.down:
-            out += self.questions.due(self.system, now_us)
-        return out
+        return out + self.questions.due(self.system, now_us) if self.seen.airborne else out
 
     def _asks_mode(self, now_us: int) -> list[Message]:
         """Once something showed the takeover a driver asks no more who flies: how soon the mode does is of interest."""
@@ -292,8 +289,6 @@ class QualifyingDriver(Driver):
 
     def _observe(self, frame: Received, now_us: int) -> None:
         name, message, found = frame.name, frame.message, self.found
-        if self.questions is not None:
-            self.questions.take(name, message)
         match name:
             case "GLOBAL_POSITION_INT" if self.seen.located:
                 speed = round(10 * hypot(message.vx, message.vy))

@@ -1,6 +1,7 @@
 """A vehicle without its socket: frames in, events and frames out, time given; for real and virtual time."""
 
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
@@ -33,6 +34,18 @@ _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 _OF_PREFLIGHT = frozenset(preflight.HEEDED)
 _heard = tuple.__new__  # the constructor that a named tuple is given is a function more
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
+
+
+class GroundQuestions(Protocol):
+    """What somebody wants to know of a vehicle before it flies: housekeeping, of which nothing waits."""
+
+    def due(self, system: int, now_us: int) -> Sequence[Message]:
+        """What to ask now."""
+        ...
+
+    def take(self, name: str, message: Message) -> None:
+        """A message of the autopilot."""
+        ...
 
 
 class Driver:
@@ -78,6 +91,8 @@ class Driver:
         self.other_kind: str | None = None
         #: the vehicle's own time of day is wanted: it is asked for until it is told
         self.asks_utc = False
+        #: what else it is asked on the ground, and told of each of its messages
+        self.asks: GroundQuestions | None = None
         self._asked_utc_us = 0
         #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
         self.resumes = False
@@ -173,6 +188,8 @@ class Driver:
             self._asked_utc_us = now_us
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         send += self.stream_requests.due(self.system, now_us)
+        if self.asks is not None and self.seen.down:
+            send += self.asks.due(self.system, now_us)
         if not self._was_ready and self.seen.down:
             send += self.preflight.due(self.system, now_us)
         if self._texts.parts:
@@ -262,6 +279,8 @@ class Driver:
             values = self._telemetry.read(name, message, component, self.seen.estimator.doubtful(name, now_us))
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
+        if component == AUTOPILOT and self.asks is not None:
+            self.asks.take(name, message)
         if component != AUTOPILOT or name not in self._heeded:
             return False
         before = self.seen.mode

@@ -161,7 +161,7 @@ def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -
 def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
     (first, *others) = POLICY.signals
     signals = (replace(first, sources=(SignalSource("BATTERY_STATUS", ("nope",), 1, 1, ()),)), *others)
-    order: Any = SimpleNamespace(fence=True, dry_run=False, system=None)
+    order: Any = SimpleNamespace(sortie=None, fence=True, dry_run=False, system=None)
     signing: Any = SimpleNamespace(verifier=None)
     with pytest.raises(launch.Refused, match=r"`BATTERY_STATUS\.nope`") as refused:
         launch._driver(order, loaded(replace(POLICY, signals=signals), MISSION), 1, signing)

@@ -44,18 +44,18 @@ def slug(document: bytes, trusted: TrustRoot | None = None, vehicle: str = "quad
     return refused.value.slug
 
 
-def test_what_was_signed_is_opened():
+def test_what_was_signed_is_opened() -> None:
     assert open_qualification(sign_qualification(RECORD, LOG), root=root(), vehicle="quad-07") == RECORD
 
 
-def test_the_log_key_signs_it_and_no_other():
+def test_the_log_key_signs_it_and_no_other() -> None:
     with pytest.raises(WrongDuty):
         sign_qualification(RECORD, POLICY)
     other = SigningKey.from_seed(bytes([9]) * 32, duty=Duty.LOG, development=True)
     assert slug(sign_qualification(RECORD, other)) == "unknown-key"
 
 
-def test_it_is_of_one_vehicle_and_its_key_could_speak_for_that():
+def test_it_is_of_one_vehicle_and_its_key_could_speak_for_that() -> None:
     signed = sign_qualification(RECORD, LOG)
     assert slug(signed, vehicle="quad-08") == "wrong-vehicle"
     assert slug(signed, root(vehicles=("quad-08",))) == "wrong-vehicle"
@@ -63,7 +63,7 @@ def test_it_is_of_one_vehicle_and_its_key_could_speak_for_that():
     assert open_qualification(signed, root=root(expires_us=1_001), vehicle="quad-07") == RECORD
 
 
-def test_another_artefact_of_the_log_key_is_none():
+def test_another_artefact_of_the_log_key_is_none() -> None:
     assert slug(cose.sign1(b"", key=LOG, duty=Duty.LOG, content_type=names.PROOF.content_type)) == "wrong-content-type"
     assert slug(bytes(MAX_QUALIFICATION + 1)) == "too-large"
 
@@ -77,11 +77,11 @@ def test_another_artefact_of_the_log_key_is_none():
         {"checks": (replace(HELD, outcome=4),)},
     ],
 )
-def test_one_that_contradicts_itself_is_refused(change: dict[str, Any]):
+def test_one_that_contradicts_itself_is_refused(change: dict[str, Any]) -> None:
     assert slug(sign_qualification(replace(RECORD, **change), LOG)) == "malformed"
 
 
-def test_what_qualifies():
+def test_what_qualifies() -> None:
     assert RECORD.qualifies
     assert replace(RECORD, checks=(HELD, TOLD)).qualifies
     assert not replace(RECORD, checks=(TOLD,)).qualifies
@@ -90,7 +90,7 @@ def test_what_qualifies():
     assert mixed.failed == (FAILED,)
 
 
-def test_what_changed_since_is_said():
+def test_what_changed_since_is_said() -> None:
     assert RECORD.changes(PX4, dict(PARAMETERS)) == ()
     assert RECORD.changes(None, {}) == ()
     assert RECORD.changes(PX4, {"GF_ACTION": bytes(8)}) == ("changed since: `GF_ACTION`",)

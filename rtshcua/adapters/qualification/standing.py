@@ -1,0 +1,42 @@
+"""How a vehicle stands to its qualification record, in words."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification
+
+
+class Standing(NamedTuple):
+    """Whether a record holds for it as it is now; and that in words, or why not."""
+
+    qualified: bool
+    text: str
+
+
+def standing(record: Qualification | str | None, firmware: Firmware | None, known: Mapping[str, bytes]) -> Standing:
+    """How a vehicle stands that tells this firmware and these parameters. A text in place of the record says why it is
+    not to be trusted; None: there is none.
+    """
+    if record is None:
+        return Standing(False, "this vehicle is not qualified: there is no record of a flight test of its autopilot")
+    if isinstance(record, str):
+        return Standing(False, f"this vehicle is not qualified: its record is not to be trusted: {record}")
+    failed = [each.slug for each in record.failed]
+    if not record.qualifies:
+        what = f"{len(failed)} checks did not hold: {', '.join(failed)}" if failed else "nothing was checked"
+        return Standing(False, f"this vehicle is not qualified: {what}")
+    day = datetime.fromtimestamp(record.issued_at_us / 1_000_000, UTC).date().isoformat()
+    changes = record.changes(firmware, known)
+    if changes:
+        return Standing(False, f"this vehicle was qualified on {day}, and is another now: {'; '.join(changes)}")
+    held = sum(each.outcome == CheckOutcome.HELD for each in record.checks)
+    left = sum(each.outcome == CheckOutcome.UNCHECKED for each in record.checks)
+    unsaid = [] if firmware is not None else ["it does not tell its version now"]
+    missing = len(dict(record.parameters).keys() - known.keys())
+    if missing:
+        unsaid.append(f"{missing} of its parameters are not told now")
+    more = f"; {'; '.join(unsaid)}" if unsaid else ""
+    return Standing(
+        not unsaid, f"qualified on {day} for {record.firmware.text}: {held} checks hold, {left} were not made{more}"
+    )

@@ -32,6 +32,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
+from rtshcua.onboard.runtime.journal import Detail, said
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.supervisor import Supervisor
@@ -302,7 +303,7 @@ class Conduct:
         stood_us: int | None = None
         bound_us = self._flown.wait_us + 2 * self._flown.tick_us
         start_us = self._flown.start_us
-        found: str | None = None
+        found: Detail | None = None
         for turn in life.turns:
             at_us = turn.at_us
             now = Now(at_us + start_us, at_us + start_us + ahead_us, decision["utc_error_us"])
@@ -334,7 +335,7 @@ class Conduct:
                 if ended_us is not None or life.ended_us > at_us + bound_us:
                     end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
                     if not self._excused(at_us, silences, bound_us):
-                        yield Failure("not-watched", at_us, f"step {step.step} rests on `{found}`, and {end}")
+                        yield Failure("not-watched", at_us, f"step {step.step} rests on `{said(found)}`, and {end}")
                 step, supervisor = next(queue, None), None
             elif ended_us == at_us and step.how == "violated" and found is None:
                 yield Failure("needless", at_us, f"step {step.step} was broken off, and as heard holds: {step.detail}")

@@ -390,9 +390,7 @@ def _settings(
     yield from settings_told(flavour, vehicle.parameters.values, policy, reach)
 
 
-def settings_told(
-    flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach
-) -> Iterator[VehicleFinding]:
+def settings_told(flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach) -> Iterator[VehicleFinding]:
     """A finding for each of the parameters that were read, which a mission of that reach is to fly with."""
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
     for setting in told:

@@ -39,6 +39,7 @@ class ConnectedVehicle:
         self._unkept: list[tuple[int, bytes]] = []
         self._slice_us = max(_SLICE_US, clock.us_in(_SLICE_S))
         self._greeted_us: int | None = None
+        self._looked_us = 0
         self._seen = StreamCounts()  # of datagrams, while no vehicle is known
         driver.carried_by(transport.capacity)
 
@@ -65,7 +66,8 @@ class ConnectedVehicle:
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
         """Wait at most `timeout_us` of the clock for frames; gives what happened.
 
-        What waits is taken in together. What has to be waited for is acted on as it comes, one datagram at a time.
+        What waits is taken in together. What has to be waited for is acted on as it comes, one datagram at a time. What
+        is due at a time is looked for as often as where nothing comes: what the vehicle says is acted on first.
         """
         self._keep_all()
         events, self._pending = self._pending, []
@@ -80,9 +82,11 @@ class ConnectedVehicle:
         if came:  # before the driver is told the time: it must not take for silence that nobody looked
             self._drain(now_us + self._slice_us, events)
             now_us = self._clock.now().monotonic_us
-        due, frames = self.driver.tick(now_us)
-        self._send(frames)
-        events += due
+        if not came or now_us - self._looked_us >= timeout_us:
+            self._looked_us = now_us
+            due, frames = self.driver.tick(now_us)
+            self._send(frames)
+            events += due
         wait = 0.0 if came or events else max(0.0, self._clock.real_seconds(timeout_us))
         if wait and select.select(links, [], [], wait)[0]:
             self._take(events)

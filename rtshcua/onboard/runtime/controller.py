@@ -18,7 +18,7 @@ from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Expect, Faile
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
-from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.link import LinkState, LinkSupervision, Silence
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
@@ -224,7 +224,7 @@ class MissionController:
         violated = None if supervisor is None else supervisor.violated(self.monitor.state(now.monotonic_us), now)
         return violated is not None and self._violated(now, violated)
 
-    def _violated(self, now: Now, what: str) -> bool:
+    def _violated(self, now: Now, what: Detail) -> bool:
         """Something that must hold for the current step does not."""
         self.dispatcher.end(now, "violated", what)
         self.fall_back(FALLBACK_LINK)

@@ -8,7 +8,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.ports import Command, Dispatch, Frozen, Release
-from rtshcua.onboard.runtime.journal import Journal
+from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
 #: Assumed until enough was measured, in us: an order above anything seen on the machines this was built on.
@@ -112,7 +112,7 @@ class Dispatcher:
         """Whether what flies brings the vehicle home or down."""
         return self.active is not None and self.active.homeward
 
-    def end(self, now: Now, event: str, detail: str = "") -> None:
+    def end(self, now: Now, event: str, detail: Detail = "") -> None:
         """The command that flies ended: record how."""
         active = self.active
         if active is None:

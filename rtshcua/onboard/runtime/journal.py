@@ -17,6 +17,13 @@ _MOST_TEXTS = 64
 
 #: makes what tells of something: its line, and what is announced of it
 Telling = Callable[[], Iterable[Action]]
+#: what is said of something that happened, or what says it once that is recorded
+Detail = str | Callable[[], str]
+
+
+def said(detail: Detail) -> str:
+    """The words of it."""
+    return detail if isinstance(detail, str) else detail()
 
 
 class Journal:
@@ -57,10 +64,13 @@ class Journal:
             yield self._seal(now)
         yield Append(line(), durability, awaited)
 
-    def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: str = "") -> None:
+    def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: Detail = "") -> None:
         """Record something that happened. `detail` may be the world's own text."""
-        line = partial(self.recorder.effect, now, event, ref, token=token, detail=detail)
+        line = partial(self._effect, now, event, ref, token, detail)
         self._entries.append(partial(self.record, line, now, WRITTEN, awaited=False))
+
+    def _effect(self, now: Now, event: str, ref: Ref, token: int, detail: Detail) -> bytes:
+        return self.recorder.effect(now, event, ref, token=token, detail=said(detail))
 
     def note(self, now: Now, text: str) -> None:
         """Record a note, unless one of the same text was recorded a short while ago: then it is counted."""

@@ -1,6 +1,7 @@
 """What must hold all the while a skill runs, and while a step is waited for (`decision.watch`)."""
 
 from collections.abc import Iterable
+from functools import partial
 
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.session import may_ask_again
@@ -9,6 +10,7 @@ from rtshcua.decision.watch import holding, watch
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Reason
+from rtshcua.onboard.runtime.journal import Detail
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.seen import seen
 from rtshcua.wire.response import Answer
@@ -55,15 +57,20 @@ class Supervisor:
         self._started_us = started_us
         self.grace = Grace()
 
-    def violated(self, state: State, now: Now) -> str | None:
+    def violated(self, state: State, now: Now) -> Detail | None:
         """The text of what does not hold any more, with the values that it read, or None while all does."""
         contract = self._prepared.invocation.contract
         at_us = now.monotonic_us
         if 0 < contract.duration_us < at_us - self._started_us:
             return _DURATION
         text = self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
-        values = "" if text is None else seen(text, self._prepared, self._policy, state)
-        return f"{text}: {values}" if values else text
+        return None if text is None else partial(_with_values, text, self._prepared, self._policy, state)
+
+
+def _with_values(text: str, prepared: PreparedInvocation, policy: PreparedPolicy, state: State) -> str:
+    """Worked out when it is recorded, after the fallback was sent."""
+    values = seen(text, prepared, policy, state)
+    return f"{text}: {values}" if values else text
 
 
 class RetryPolicy:

@@ -21,7 +21,15 @@ def test_32_bits_and_their_text_are_the_same_number(value: float) -> None:
 
 
 @rows(
-    ("value", "text"), [(0.1, "0.1"), (300.0, "300"), (-0.0, "0"), (16_777_217.0, "16777216"), (1 / 3, "0.33333334"), (9.99999974e-6, "1e-05")]
+    ("value", "text"),
+    [
+        (0.1, "0.1"),
+        (300.0, "300"),
+        (-0.0, "0"),
+        (16_777_217.0, "16777216"),
+        (1 / 3, "0.33333334"),
+        (9.99999974e-6, "1e-05"),
+    ],
 )
 def test_a_value_is_shown_in_as_few_digits_as_tell_it(value: float, text: str) -> None:
     bits = bits_of(value)

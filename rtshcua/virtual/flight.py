@@ -1,15 +1,18 @@
 """A whole flight of a signed bundle, turn by turn: simulation, driver, loop, runtime, evidence."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from errno import ENOSPC
+from functools import partial
+from types import MappingProxyType
 from typing import Any, Final, Protocol, Self
 
 import msgspec
 
 from rtshcua.adapters.loop import RunLoop
 from rtshcua.adapters.packs import manoeuvres, packs_of
+from rtshcua.adapters.preparation import Preparations
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST
@@ -18,7 +21,8 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
-from rtshcua.onboard.ports import Action, Ending, Event, EvidenceSink
+from rtshcua.onboard.enforcement.preparation import Owed
+from rtshcua.onboard.ports import Action, Ending, Event, EvidenceSink, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
@@ -136,7 +140,8 @@ class VirtualFlight:
     given. `log_key` signs the log; it must be one of the root's if that is to be audited. `sink` makes another place
     for the evidence than memory, and `vehicle` is one that was made already, with the clock that it lives by. What the
     vehicle says is heard every `tick_us`: a longer tick makes a flight cheaper, and what happens on it as much later.
-    `before` is the hash of the last line of the vehicle's log before this one.
+    `before` is the hash of the last line of the vehicle's log before this one. `settings` are parameters that are set
+    before the flight, `owed` what earlier ones left to be put back, kept up to date as a file would be.
     Raises ValueError for a bundle that is refused, and what `open_root` raises.
     """
 
@@ -148,6 +153,7 @@ class VirtualFlight:
         *, root: bytes, log_key: SigningKey = NOBODY, mode: Mode = Mode.SOFTWARE, utc_us: int | None = None,
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
+        settings: Mapping[str, int] = MappingProxyType({}), owed: dict[str, Owed] | None = None,
     ) -> None:  # fmt: skip
         policy, mission = _claimed(bundle)
         utc_us = mission.issued_at_us + LATER_US if utc_us is None else utc_us
@@ -158,6 +164,7 @@ class VirtualFlight:
         loaded = load(
             bundle, root=trusted, vehicle=policy.vehicle.identity, now=now, mode=mode,
             session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=True,
+            settings=settings, owed=owed or {},
         )  # fmt: skip
         if isinstance(loaded, Refusal):
             raise ValueError(f"{loaded.slug}: {loaded.text}")
@@ -191,6 +198,15 @@ class VirtualFlight:
         )
         self.events: list[Event] = []
         self.steps = 0
+        self._wait_us = wait_us
+        self._early: list[Event] = []
+        kept = {} if owed is None else owed
+
+        def keep_owed(now_owed: Mapping[str, Owed]) -> None:
+            kept.clear()
+            kept.update(now_owed)
+
+        self.preparations = Preparations(loaded, self.vehicle.driver, self.clock, kept, self._record, keep_owed)
         self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us, prepares=False)
 
     def fly(self, each: Callable[[Self], Sequence[Event]] = lambda _: (), most_s: int = 3_600) -> FlownFlight:
@@ -198,12 +214,30 @@ class VirtualFlight:
 
         Raises TimeoutError for a flight that has not ended after `most_s` seconds of its time.
         """
-        ending = None
+        ending = self.prepare(each)
         while ending is None:
             if self.clock.elapsed_us >= most_s * SECOND:
                 raise TimeoutError(f"after {most_s} s it flies still: {self.runtime.view(self.clock.now())}")
-            ending = self.loop.turn(each(self))
+            ending = self.turn(each(self))
+        if ending is not Ending.CRASHED:
+            self.preparations.end(partial(self._pass, each))
         return self.close(ending)
+
+    def prepare(self, each: Callable[[Self], Sequence[Event]] = lambda _: ()) -> Ending | None:
+        """Set what is configured, before the first turn; an ending where that keeps the mission from flying."""
+        return Ending.REFUSED if self.preparations.begin(partial(self._pass, each)) is not None else None
+
+    def turn(self, also: Sequence[Event] = ()) -> Ending | None:
+        """One turn of the loop; its ending, once there is one."""
+        early, self._early = self._early, []
+        return self.loop.turn([*early, *also])
+
+    def _pass(self, each: Callable[[Self], Sequence[Event]]) -> bool:
+        """Let time pass outside of the loop, which is told afterwards what happened; False if it is to stop."""
+        given = each(self)
+        self._early += given
+        self._early += self.vehicle.poll(self.clock.now().monotonic_us, self._wait_us)
+        return not any(isinstance(event, Interrupted) for event in given)
 
     def close(self, ending: Ending) -> FlownFlight:
         """Sign and close the log of a flight that ended so; what came of it."""
@@ -211,6 +245,12 @@ class VirtualFlight:
             self.sink.append(self.recorder.close(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
             self.sink.close()
         return self.flown(ending, self.sink.lines, self.vehicle, self.steps, self.loaded, self._root_key)
+
+    def _record(self, event: str, detail: str) -> None:
+        now = self.clock.now()
+        if self.recorder.overdue(now):
+            self.sink.append(self.recorder.seal(now), SYNCED_FIRST)
+        self.sink.append(self.recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST), SYNCED_FIRST)
 
     def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
         self.events += events

@@ -11,6 +11,7 @@ from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, 
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
+from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.source_time import EACH_US, SourceTime
 from rtshcua.adapters.vehicle.streams import AT_TIMES, IN_THE_AIR, PATIENCE_US, StreamPlan, StreamRequests, plan_streams
@@ -80,11 +81,13 @@ class Driver:
         self.source = SourceTime()
         #: what it was last seen to do
         self.seen = ObservedVehicle()
-        #: which autopilot it is; None before its first heartbeat, at which the next four are set
+        #: which autopilot it is; None before its first heartbeat, at which the next five are set
         self.flavour: AutopilotFlavour | None = None
         self._aids: Aids
         self.stream_requests: StreamRequests  # what is asked for, and what comes of it
         self.preflight: Preflight  # what is compared with the policy
+        self.settings: VehicleParameters  # what is read and set for a preparation (`adapters.preparation`),
+        self.prepares = False  # which is under way: nothing is ready, nor is a fence handed over
         self._heeded: set[str]  # what more is made of than readings
         self.system = 0
         #: that it is no multirotor, in words
@@ -146,6 +149,8 @@ class Driver:
         mute = None if self._watch.answers else "it answers nothing that it is asked"
         if self._flies:
             return self.link.crowd or mute or self.seen.unready
+        if self.prepares:
+            return self.other_kind or self.link.crowd or "its parameters are being set as configured"
         waits = self.other_kind or self.link.crowd or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
 
@@ -190,7 +195,7 @@ class Driver:
         send += self.stream_requests.due(self.system, now_us)
         if self.asks is not None and self.seen.down:
             send += self.asks.due(self.system, now_us)
-        if not self._was_ready and self.seen.down:
+        if not self._was_ready and self.seen.down and not self.prepares:
             send += self.preflight.due(self.system, now_us)
         if self._texts.parts:
             self._hear(self._texts.due(now_us), events)
@@ -207,7 +212,13 @@ class Driver:
                 notes.clear()
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
-        return events, self._pack(send, now_us, events) if send else []
+        frames = self._pack(send, now_us, events) if send else []
+        asked = self.settings.due(self.system, now_us)
+        if asked:
+            out, refused = self.link.pack(asked, now_us)
+            frames += out
+            self.settings.refused = refused[0] if refused else self.settings.refused
+        return events, frames
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
         """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard.
@@ -257,6 +268,7 @@ class Driver:
             self.stream_requests = StreamRequests(self.plan(flavour), needed)
             slack = self._commander.slack
             self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
+            self.settings = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
             self.preflight = Preflight(
                 self._policy, flavour, self.seen, self._steps, fence=self._fence, slack=slack, judges=self.judges
             )
@@ -295,6 +307,8 @@ class Driver:
             case "STATUSTEXT":
                 self._hear(self._texts.take(message, now_us), events)
             case _ if name in _OF_PREFLIGHT and self._is_for_us(message):
+                if name == "PARAM_VALUE":
+                    self.settings.take(message)
                 send += self.preflight.take(name, message, self.system, now_us)
         if new and self.seen.landed_state:
             self._tell_air(now_us, events)

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.parameters import decode, encode
 
 RETRY_US: Final = 1_000_000
@@ -39,6 +40,8 @@ class VehicleParameters:
         self._wanted: dict[str, _Wanted] = {}
         #: what was set: the value that was found, and the one that is wanted
         self.changed: dict[str, tuple[float, float]] = {}
+        #: why the boundary did not let out what was to be set, last
+        self.refused: Refusal | None = None
 
     def read(self, name: str) -> None:
         """Ask for one that is not asked for yet."""
@@ -48,6 +51,10 @@ class VehicleParameters:
         """As if it had never been asked for."""
         self._wanted.pop(name, None)
         self.values.pop(name, None)
+
+    def drop(self, name: str) -> None:
+        """Ask for it, or set it, no more; what was heard of it stays."""
+        self._wanted.pop(name, None)
 
     def write(self, name: str, value: float) -> None:
         """Set one that was read before."""
@@ -73,6 +80,10 @@ class VehicleParameters:
     def is_absent(self, name: str) -> bool:
         """Whether it did not answer, as often as it was asked."""
         return name in self._wanted and self._wanted[name].silent
+
+    def is_known(self, name: str) -> bool:
+        """Whether it answered, or is given up for now."""
+        return name in self.values or self.is_absent(name)
 
     def is_settled(self, name: str) -> bool:
         """Whether nothing about it is outstanding."""

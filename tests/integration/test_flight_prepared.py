@@ -1,0 +1,143 @@
+"""Parameters that an operator configured are set before a flight, make the mission fly, and are put back after it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from rtshcua.mavlink.parameters import bits_of
+from rtshcua.model.faults import LinkLoss, MessageSilence
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.preparation import Owed
+from rtshcua.onboard.ports import Ending, Event, Interrupted
+from rtshcua.virtual.vehicle import VirtualVehicle
+from virtual.flight import Flight
+from virtual.shipped import shipped, simulated
+
+S = 1_000_000
+#: what its owner has, which the mission does not fit into, and what is configured; `short` returns at 30 m
+NARROW = {
+    "ardupilot": ({"FENCE_RADIUS": 30.0, "FENCE_ALT_MAX": 15.0}, {"FENCE_RADIUS": 250.0, "FENCE_ALT_MAX": 80.0}),
+    "px4": ({"GF_MAX_VER_DIST": 15.0, "GF_ACTION": 1.0}, {"GF_MAX_VER_DIST": 80.0, "GF_ACTION": 3.0}),
+}
+FLAVOURS = pytest.mark.parametrize("flavour", NARROW)
+
+
+def bits(values: dict[str, float]) -> dict[str, int]:
+    return {name: found for name, value in values.items() if (found := bits_of(value)) is not None}
+
+
+def prepared(flavour: str, owed: dict[str, Owed] | None = None, **fields: Any) -> Flight:
+    had, settings = NARROW[flavour]
+    config = simulated(flavour, parameters=tuple(had.items()), **fields)
+    return Flight(shipped("short"), config, settings=bits(settings), owed=owed)
+
+
+def has(flight: Flight, names: Sequence[str]) -> dict[str, float]:
+    parameters = flight.vehicle.simulation._autopilot.parameters
+    return {name: parameters.value(name) for name in names}
+
+
+@FLAVOURS
+def test_what_is_configured_makes_it_fly_and_is_put_back(flavour: str) -> None:
+    had, settings = NARROW[flavour]
+    owed: dict[str, Owed] = {}
+    flight = prepared(flavour, owed)
+    during: list[dict[str, float]] = []
+
+    def each(of: Flight) -> Sequence[Event]:
+        if of.vehicle.simulation.truth().up_mm > 5_000:
+            during.append(has(of, tuple(settings)))
+        return ()
+
+    flown = flight.fly(each)
+    assert flown.ending is Ending.COMPLETED
+    assert during
+    assert all(each == settings for each in during)
+    assert has(flight, tuple(had)) == had
+    assert owed == {}
+    told = [each["detail"] for each in flown.effects("preparation")]
+    assert [each.split()[0] for each in told] == ["set", "restore"]
+    for name, value in had.items():
+        assert f"{name} from {value:g} to {settings[name]:g}" in told[0]
+        assert f"{name} from {settings[name]:g} to {value:g}" in told[1]
+    assert len(flown.effects("prepared")) == 2
+    order = [each["event"] for each in flown.records if each["type"] == "effect"]
+    assert order.index("prepared") < order.index("ready") < order.index("dispatched")
+    assert flown.audit().report.failure is None
+
+
+@FLAVOURS
+def test_without_it_the_same_mission_is_refused(flavour: str) -> None:
+    had, _ = NARROW[flavour]
+    flight = Flight(shipped("short"), simulated(flavour, parameters=tuple(had.items())))
+    assert flight.fly().ending is Ending.REFUSED
+    assert has(flight, tuple(had)) == had
+
+
+@FLAVOURS
+@pytest.mark.parametrize("fault", [
+    MessageSilence(at_us=S, message="PARAM_VALUE", for_us=6 * S), LinkLoss(at_us=0, loss=2_000, for_us=20 * S),
+], ids=["no PARAM_VALUE for a while", "a fifth of all is lost"])  # fmt: skip
+def test_lost_answers_delay_it_and_spoil_nothing(flavour: str, fault: Any) -> None:
+    had, _ = NARROW[flavour]
+    flight = prepared(flavour, faults=(fault,))
+    assert flight.fly().ending is Ending.COMPLETED
+    assert has(flight, tuple(had)) == had
+
+
+@FLAVOURS
+def test_what_is_never_answered_refuses_the_mission(flavour: str) -> None:
+    flight = prepared(flavour, faults=(MessageSilence(at_us=0, message="PARAM_VALUE"),))
+    flown = flight.fly()
+    assert flown.ending is Ending.REFUSED
+    assert flown.dispatched() == flown.effects("preparation") == []
+    assert has(flight, tuple(NARROW[flavour][0])) == NARROW[flavour][0]
+
+
+@FLAVOURS
+def test_what_is_interrupted_on_the_ground_is_put_back(flavour: str) -> None:
+    had, _ = NARROW[flavour]
+    flight = prepared(flavour)
+    asked = [False]
+
+    def each(of: Flight) -> Sequence[Event]:
+        if asked[0] or has(of, tuple(had)) == had:
+            return ()
+        asked[0] = True
+        return [Interrupted(of.clock.now().monotonic_us)]
+
+    flown = flight.fly(each)
+    assert flown.ending is Ending.INTERRUPTED
+    assert flown.dispatched() == []
+    assert len(flown.effects("preparation")) == 2
+    assert has(flight, tuple(had)) == had
+
+
+@FLAVOURS
+def test_what_a_run_that_died_left_is_put_back_by_the_next(flavour: str) -> None:
+    had, settings = NARROW[flavour]
+    owed: dict[str, Owed] = {}
+    first = prepared(flavour, owed)
+    assert first.prepare() is None
+    while first.vehicle.simulation.truth().up_mm < 8_000:  # as `fly` does, and then nobody goes on
+        assert first.turn() is None
+    assert set(owed) == set(had)
+    assert has(first, tuple(had)) == settings
+
+    bundle = first.loaded.bundle
+    again = VirtualVehicle(
+        bundle.policy, simulated(flavour), first.clock, FrameSession(), steps=bundle.mission.invocations
+    )
+    again.simulation = first.vehicle.simulation
+    second = Flight(shipped("short"), simulated(flavour), vehicle=again, resumed=True, owed=owed)
+    flown = second.fly()
+    assert flown.ending is Ending.ABORTED
+    (kept,) = flown.effects("not-restored")
+    assert "not known to stand on the ground" in kept["detail"]
+    (put_back,) = flown.effects("preparation")
+    assert put_back["detail"].startswith("restore ")
+    assert put_back["seq"] > flown.effects("resumed")[0]["seq"]
+    assert has(second, tuple(had)) == had
+    assert owed == {}
+    assert flown.audit().report.failure is None

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from time import perf_counter_ns
 
 from rtshcua.campaign.flights import DIED, LOST, Field
 from rtshcua.decision.prepare import prepare, prepare_mission
@@ -41,6 +42,7 @@ class Trial:
 
     def fly(self, flight: Try) -> Tried:
         """One of them."""
+        began_ns = perf_counter_ns()
         was = self.field.flown(flight.scenario, flight.flavour, flight.seed)
         verdict = judge(was)
         wrong = [Wrong(JUDGED, each.slug, each.text) for each in verdict.failures]
@@ -58,6 +60,7 @@ class Trial:
             tuple(f"{each.slug}: {each.cause}" for each in verdict.exceptions),
             tuple(f"{each.at_us / 1_000_000:.2f} s {each.text}" for each in was.happened),
             tuple(_reached(was)) if self.with_coverage else (),
+            (perf_counter_ns() - began_ns) // 1_000,
         )
 
     def lost(self, flight: Try) -> Tried:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from time import perf_counter_ns
 from typing import Final, NamedTuple
 
 from rtshcua.cli.progress import watched
@@ -117,7 +118,9 @@ def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: boo
 
 
 def _run(case: Case, tally: Tally | None) -> Ran:
+    began_ns = perf_counter_ns()
     ran = run_case(case)
+    ran = ran._replace(took_us=(perf_counter_ns() - began_ns) // 1_000)
     if tally is not None:
         tally.case(ran)
     return ran

@@ -19,7 +19,7 @@ class Outcome:
     """How one test ended: passed, unless `failure` or `skipped` says why not.
 
     `kind` is a short name for what failed, for programs; `broken` says that the test could not be run, which JUnit
-    calls an error; `time_ms` is how long it took, None where nobody measured. `line` counts from 1.
+    calls an error; `time_us` is how long it took, None where nobody measured. `line` counts from 1.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Outcome:
     kind: str = ""
     broken: bool = False
     skipped: str | None = None
-    time_ms: int | None = None
+    time_us: int | None = None
     output: str = ""
 
 
@@ -75,13 +75,13 @@ def _count(element: ElementTree.Element, name: str, cases: Iterable[Outcome], *,
     element.set("errors", str(sum(case.failure is not None and case.broken for case in each)))
     if skipped:
         element.set("skipped", str(sum(_is_skipped(case) for case in each)))
-    element.set("time", _seconds(sum(case.time_ms or 0 for case in each)))
+    element.set("time", _seconds(sum(case.time_us or 0 for case in each)))
 
 
 def _case(made: ElementTree.Element, case: Outcome, suite: Suite) -> None:
     element = ElementTree.SubElement(made, "testcase", name=_line(case.name), classname=_line(case.file or suite.name))
-    if case.time_ms is not None:
-        element.set("time", _seconds(case.time_ms))
+    if case.time_us is not None:
+        element.set("time", _seconds(case.time_us))
     if case.failure is not None:
         text = _text(case.failure)
         failure = ElementTree.SubElement(element, "error" if case.broken else "failure", message=text.split("\n")[0])
@@ -104,7 +104,9 @@ def _place(case: Outcome) -> str:
     return f"{_line(case.file)}{'' if case.line is None else f':{case.line}'}\n"
 
 
-def _seconds(milliseconds: int) -> str:
+def _seconds(microseconds: int) -> str:
+    """To the millisecond, which is all that the schema of Jenkins takes; what took less counts as one."""
+    milliseconds = -(-microseconds // 1_000)
     return f"{milliseconds // 1000}.{milliseconds % 1000:03}"
 
 

@@ -29,7 +29,9 @@ class Wrong(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on."""
+    """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on; `took_us`:
+    how long it took to fly and judge, by the machine's clock.
+    """
 
     number: int
     flavour: str
@@ -39,6 +41,7 @@ class Tried:
     excused: tuple[str, ...]
     happened: tuple[str, ...]
     reached: tuple[Reached, ...]
+    took_us: int = 0
 
 
 class Flown(NamedTuple):
@@ -123,7 +126,10 @@ def flown_suites(flown: Sequence[Flown], sources: Mapping[str, Source]) -> tuple
 def _outcome(flown: Flown, sources: Mapping[str, Source]) -> Outcome:
     span = flown.scenario.declaration.name.span
     line = sources[span.file].position(span.start).line
+    took_us = sum(flight.took_us for flight in flown.flights)
     if not flown.findings:
-        return Outcome(flown.scenario.scenario.name, span.file, line)
+        return Outcome(flown.scenario.scenario.name, span.file, line, time_us=took_us)
     text = "\n".join(render_one(each, sources).rstrip("\n") for each in flown.findings)
-    return Outcome(flown.scenario.scenario.name, span.file, line, failure=text, kind=flown.findings[0].code.id)
+    return Outcome(
+        flown.scenario.scenario.name, span.file, line, failure=text, kind=flown.findings[0].code.id, time_us=took_us
+    )

@@ -101,9 +101,9 @@ def _outcome(ran: Ran, sources: Mapping[str, Source]) -> Outcome:
     span, finding = ran.case.span, ran.finding
     line = sources[span.file].position(span.start).line
     if finding is None:
-        return Outcome(ran.case.name, span.file, line)
+        return Outcome(ran.case.name, span.file, line, time_us=ran.took_us)
     text = render_one(finding, sources).rstrip("\n")
-    return Outcome(ran.case.name, span.file, line, failure=text, kind=finding.code.id)
+    return Outcome(ran.case.name, span.file, line, failure=text, kind=finding.code.id, time_us=ran.took_us)
 
 
 def _properties(covered: Sequence[Covered]) -> Iterable[tuple[str, str]]:

@@ -23,13 +23,17 @@ MAX_PERMITS = 3
 
 
 class Ran(NamedTuple):
-    """A case, the way to its decision, what was expected, and whether it was met; where not, `finding` (E1411)."""
+    """A case, the way to its decision, what was expected, and whether it was met; where not, `finding` (E1411).
+
+    `took_us`: how long that took, where somebody measured it.
+    """
 
     case: Case
     trace: Trace
     expected: Expectation
     met: bool
     finding: Diagnostic | None
+    took_us: int | None = None
 
 
 def run_case(case: Case) -> Ran:

@@ -205,6 +205,9 @@ def test_junit_has_a_case_each_and_the_coverage(here: Path, capsys: pytest.Captu
     assert (root.get("tests"), root.get("failures")) == ("4", "1")
     names = [case.get("name") for case in root.iter("testcase")]
     assert names == ["hovering [60 %]", "hovering [40 %]", "hovering [unknown]", "coming home"]
+    times = [float(case.get("time", "0")) for case in root.iter("testcase")]
+    assert min(times) > 0
+    assert float(root.get("time", "0")) >= max(times)
     properties = [each.get("name") for each in root.iter("property")]
     assert properties[0] == "coverage yard@1"
     assert "never decided yard@1" in properties

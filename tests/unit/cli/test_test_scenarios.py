@@ -60,6 +60,7 @@ def test_scenarios_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "coverage of training_field@2 on quad: " in out
     suite = ElementTree.parse("report.xml").getroot()
     assert [len(case) for case in suite.iter("testcase")] == [0, 1]
+    assert all(float(case.get("time", "0")) > 0.01 for case in suite.iter("testcase")), "a flight takes its time"
 
 
 def test_only_those_that_are_chosen_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -31,7 +31,7 @@ def read(*given: Suite) -> ElementTree.Element:
 
 
 CASES = (
-    Outcome("passes", "a.rts", 3, time_ms=1250),
+    Outcome("passes", "a.rts", 3, time_us=1_249_001),
     Outcome("fails", "a.rts", 9, failure="asked for allow\nwas deny", kind="state/violated", output="trace"),
     Outcome("cannot run", "a.rts", failure="no nominal", broken=True),
     Outcome("is left out", "a.rts", skipped="not asked for"),

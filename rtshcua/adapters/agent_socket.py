@@ -288,6 +288,10 @@ def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s:
         try:
             link.connect(str(path))
         except OSError as error:
+            if path.exists() and not path.is_socket():
+                raise OSError(errno.ENXIO, "no agent socket of a flight", str(path)) from None
+            if error.errno is None:
+                raise OSError(errno.ENAMETOOLONG, "the path is too long for a socket", str(path)) from None
             raise OSError(error.errno, error.strerror, str(path)) from None
         link.sendall(line)
         waiting = b""

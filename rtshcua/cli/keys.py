@@ -6,7 +6,7 @@ import re
 import secrets
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from getpass import getpass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -34,7 +34,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
-from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, TrustRoot, open_root
+from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, PERSON, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -91,6 +91,11 @@ def init(
         return fail(
             ExitCode.USAGE, f"`--witness-threshold {witness_threshold}` is more than the {witnesses} of `--witnesses`"
         )
+    misnamed = _misnamed(role or (), policy or ())
+    if misnamed is not None:
+        return misnamed
+    if not PERSON.fullmatch(owner):
+        return _no_person(owner)
     if not development and not policy:
         help = "`--policy NAME` names one: whoever may choose the policy may choose a laxer one"
         return fail(ExitCode.USAGE, "mission keys that are in earnest are for named policies", help)
@@ -136,8 +141,10 @@ def approver(
     The same name is the same person: where a rule asks two people, two keys of one name are one. Hand the key file
     over, and keep it nowhere else. Who pinned the root key trusts the new root too.
     """
+    if not PERSON.fullmatch(name):
+        return _no_person(name)
     if not _ROLE.fullmatch(role):
-        return fail(ExitCode.USAGE, f"`{visible(role)}` is no role", "accepted: a name, as policies write it")
+        return _no_name(role, "role")
     return _added(
         Duty.APPROVAL,
         lambda key: key.verification(roles=(role,), sources=(HUMAN,), vehicles=tuple(vehicle or (ANY,)), person=name),
@@ -167,6 +174,9 @@ def mission(
     """
     if source not in PROPOSERS:
         return fail(ExitCode.USAGE, f"`{source}` proposes no missions", f"accepted: {' or '.join(PROPOSERS)}")
+    misnamed = _misnamed(role, policy)
+    if misnamed is not None:
+        return misnamed
     return _added(
         Duty.MISSION,
         lambda key: key.verification(
@@ -521,6 +531,24 @@ def _link_named(text: str) -> bytes | None:
 def _own_passphrase(root: TrustRoot, file: Path | None) -> bytes | Literal[False]:
     """What a new key of this root is encrypted with; empty for development, False where no good one was given."""
     return b"" if root.development else _new_passphrase(file) or False
+
+
+def _misnamed(roles: Sequence[str], policies: Sequence[str]) -> ExitCode | None:
+    """Fails for the first that can be no role or policy of any source; None where each can."""
+    for what, names in (("role", roles), ("policy", policies)):
+        for name in names:
+            if name != ANY and not _ROLE.fullmatch(name):
+                return _no_name(name, what)
+    return None
+
+
+def _no_name(name: str, what: str) -> ExitCode:
+    return fail(ExitCode.USAGE, f"`{visible(name)}` is no {what}", "accepted: a name, as policies write it")
+
+
+def _no_person(name: str) -> ExitCode:
+    text = f"`{visible(name)}` is no name of a person"
+    return fail(ExitCode.USAGE, text, "accepted: up to 64 lower-case letters, digits, `.`, `_` and `-`")
 
 
 def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:

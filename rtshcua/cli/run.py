@@ -102,6 +102,10 @@ def run(
     own = connect is None
     if not own and words:
         return fail(ExitCode.USAGE, "options of the simulated vehicle do not go with `--connect`", _SIM_HELP)
+    try:
+        link = None if connect is None else address.parse(connect)
+    except AddressError as error:
+        return misaddressed("--connect", error)
     if not own and vehicle is None:
         return fail(ExitCode.USAGE, "`--connect` needs `--vehicle`: which vehicle is it?", _VEHICLE_HELP)
     if not own and scenario is not None:
@@ -115,10 +119,6 @@ def run(
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
-    try:
-        link = None if connect is None else address.parse(connect)
-    except AddressError as error:
-        return misaddressed("--connect", error)
     try:
         witnesses = witnessed.addresses(witness or ())
     except AddressError as error:

@@ -17,7 +17,7 @@ from rtshcua.wire.untrusted import Untrusted
 #: what a human answer comes through; a key that may speak through an agent only answers nothing
 HUMAN: Final = "operator"
 #: how people are named: one way to write each name, so that two names are two people
-_PERSON: Final = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
+PERSON: Final = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
 
 #: length of the name of a link's key in bytes, as `revoked` holds it: it signs frames, and no root names it
 LINK_ID_BYTES: Final = 8
@@ -271,7 +271,7 @@ def _check_bound(key: VerificationKey) -> None:
         raise RootError("malformed", f"a key of duty `{key.duty}` has a person or policies")
     if key.duty is not Duty.APPROVAL:
         return
-    if not _PERSON.fullmatch(key.person):
+    if not PERSON.fullmatch(key.person):
         text = f"approval key {key.kid.hex()} is of no person: a name has lower-case letters, digits, `.`, `_` and `-`"
         raise RootError("whose-approval", text)
     if len(key.roles) != 1 or ANY in key.roles or key.sources != (HUMAN,):

@@ -103,8 +103,8 @@ def parse(text: str, ways: Collection[Way] = tuple(Way)) -> Address:
     example = f"write it as `{_EXAMPLES[way]}`"
     host, second, port = rest.rpartition(":")
     if not colon or not second:
-        missing = number if rest else f"{place} and {number}"
-        raise AddressError(f"the {missing} of the link is missing", text, len(text), len(text), example)
+        missing = f"{number} of the link is missing" if rest else f"{place} and {number} of the link are missing"
+        raise AddressError(f"the {missing}", text, len(text), len(text), example)
     end = begin + len(host)
     if not host:
         raise AddressError(f"the {place} of the link is missing", text, begin, begin, example)

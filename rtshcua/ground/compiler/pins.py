@@ -36,7 +36,7 @@ def claims(mission: MissionDecl, pins: Pins) -> Iterator[Diagnostic]:
     for word, name, pinned in (("source", mission.source, pins.source), ("role", mission.role, pins.role)):
         if name is not None and pinned is not None and name.text != pinned:
             text = f"says that its {word} is `{name.text}`, and is compiled as `{pinned}`"
-            yield _claim(name, text, f"write `{pinned}`; `rtshcua compile --{word} {name.text}` is for you to say")
+            yield _claim(name, text, _either(word, name.text, pinned))
     policy, allowed = mission.policy, pins.policies
     if allowed is not None and not allowed:
         yield Diagnostic(
@@ -53,6 +53,11 @@ def claims(mission: MissionDecl, pins: Pins) -> Iterator[Diagnostic]:
         named = f"`{policy.text}@{mission.policy_version}`"
         text = f"says that it flies under {named}, and is compiled for version {pins.version}"
         yield _claim(policy, text, f"write `{policy.text}@{pins.version}`")
+
+
+def _either(word: str, claimed: str, pinned: str) -> str:
+    """Which of both is wrong nobody knows here: a slip in an option, or a claim that goes too far."""
+    return f"if `--{word} {pinned}` is what you mean, write `{pinned}`; else `--{word} {claimed}` is for you to say"
 
 
 def _claim(name: Name, text: str, help: str) -> Diagnostic:

@@ -10,7 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.agent_socket import GAP_US, LONGEST, MOST_READERS, MOST_WAITING, AgentSocket, SocketTaken, hand_in
+from rtshcua.adapters.agent_socket import (
+    GAP_US,
+    LONGEST,
+    MOST_READERS,
+    MOST_WAITING,
+    AgentSocket,
+    SocketTaken,
+    flight_at,
+    hand_in,
+)
 from rtshcua.onboard.ports import Presented
 
 HELLO = b'{"type":"hello"}\n'
@@ -252,3 +261,9 @@ def test_a_socket_in_no_folder_is_named(folder: Path) -> None:
     with pytest.raises(FileNotFoundError) as refused:
         AgentSocket(folder / "none" / "x", lambda: HELLO)
     assert refused.value.filename == str(folder / "none" / "x")
+    (folder / "file").write_text("no socket")
+    for path in (folder, folder / "file"):
+        with pytest.raises(OSError, match="no agent socket of a flight"):
+            flight_at(path)
+    with pytest.raises(OSError, match="too long for a socket"):
+        hand_in(folder / ("x" * 120), b"")

@@ -86,3 +86,16 @@ def test_a_line_that_is_no_address(capsys: pytest.CaptureFixture[str]) -> None:
         "    |        ^^^^^^^",
         " help: a device is an absolute path: write it as `serial:/dev/ttyAMA0:921600`",
     ]
+
+
+def test_what_is_wrong_with_the_address_is_said_before_that_the_vehicle_is_not_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for address, says_so in (
+        ("serial", "the device and baud rate of the link are missing"),
+        ("udpin", "the host and port of the link are missing"),
+    ):
+        assert app.main(["run", "any.bundle", "--connect", address]) == ExitCode.USAGE
+        assert says_so in capsys.readouterr().err
+    assert app.main(["run", "any.bundle", "--connect", "udpin:127.0.0.1:14550"]) == ExitCode.USAGE
+    assert "`--connect` needs `--vehicle`" in capsys.readouterr().err

@@ -177,8 +177,8 @@ def test_an_approver_is_a_person_in_a_role(capsys: pytest.CaptureFixture[str]) -
     ("words", "code"),
     [
         (["ada", "--role", "supervisor"], ExitCode.UNTRUSTED),  # there is one already
-        (["Ada", "--role", "pilot"], ExitCode.UNTRUSTED),
-        (["../ada", "--role", "pilot"], ExitCode.UNTRUSTED),
+        (["Ada", "--role", "pilot"], ExitCode.USAGE),
+        (["../ada", "--role", "pilot"], ExitCode.USAGE),
         (["ada", "--role", "*"], ExitCode.USAGE),
         (["ada", "--role", "../pilot"], ExitCode.USAGE),
     ],
@@ -190,6 +190,26 @@ def test_who_is_no_approver(words: list[str], code: ExitCode, capsys: pytest.Cap
     before = (store.root(), sorted(store.folder.iterdir()))
     assert app.main(["keys", "approver", *words]) == code
     assert (store.root(), sorted(store.folder.iterdir())) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["approver", "a/b", "--role", "pilot"], "`a/b` is no name of a person"),
+        (["mission", "agent", "--role", "a/b", "--policy", "field"], "`a/b` is no role"),
+        (["mission", "agent", "--role", "pilot", "--policy", "a b"], "`a b` is no policy"),
+        (["init", "--encrypted", "--policy", "field", "--approver", "A"], "`A` is no name of a person"),
+        (["init", "--encrypted", "--policy", "a b"], "`a b` is no policy"),
+        (["init", "--role", ""], "`` is no role"),
+    ],
+)
+def test_a_name_that_is_none_is_refused_before_a_passphrase_is_asked_for(
+    words: list[str], says: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keys, "_new_passphrase", lambda _: pytest.fail("too early"))
+    monkeypatch.setattr(keys, "unlock", lambda *_, **__: pytest.fail("too early"))
+    assert app.main(["keys", *words]) == ExitCode.USAGE
+    assert says in capsys.readouterr().err
 
 
 def test_a_further_mission_key_is_for_what_it_names(capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ def test_parts() -> None:
 
 @pytest.mark.parametrize(("text", "marked", "says", "accepted"), [
     ("", "", "is empty", "udpin:0.0.0.0:14550"),
-    ("udpin", "", "host and port of the link is missing", "udpin:0.0.0.0:14550"),
+    ("udpin", "", "host and port of the link are missing", "udpin:0.0.0.0:14550"),
     ("udpin:", "", "host and port", "udpin:0.0.0.0:14550"),
     ("udpin:14550", "", "port of the link is missing", "udpin:0.0.0.0:14550"),
     ("udpin::14550", "", "host of the link is missing", "udpin:0.0.0.0:14550"),

@@ -29,6 +29,7 @@ FILES = (
     "skills/look_around.rts",
     "missions/first_look.rts",
     "tests/rules.rts",
+    "tests/flights.rts",
     "rtshcua.toml",
     ".pre-commit-config.yaml",
     ".github/workflows/policy.yml",

@@ -8,7 +8,22 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
+from rtshcua.cli.documents import (
+    MOST_S,
+    WHERE,
+    WHOSE,
+    AgentSocket,
+    ApprovalKey,
+    AsJson,
+    FlightId,
+    FlyingBundle,
+    PassphraseFile,
+    Person,
+    SignedRoot,
+    deliver,
+    flight_id,
+    subject,
+)
 from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
 from rtshcua.cli.unlock import terminal, unlock_person
@@ -16,38 +31,31 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
-from rtshcua.wire.document import MAX_LIFE_US
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-_MOST_S = MAX_LIFE_US // 1_000_000
-
 
 @app.command()
 def approve(
-    bundle: Annotated[Path, typer.Argument(help="the bundle that flies")],
+    bundle: FlyingBundle,
     step: Annotated[int, typer.Option(help="the number of the step, from 0")],
     role: Annotated[str | None, typer.Option(help="who you are, where several are asked")] = None,
     refused: Annotated[bool, typer.Option("--refuse", help="say no: the step is denied, whoever else agrees")] = False,
-    seconds: Annotated[int, typer.Option("--for", min=1, max=_MOST_S, help="how many seconds the answer is good")]
+    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds the answer is good")]
     = 300,
     replacement: Annotated[
         list[Path] | None, typer.Option(help="a replacement that is in force since, in order (repeatable)")
     ] = None,
-    to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
+    to: AgentSocket = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer here")] = None,
-    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
-    flight: Annotated[
-        str | None, typer.Option(metavar="ID", help="the flight: its id, or its agent socket [default: --to]")
-    ] = None,
-    person: Annotated[
-        str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
-    ] = None,
-    approval_key: Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    root: SignedRoot = None,
+    flight: FlightId = None,
+    person: Person = None,
+    approval_key: ApprovalKey = None,
+    passphrase_file: PassphraseFile = None,
     yes: Annotated[bool, typer.Option("--yes", help="sign without asking, at a terminal too; for scripts")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Answer the `confirm` rules that ask you about one step of one mission: yes, or no.
 

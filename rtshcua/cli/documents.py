@@ -3,6 +3,9 @@
 import json
 import re
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.files.folders import data_folder
@@ -16,9 +19,28 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, open_bundle
-from rtshcua.wire.document import MAX_DOCUMENT
+from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
+
+# ---------------------------------------------------------------- the options that they share
+
+FlyingBundle = Annotated[Path, typer.Argument(help="the bundle that flies")]
+AgentSocket = Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")]
+FlightId = Annotated[
+    str | None, typer.Option(metavar="ID", help="the flight: its id, or its agent socket [default: --to]")
+]
+Person = Annotated[
+    str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
+]
+SignedRoot = Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")]
+ApprovalKey = Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the key's passphrase")]
+AsJson = Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")]
+#: the longest that a document may be good for, in s
+MOST_S = MAX_LIFE_US // 1_000_000
+
+# ---------------------------------------------------------------- what they do alike
 
 _FLIGHT = re.compile(r"[0-9a-f]{32}")
 #: help for what a document may be handed to

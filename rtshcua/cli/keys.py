@@ -22,6 +22,7 @@ from rtshcua.adapters.link_setup import LinkSetup, after_setup, carry_out
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.cli.documents import AsJson
 from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.meeting import unopened
 from rtshcua.cli.showing.keys import as_object, speaks
@@ -38,6 +39,11 @@ from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, PERSON, TrustRoot, open_roo
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
+
+# the options that its commands share
+Vehicles = Annotated[list[str] | None, typer.Option(help="the identity of a vehicle [default: any] (repeatable)")]
+RootPassphrase = Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")]
+OwnPassphrase = Annotated[Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")]
 
 _DAY_US = 86_400_000_000
 _SHORTEST = 12  # characters of a passphrase
@@ -73,7 +79,7 @@ def init(
         typer.Option(help="a policy that missions may be under; encrypted keys need one [default: any] (repeatable)"),
     ] = None,
     owner: Annotated[str, typer.Option("--approver", help="who may recall, and answer as operator")] = OWNER,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Make a key for each duty, and the trust root that names them.
 
@@ -127,14 +133,10 @@ def init(
 def approver(
     name: Annotated[str, typer.Argument(help="the person: lower-case letters, digits, `.`, `_`, `-`")],
     role: Annotated[str, typer.Option(help="the role in which they answer")],
-    vehicle: Annotated[
-        list[str] | None, typer.Option(help="the identity of a vehicle [default: any] (repeatable)")
-    ] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
-    own_passphrase_file: Annotated[
-        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    vehicle: Vehicles = None,
+    passphrase_file: RootPassphrase = None,
+    own_passphrase_file: OwnPassphrase = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Make an approval key for one person in one role, and the next version of the trust root, which names it.
 
@@ -159,14 +161,10 @@ def mission(
     source: Annotated[str, typer.Argument(metavar="agent|operator", help="who proposes what it signs")],
     role: Annotated[list[str], typer.Option(help="a role that missions are for (repeatable)")],
     policy: Annotated[list[str], typer.Option(help="a policy that missions are under (repeatable)")],
-    vehicle: Annotated[
-        list[str] | None, typer.Option(help="the identity of a vehicle [default: any] (repeatable)")
-    ] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
-    own_passphrase_file: Annotated[
-        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    vehicle: Vehicles = None,
+    passphrase_file: RootPassphrase = None,
+    own_passphrase_file: OwnPassphrase = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Make a mission key for one source, bound to roles and policies, and the next version of the trust root.
 
@@ -199,8 +197,8 @@ def revoke(
             metavar="ID", help="the key of a link: what `rtshcua keys link` printed, or its file (repeatable)"
         ),
     ] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    passphrase_file: RootPassphrase = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Make the next version of the trust root, by which keys are never trusted again.
 
@@ -232,11 +230,9 @@ def revoke(
 @app.command(name="replace")
 def replace_(
     key: Annotated[str, typer.Argument(help="its id, or the first 8 digits, or the name of its file")],
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
-    own_passphrase_file: Annotated[
-        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    passphrase_file: RootPassphrase = None,
+    own_passphrase_file: OwnPassphrase = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Revoke a key, and make another that may speak for the same: an agent's, an approver's, a vehicle's log key.
 
@@ -264,11 +260,9 @@ def rotate_root(
     days: Annotated[
         int | None, typer.Option(min=1, max=3660, help="how long the new root is valid [default: as the old one]")
     ] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")] = None,
-    own_passphrase_file: Annotated[
-        Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    passphrase_file: RootPassphrase = None,
+    own_passphrase_file: OwnPassphrase = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Change the root key, in two versions of the trust root: one names both keys, the next one revokes the old.
 
@@ -293,7 +287,7 @@ def accept(
     roots: Annotated[list[Path], typer.Argument(metavar="ROOT", help="signed trust roots, from the oldest on")],
     vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is")],
     state_dir: Annotated[Path | None, typer.Option(help="where the vehicle's state is kept (the data folder)")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """On the vehicle: take a newer trust root, which may revoke keys. No older one is taken again.
 
@@ -324,7 +318,7 @@ def accept(
 
 @app.command(name="list")
 def list_(
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """List the keys of the key store, and what the trust root trusts them for."""
     return _listed(KeyStore(data_folder()), as_json=as_json)
@@ -332,7 +326,7 @@ def list_(
 
 @app.command()
 def show(
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Print the pin of the trust root: what an auditor gives to `rtshcua verify-log --root`."""
     store = KeyStore(data_folder())
@@ -428,13 +422,14 @@ def _set_up(file: Path, address: Address, system: int | None) -> ExitCode:
     release = "of an unknown release" if seen.release is None else ".".join(map(str, seen.release))
     did = "it has this key, nothing was sent" if seen.already else "disarmed, on the ground: the key was sent"
     yes = {True: "yes", False: "no"}
-    print(f"{seen.autopilot} {release}, system {seen.system}: {did}")
-    print(f"  signs what it sends           {yes[seen.signs]}")
-    print(f"  answers a signed request      {yes[seen.answers_signed]}")
-    print(f"  answers an unsigned request   {yes[seen.answers_unsigned]}")
-    for text in seen.texts:
-        print(f"  it said                       `{visible(text)}`")
-    print(f"  {after_setup(seen.autopilot, seen.release)}")
+    out(
+        f"{seen.autopilot} {release}, system {seen.system}: {did}",
+        f"  signs what it sends           {yes[seen.signs]}",
+        f"  answers a signed request      {yes[seen.answers_signed]}",
+        f"  answers an unsigned request   {yes[seen.answers_unsigned]}",
+        *(f"  it said                       `{text}`" for text in seen.texts),
+        f"  {after_setup(seen.autopilot, seen.release)}",
+    )
     if seen.insists:
         return ExitCode.OK
     if seen.signs and seen.answers_signed:

@@ -8,37 +8,45 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
+from rtshcua.cli.documents import (
+    MOST_S,
+    WHERE,
+    WHOSE,
+    AgentSocket,
+    ApprovalKey,
+    AsJson,
+    FlightId,
+    FlyingBundle,
+    PassphraseFile,
+    Person,
+    SignedRoot,
+    deliver,
+    flight_id,
+    subject,
+)
 from rtshcua.cli.faults import fail, refuse, untrusted
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.wire.document import MAX_LIFE_US
 from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-_MOST_S = MAX_LIFE_US // 1_000_000
-
 
 @app.command()
 def recall(
-    bundle: Annotated[Path, typer.Argument(help="the bundle that flies")],
+    bundle: FlyingBundle,
     policy: Annotated[bool, typer.Option("--policy", help="all that fly under its policy on this vehicle")] = False,
-    seconds: Annotated[int, typer.Option("--for", min=1, max=_MOST_S, help="how many seconds the recall is good")]
+    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds the recall is good")]
     = 300,
-    to: Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")] = None,
+    to: AgentSocket = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed recall here")] = None,
-    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
-    flight: Annotated[
-        str | None, typer.Option(metavar="ID", help="the flight: its id, or its agent socket [default: --to]")
-    ] = None,
-    person: Annotated[
-        str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
-    ] = None,
-    approval_key: Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    root: SignedRoot = None,
+    flight: FlightId = None,
+    person: Person = None,
+    approval_key: ApprovalKey = None,
+    passphrase_file: PassphraseFile = None,
+    as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Call a flight home: the mission ends, and in the air the policy's contingency flies.
 

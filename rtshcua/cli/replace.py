@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.store.reading import read_regular
-from rtshcua.cli.documents import deliver
+from rtshcua.cli.documents import AsJson, deliver
 from rtshcua.cli.faults import fail
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import names
@@ -20,7 +20,7 @@ app = typer.Typer(add_completion=False)
 def replace(
     replacement: Annotated[Path, typer.Argument(help="what `rtshcua compile --replaces` made")],
     to: Annotated[Path, typer.Option(metavar="SOCKET", help="the flight's agent socket")],
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Hand a flight a signed replacement: steps that were not released yet become those of another mission.
 

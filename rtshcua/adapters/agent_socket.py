@@ -1,18 +1,24 @@
-"""A local socket on which agents and operators follow a flight and hand documents in (docs/agents.md).
+"""A local socket on which agents, or operators, follow a flight and hand documents in (docs/agents.md).
 
-A Unix stream socket that its owner alone may use. Every record of the log goes out as its line, and beside it `hello`,
-`mission` and `answer`; documents come in as JSON lines. Nothing here ever waits: what a reader does not take stays in a
-bounded buffer, and a reader that lets it fill is dropped, as is one that sends what is no line of the kind. A document
-that is taken up here is only bytes; the enforcement boundary says whether it is to be trusted.
+A Unix stream socket that its owner alone may use, or a group of users besides. Operators have one of their own, so that
+a recall gets through whatever agents do to theirs: it takes nobody but its owner, by what the kernel says of the peer
+(SO_PEERCRED). One process never has all places of a socket.
+
+Every record of the log goes out as its line, and beside it `hello`, `mission` and `answer`; documents come in as JSON
+lines. Nothing here ever waits: what a reader does not take stays in a bounded buffer, and a reader that lets it fill is
+dropped, as is one that sends what is no line of the kind. A document that is taken up here is only bytes; the
+enforcement boundary says whether it is to be trusted.
 """
 
 import errno
 import os
 import socket
+import struct
 import time
 from base64 import b64decode, b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -21,8 +27,12 @@ import msgspec
 from rtshcua.onboard.ports import Presented
 from rtshcua.wire.document import MAX_DOCUMENT
 
-#: how many may follow a flight at once; one more takes the place of whoever was quiet for longest
+#: how many may follow a flight at once at one socket; one more takes the place of whoever was quiet for longest
 MOST_READERS: Final = 8
+#: how many of them may be of one process; one more takes the place of one of its own
+MOST_OF_A_PEER: Final = 4
+#: how many are welcomed in one turn of the flight, and how many may wait for that
+MOST_WELCOMED: Final = 32
 #: how much may wait for one reader, in bytes
 MOST_WAITING: Final = 4 << 20
 #: the longest line that may come in: a document in base64, with what stands around it
@@ -32,7 +42,10 @@ GAP_US: Final = 20_000
 #: the longest path of a Unix socket, in bytes (unix(7))
 LONGEST_PATH: Final = 107
 _CHUNK: Final = 1 << 16
+_CREDENTIALS: Final = struct.Struct("iII")
 _PATIENCE_S: Final = 1.0
+#: after how long who found no place tries again
+AGAIN_S: Final = 0.02
 
 
 class SocketTaken(OSError):
@@ -57,11 +70,19 @@ _read_number = msgspec.json.Decoder(_Numbered).decode
 _encode = msgspec.json.Encoder().encode
 
 
+class Peer(NamedTuple):
+    """Who is at the other end, by what the kernel says: the process and its user. 0 and None where it does not say."""
+
+    process: int
+    user: int | None
+
+
 class _Reader:
     """One connection."""
 
-    def __init__(self, link: socket.socket) -> None:
+    def __init__(self, link: socket.socket, peer: Peer) -> None:
         self.link = link
+        self.peer = peer
         self.incoming = bytearray()
         self.waiting = bytearray()
 
@@ -81,6 +102,16 @@ class _Reader:
                 return False
             del self.waiting[:sent]
         return True
+
+    @property
+    def unread(self) -> bool:
+        """Whether something came of it that was not looked at yet."""
+        if b"\n" in self.incoming:
+            return True
+        try:
+            return bool(self.link.recv(1, socket.MSG_PEEK))
+        except OSError:
+            return False
 
     def line(self) -> bytes | None:
         """The next whole line, if there is one; raises OSError for a connection that ended or sends too long a line."""
@@ -102,16 +133,31 @@ class _Reader:
 
 
 class AgentSocket:
-    """Listens at a path until it is closed. `greeting` gives what a new reader is told first, as whole lines."""
+    """Listens at a path until it is closed. `greeting` gives what a new reader is told first, as whole lines.
 
-    def __init__(self, path: Path, greeting: Callable[[], bytes]) -> None:
+    `own`: nobody but the user that this runs as, and root, is listened to, whatever the socket's mode says. `group`:
+    the id of a group whose users may open it too. `numbers` are for what comes in; sockets of one flight share them.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        greeting: Callable[[], bytes],
+        *,
+        own: bool = False,
+        group: int | None = None,
+        numbers: Iterator[int] | None = None,
+    ) -> None:
         self.path = path
         self._greeting = greeting
+        self._own = own
         self.readers: list[_Reader] = []
+        #: the users that were welcomed
+        self.users: set[int] = set()
         self._senders: dict[int, tuple[_Reader, int]] = {}
-        self._count = 0
+        self._numbers = count(1) if numbers is None else numbers
         self._next_us = 0
-        self._listener = _listen(path)
+        self._listener = _listen(path, group)
 
     def poll(self, now_us: int) -> Presented | None:
         """The next document, if one came in: one of each reader in turn, and at most one in `GAP_US`."""
@@ -157,17 +203,36 @@ class AgentSocket:
             self.path.unlink()
 
     def _welcome(self) -> None:
-        for _ in range(MOST_READERS):  # and no more: whoever connects again and again must not keep us here
+        for _ in range(MOST_WELCOMED):  # and no more: whoever connects again and again must not keep us here
             try:
                 link, _ = self._listener.accept()
             except OSError:
                 return
             link.setblocking(False)
-            if len(self.readers) >= MOST_READERS:
-                self._drop(self.readers[0])  # the one that was quiet for longest: a recall must not find it full
-            reader = _Reader(link)
+            reader = _Reader(link, peer_of(link))
+            if not self._has_place(reader.peer):
+                link.close()  # it may come again
+                continue
             self.readers.append(reader)
+            if reader.peer.user is not None:
+                self.users.add(reader.peer.user)
             self._send(reader, self._greeting())
+
+    def _has_place(self, peer: Peer) -> bool:
+        """Whether one more of this peer is taken in; who makes place for it was quiet for longest, and is of the same
+        process where that has its share. Nobody makes place who said something that was not looked at yet.
+        """
+        if self._own and peer.user not in (None, 0, os.geteuid()):
+            return False
+        alike = [reader for reader in self.readers if peer.process and reader.peer.process == peer.process]
+        if len(alike) < MOST_OF_A_PEER and len(self.readers) < MOST_READERS:
+            return True
+        may_go = alike if len(alike) >= MOST_OF_A_PEER else [*alike, *self.readers]
+        quiet = next((reader for reader in may_go if not reader.unread), None)
+        if quiet is None:
+            return False
+        self._drop(quiet)
+        return True
 
     def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Presented | None:
         try:
@@ -177,9 +242,9 @@ class AgentSocket:
             text = "not a line of the kind {id, document}, document in base64"
             self._send(reader, _answer(_number(line), "malformed", text))
             return None
-        self._count += 1
-        self._senders[self._count] = (reader, handed.id)
-        return Presented(now_us, document, self._count)
+        number = next(self._numbers)
+        self._senders[number] = (reader, handed.id)
+        return Presented(now_us, document, number)
 
     def _send(self, reader: _Reader, line: bytes) -> None:
         if not reader.tell(line):
@@ -204,8 +269,22 @@ def _answer(number: int, slug: str, text: str) -> bytes:
     return _encode({"type": "answer", "id": number, "slug": slug, "text": text}) + b"\n"
 
 
-def _listen(path: Path) -> socket.socket:
-    """A listening socket of mode 0600 at `path`; one that a crash left behind is replaced, nothing else ever is."""
+def peer_of(link: socket.socket) -> Peer:
+    """Who is at the other end, on Linux (unix(7), SO_PEERCRED); elsewhere nobody says."""
+    option = getattr(socket, "SO_PEERCRED", None)
+    if option is None:
+        return Peer(0, None)
+    try:
+        process, user, _ = _CREDENTIALS.unpack(link.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size))
+    except OSError:
+        return Peer(0, None)
+    return Peer(process, user)
+
+
+def _listen(path: Path, group: int | None) -> socket.socket:
+    """A listening socket of mode 0600 at `path`, or 0660 with a group; one that a crash left behind is replaced,
+    nothing else ever is.
+    """
     if len(os.fsencode(path)) > LONGEST_PATH:
         text = f"a socket's path has at most {LONGEST_PATH} bytes"
         raise OSError(errno.ENAMETOOLONG, text, str(path))
@@ -215,7 +294,10 @@ def _listen(path: Path) -> socket.socket:
     before = os.umask(0o177)
     try:
         listener.bind(str(path))
-        listener.listen(MOST_READERS)
+        if group is not None:
+            os.chown(path, -1, group)
+            path.chmod(0o660)
+        listener.listen(MOST_WELCOMED)
     except OSError as error:
         listener.close()
         if error.errno == errno.EADDRINUSE:
@@ -281,12 +363,31 @@ def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
 
 
 def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s: float) -> _Line:
-    """The first line that is wanted, after sending one. Raises OSError, TimeoutError without an answer."""
+    """The first line that is wanted, after sending one; tried again where the queue is full, or there is no place.
+
+    Raises OSError, TimeoutError without an answer.
+    """
     until_s = time.monotonic() + patience_s
+    last: OSError | None = None
+    while True:
+        try:
+            return _asked_once(path, line, wanted, until_s)
+        except (BlockingIOError, ConnectionResetError, BrokenPipeError) as error:
+            if time.monotonic() + AGAIN_S >= until_s:
+                raise
+            last = error
+        except (FileNotFoundError, ConnectionRefusedError) as error:
+            raise last or error from None  # the flight ended meanwhile
+        time.sleep(AGAIN_S)
+
+
+def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_s: float) -> _Line:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
-        link.settimeout(patience_s)
+        link.settimeout(max(until_s - time.monotonic(), AGAIN_S))
         try:
             link.connect(str(path))
+        except BlockingIOError:  # others wait to be taken in, as many as may: unix(7) does not let us wait too
+            raise
         except OSError as error:
             if path.exists() and not path.is_socket():
                 raise OSError(errno.ENXIO, "no agent socket of a flight", str(path)) from None

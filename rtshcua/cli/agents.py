@@ -1,8 +1,10 @@
-"""What agents and operators are told of a flight on its socket, and what they hand in (docs/agents.md)."""
+"""What agents and operators are told of a flight on its sockets, and what they hand in (docs/agents.md)."""
 
+import os
 import sys
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -17,6 +19,12 @@ from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
 FORMAT: Final = "rtshcua/agent"
 VERSION: Final = 1
 
+#: what there is to tell where agents and operators have a socket each, and one user
+ALIKE: Final = (
+    "who listens at the agent socket runs as the same user as this program, and may open the operator socket too: "
+    "nothing tells an agent there from an operator. Let the agent run as another user (`--agent-group`)"
+)
+
 #: what is larger is looked at ahead in another thread, in bytes: a mission takes some ms a step to verify and prepare
 _LARGE: Final = 1 << 11
 _MOST_AHEAD: Final = 8
@@ -26,48 +34,82 @@ _SWITCH_S: Final = 0.000_5
 _encode = msgspec.json.Encoder().encode
 
 
-class Agents:
-    """The socket of one flight. It never waits, and nothing of the flight depends on it."""
+class _Door:
+    """A socket, and what came in there and is looked at ahead, by a thread of its own: no operator waits for agents."""
 
-    def __init__(self, path: Path, loaded: Loaded) -> None:
+    def __init__(self, socket: AgentSocket) -> None:
+        self.socket = socket
+        self.ahead: list[tuple[Future[None], Presented]] = []
+        self.worker = ThreadPoolExecutor(1)
+
+
+class Agents:
+    """The sockets of one flight: `path` of agents, `operators` of operators, either or both. They never wait, and
+    nothing of the flight depends on them. `group`: the id of a group whose users are agents too.
+    """
+
+    def __init__(
+        self, path: Path | None, loaded: Loaded, *, operators: Path | None = None, group: int | None = None
+    ) -> None:
         self._loaded = loaded
         self._told = loaded.bundle.mission_digest
-        self._ahead: list[tuple[Future[None], Presented]] = []
-        self._worker = ThreadPoolExecutor(1)
+        self._greeted: tuple[bytes, bytes] | None = None
         self._switch_s = sys.getswitchinterval()
-        self._socket = AgentSocket(path, self._greeting)
+        self._notes: list[str] = []
+        self._sockets: list[_Door] = []
+        numbers = count(1)
+        try:
+            if operators is not None:  # first: what operators hand in comes before what agents do
+                self._sockets.append(_Door(AgentSocket(operators, self._greeting, own=True, numbers=numbers)))
+            if path is not None:
+                self._sockets.append(_Door(AgentSocket(path, self._greeting, group=group, numbers=numbers)))
+        except OSError:
+            self._close()
+            raise
+        self._watches = path is not None and operators is not None
 
     def events(self, now: Now) -> Sequence[Event]:
         """The documents that came in, large ones after they were looked at ahead."""
         found: list[Event] = []
-        event = self._socket.poll(now.monotonic_us)
-        if event is not None:
-            if len(event.document) <= _LARGE:
-                found.append(event)
-            elif len(self._ahead) == _MOST_AHEAD:
-                self._socket.answer(event.sender, "busy", "other documents are being looked at")
-            else:
-                sys.setswitchinterval(_SWITCH_S)
-                consider = self._loaded.boundary.consider
-                self._ahead.append((self._worker.submit(consider, event.document, now), event))
-        while self._ahead and self._ahead[0][0].done():
-            found.append(self._ahead.pop(0)[1])
+        for door in self._sockets:
+            event = door.socket.poll(now.monotonic_us)
+            if event is not None:
+                if len(event.document) <= _LARGE:
+                    found.append(event)
+                elif len(door.ahead) == _MOST_AHEAD:
+                    door.socket.answer(event.sender, "busy", "other documents are being looked at")
+                else:
+                    sys.setswitchinterval(_SWITCH_S)
+                    consider = self._loaded.boundary.consider
+                    door.ahead.append((door.worker.submit(consider, event.document, now), event))
+            while door.ahead and door.ahead[0][0].done():
+                found.append(door.ahead.pop(0)[1])
+        if self._watches and not self._sockets[-1].socket.users.isdisjoint((0, os.geteuid())):
+            self._watches = False
+            self._notes.append(ALIKE)
         return found
+
+    def notes(self) -> Sequence[str]:
+        """What there is to tell of who listens, each once."""
+        told, self._notes = self._notes, []
+        return told
 
     def watch(self, actions: Sequence[Action]) -> None:
         """Tell of what was done: every record as its line, and the answers to whoever handed something in."""
         for action in actions:
             if isinstance(action, Append):
-                self._socket.tell(action.line)
+                self.tell(action.line)
             elif isinstance(action, Reply):
-                self._socket.answer(action.sender, action.slug, action.text)
+                for door in self._sockets:
+                    door.socket.answer(action.sender, action.slug, action.text)
         if self._told != self._loaded.bundle.mission_digest:
             self._told = self._loaded.bundle.mission_digest
-            self._socket.tell(self._mission())
+            self.tell(self._mission())
 
     def tell(self, line: bytes) -> None:
         """Tell a record that the runtime did not make: the close."""
-        self._socket.tell(line)
+        for door in self._sockets:
+            door.socket.tell(line)
 
     def __enter__(self) -> Self:
         return self
@@ -75,11 +117,22 @@ class Agents:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._worker.shutdown(cancel_futures=True)
+        self._close()
+
+    def _close(self) -> None:
+        for door in self._sockets:
+            door.worker.shutdown(cancel_futures=True)
         sys.setswitchinterval(self._switch_s)
-        self._socket.close()
+        for door in self._sockets:
+            door.socket.close()
 
     def _greeting(self) -> bytes:
+        digest = self._loaded.bundle.mission_digest
+        if self._greeted is None or self._greeted[0] != digest:  # they come by the hundred, where somebody means ill
+            self._greeted = digest, self._hello()
+        return self._greeted[1]
+
+    def _hello(self) -> bytes:
         loaded = self._loaded
         hello = {
             "type": "hello",

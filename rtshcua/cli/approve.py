@@ -12,10 +12,10 @@ from rtshcua.cli.documents import (
     MOST_S,
     WHERE,
     WHOSE,
-    AgentSocket,
     ApprovalKey,
     AsJson,
     FlightId,
+    FlightSocket,
     FlyingBundle,
     PassphraseFile,
     Person,
@@ -47,7 +47,7 @@ def approve(
     replacement: Annotated[
         list[Path] | None, typer.Option(help="a replacement that is in force since, in order (repeatable)")
     ] = None,
-    to: AgentSocket = None,
+    to: FlightSocket = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer here")] = None,
     root: SignedRoot = None,
     flight: FlightId = None,

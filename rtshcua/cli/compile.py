@@ -62,7 +62,7 @@ def compile(
         int | None, typer.Option("--from", min=0, help="with --replaces: the first step that is another one")
     ] = None,
     flight: Annotated[
-        str | None, typer.Option(metavar="ID", help="with --replaces: the flight, by its id or its agent socket")
+        str | None, typer.Option(metavar="ID", help="with --replaces: the flight, by its id or a socket of it")
     ] = None,
     root: Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (the key store's)")] = None,
     deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")] = False,

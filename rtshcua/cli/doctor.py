@@ -1,5 +1,7 @@
 """`rtshcua doctor`: what a vehicle supports, and what would stop a mission. It asks and listens, and moves nothing."""
 
+import os
+import pwd
 import sys
 import time
 from collections.abc import Sequence
@@ -13,7 +15,7 @@ import typer
 
 from rtshcua import library
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
@@ -64,6 +66,9 @@ def doctor(
     system: Annotated[
         int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
     ] = None,
+    agent_user: Annotated[
+        str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
 ) -> ExitCode:  # fmt: skip
     """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
@@ -76,6 +81,10 @@ def doctor(
         return misaddressed("--connect", error)
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+    try:
+        agents = [] if agent_user is None else [told_apart(agent_user, pwd.getpwnam(agent_user).pw_uid, os.geteuid())]
+    except KeyError:
+        return fail(ExitCode.USAGE, f"there is no user `{agent_user}`")
     clock = SystemClock()
     try:
         policy, mission, root = _wanted(bundle, clock.now().utc_us)
@@ -102,7 +111,7 @@ def doctor(
             return refuse(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
-        findings = list(
+        findings = agents + list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
                 unheard=signing.unheard, named=system is not None,

@@ -26,9 +26,9 @@ from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 # ---------------------------------------------------------------- the options that they share
 
 FlyingBundle = Annotated[Path, typer.Argument(help="the bundle that flies")]
-AgentSocket = Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's agent socket")]
+FlightSocket = Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's operator or agent socket")]
 FlightId = Annotated[
-    str | None, typer.Option(metavar="ID", help="the flight: its id, or its agent socket [default: --to]")
+    str | None, typer.Option(metavar="ID", help="the flight: its id, or a socket of it [default: --to]")
 ]
 Person = Annotated[
     str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
@@ -44,8 +44,8 @@ MOST_S = MAX_LIFE_US // 1_000_000
 
 _FLIGHT = re.compile(r"[0-9a-f]{32}")
 #: help for what a document may be handed to
-WHOSE = "give `--flight` (32 hexadecimal digits, or the flight's agent socket)"
-WHERE = "give `--to` (the flight's agent socket) or `--output`"
+WHOSE = "give `--flight` (32 hexadecimal digits, or a socket of the flight)"
+WHERE = "give `--to` (a socket of the flight) or `--output`"
 
 
 def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: int) -> Bundle:

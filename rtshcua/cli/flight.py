@@ -200,6 +200,8 @@ class Flight:
                     pass
             if self._agents is not None:
                 also += self._agents.events(self._clock.now())
+                for text in self._agents.notes():
+                    self._feed.post(Note(text))
             also += self._witnesses.events(self._clock.now().monotonic_us)
             also += self._steps.events(self._clock.now())
             if self._utc.waits:

@@ -106,6 +106,8 @@ class Launch:
     signing_key: Path | None = None
     unsigned_radio: bool = False
     agent_socket: Path | None = None
+    operator_socket: Path | None = None
+    agent_group: int | None = None
     dry_run: bool = False
     system: int | None = None
     witnesses: tuple[Address, ...] = ()
@@ -139,7 +141,9 @@ def launch(order: Launch) -> ExitCode:
                 simulator = stack.enter_context(_simulate(order, loaded, transport.port))
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
-            agents = None if order.agent_socket is None else stack.enter_context(Agents(order.agent_socket, loaded))
+            agents = _agents(order, loaded)
+            if agents is not None:
+                stack.enter_context(agents)
             vehicle.driver.asks_utc = utc.waits
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
@@ -190,6 +194,13 @@ def launch(order: Launch) -> ExitCode:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _agents(order: Launch, loaded: Loaded) -> Agents | None:
+    """Who may follow the flight and hand in. Raises OSError."""
+    if order.agent_socket is None and order.operator_socket is None:
+        return None
+    return Agents(order.agent_socket, loaded, operators=order.operator_socket, group=order.agent_group)
 
 
 def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterable[bytes], feed: Feed) -> ExitCode:

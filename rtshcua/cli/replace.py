@@ -19,7 +19,7 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def replace(
     replacement: Annotated[Path, typer.Argument(help="what `rtshcua compile --replaces` made")],
-    to: Annotated[Path, typer.Option(metavar="SOCKET", help="the flight's agent socket")],
+    to: Annotated[Path, typer.Option(metavar="SOCKET", help="the flight's operator or agent socket")],
     as_json: AsJson = False,
 ) -> ExitCode:
     """Hand a flight a signed replacement: steps that were not released yet become those of another mission.

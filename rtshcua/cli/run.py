@@ -1,5 +1,6 @@
 """`rtshcua run`: fly a bundle, on the simulated vehicle or on another one."""
 
+import grp
 import os
 import sys
 import tempfile
@@ -81,6 +82,12 @@ def run(
     agent_socket: Annotated[
         Path | None, typer.Option(metavar="PATH", help="a local socket: records go out, signed documents come in")
     ] = None,
+    operator_socket: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="another one, for operators: no agent holds up a recall there")
+    ] = None,
+    agent_group: Annotated[
+        str | None, typer.Option(metavar="GROUP", help="users of this group may open the agent socket too")
+    ] = None,
     witness: Annotated[
         list[str] | None,
         typer.Option(metavar="udpout:HOST:PORT", help="a `rtshcua witness` that is shown the log; repeatable"),
@@ -119,6 +126,9 @@ def run(
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+    group = _group(agent_socket, operator_socket, agent_group)
+    if isinstance(group, str):
+        return fail(ExitCode.USAGE, group)
     try:
         witnesses = witnessed.addresses(witness or ())
     except AddressError as error:
@@ -151,6 +161,8 @@ def run(
             signing_key=signing_key,
             unsigned_radio=unsigned_radio,
             agent_socket=agent_socket,
+            operator_socket=operator_socket,
+            agent_group=group,
             dry_run=rehearsal,
             fence=not no_fence and not rehearsal,
             system=system,
@@ -177,6 +189,18 @@ _UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's tim
 _LONELY = {(False, False): "", (True, False): _SYSTEM, (True, True): _SYSTEM, (False, True): _UTC}
 _VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
+
+
+def _group(agent_socket: Path | None, operator_socket: Path | None, name: str | None) -> int | str | None:
+    """The id of the group whose users may open the agent socket, if there is one; a text where that makes no sense."""
+    if agent_socket is not None and agent_socket == operator_socket:
+        return "agents and operators have a socket each: give `--operator-socket` another path"
+    if name is not None and agent_socket is None:
+        return "`--agent-group` goes with `--agent-socket`"
+    try:
+        return None if name is None else grp.getgrnam(name).gr_gid
+    except KeyError:
+        return f"there is no group `{name}`"
 
 
 def _style(*, plain: bool, as_json: bool) -> str:

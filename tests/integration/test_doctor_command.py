@@ -43,6 +43,7 @@ def test_a_vehicle_over_real_udp() -> None:
         (["--connect", "serial:/dev/no-such-device:57600"], 8, "no such file"),
         (["--connect", "udpin:127.0.0.1:14550", "missing.bundle"], 3, "no such file"),
         ([], 2, "--connect"),
+        (["--connect", "udpin:127.0.0.1:14550", "--agent-user", "no-such-user"], 2, "no user `no-such-user`"),
     ],
 )
 def test_wrong_words(commands: Forked, words: list[str], code: int, says: str, tmp_path: Path) -> None:

@@ -50,6 +50,19 @@ class VehicleFinding(msgspec.Struct, frozen=True):
     advice: str = ""
 
 
+def told_apart(agent: str, user: int, own: int) -> VehicleFinding:
+    """Whether the kernel can tell an agent, which runs as the user `agent` of the id `user`, from operators (`own`)."""
+    found = f"the agent runs as `{agent}`"
+    if user not in (0, own):
+        return VehicleFinding("agents/user", MissionVerdict.OK, f"{found}, and the flight as another user")
+    return VehicleFinding(
+        "agents/user", MissionVerdict.WARN,
+        f"{found}, as which it may open the operators' socket: nothing tells it from an operator there",
+        "another user than the flight's, and not root",
+        "let the agent run as a user of its own, and give that user's group to `run --agent-group`",
+    )  # fmt: skip
+
+
 def diagnose(
     vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, utc_error_us: int | None,
     unheard: frozenset[int] = frozenset(), named: bool = False,

@@ -1,24 +1,31 @@
 """The agent socket: who may use it, what goes out and comes in, and what never holds a flight up."""
 
 import json
+import os
 import socket
 import stat
 import threading
 from base64 import b64encode
 from collections.abc import Iterator
+from itertools import count, repeat
 from pathlib import Path
 
 import pytest
 
+from rtshcua.adapters import agent_socket
 from rtshcua.adapters.agent_socket import (
     GAP_US,
     LONGEST,
+    MOST_OF_A_PEER,
     MOST_READERS,
     MOST_WAITING,
     AgentSocket,
+    Answered,
+    Peer,
     SocketTaken,
     flight_at,
     hand_in,
+    peer_of,
 )
 from rtshcua.onboard.ports import Presented
 
@@ -183,6 +190,14 @@ def test_a_reader_that_hung_up_is_forgotten_with_what_it_waits_for(agents: Agent
     assert len(agents.readers) == 0
 
 
+@pytest.fixture
+def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every connection is of another process."""
+    processes = count(1)
+    monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(processes), os.geteuid()))
+
+
+@pytest.mark.usefixtures("strangers")
 def test_no_more_readers_than_that(agents: AgentSocket) -> None:
     links = []
     for _ in range(MOST_READERS + 2):
@@ -191,6 +206,101 @@ def test_no_more_readers_than_that(agents: AgentSocket) -> None:
     assert len(agents.readers) == MOST_READERS
     for link in links:
         link.close()
+
+
+def test_one_process_has_no_more_places_than_its_share(agents: AgentSocket) -> None:
+    links = []
+    for number in range(MOST_OF_A_PEER + 2):
+        links.append(reader(agents))
+        agents.poll(number * GAP_US)
+    assert len(agents.readers) == MOST_OF_A_PEER
+    assert {each.peer for each in agents.readers} == {Peer(os.getpid(), os.geteuid())}
+    assert agents.users == {os.geteuid()}
+    for each in links[:2]:
+        heard(each)
+        assert each.recv(1) == b"", "those that were quiet for longest made place"
+    for link in links:
+        link.close()
+
+
+@pytest.mark.parametrize("alike", [False, True])
+def test_nobody_makes_place_whose_words_were_not_looked_at(
+    agents: AgentSocket, monkeypatch: pytest.MonkeyPatch, alike: bool
+) -> None:
+    """What came in, and waits for its turn, is not thrown away for whoever comes later."""
+    processes = repeat(7) if alike else count(1)
+    monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(processes), None))
+    most = MOST_OF_A_PEER if alike else MOST_READERS
+    links = [reader(agents) for _ in range(most)]
+    for number, link in enumerate(links):
+        link.sendall(handed(b"%d" % number, number) * 2)
+    assert agents.poll(0) is not None, "one has been looked at, and the second waits in its buffer"
+    with reader(agents) as late:
+        agents.poll(1)
+        heard_last = late.recv(1)
+        assert heard_last == b"", "there was no place: it may come again"
+    taken = [agents.poll(at_us) for at_us in range(GAP_US, 2 * most * GAP_US, GAP_US)]
+    assert all(taken)
+    with reader(agents) as late:
+        agents.poll(100 * most * GAP_US)
+        assert heard(late) == [HELLO.strip()]
+    assert agents.users == set()
+    for link in links:
+        link.close()
+
+
+def test_the_operators_socket_takes_nobody_but_its_owner(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    operators = AgentSocket(folder / "o", lambda: HELLO, own=True)
+    for user, welcome in ((os.geteuid(), True), (0, True), (os.geteuid() + 1, False), (None, True)):
+        monkeypatch.setattr(agent_socket, "peer_of", lambda _, user=user: Peer(1, user))
+        with reader(operators) as link:
+            operators.poll(0)
+            assert (link.recv(1) != b"") == welcome
+    operators.close()
+
+
+def test_a_group_may_open_the_agents_socket(folder: Path) -> None:
+    agents = AgentSocket(folder / "g", lambda: HELLO, group=os.getegid())
+    found = agents.path.stat()
+    assert (stat.S_IMODE(found.st_mode), found.st_gid) == (0o660, os.getegid())
+    agents.close()
+
+
+def test_where_nobody_says_who_connects(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, other = socket.socketpair()
+    with one, other:
+        assert peer_of(one) == Peer(os.getpid(), os.geteuid())
+        monkeypatch.delattr(socket, "SO_PEERCRED")
+        assert peer_of(one) == Peer(0, None)
+    monkeypatch.setattr(socket, "SO_PEERCRED", 17, raising=False)
+    assert peer_of(one) == Peer(0, None), "it is closed"
+
+
+def test_a_client_that_finds_no_place_tries_again(folder: Path) -> None:
+    """First the queue is full, then it is hung up on; then there is room."""
+    path = folder / "s"
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen(0)
+        waiting = [socket.socket(socket.AF_UNIX) for _ in range(2)]
+        for each in waiting:
+            each.setblocking(False)
+            each.connect_ex(str(path))
+        found: list[object] = []
+        client = threading.Thread(target=lambda: found.append(hand_in(path, b"paper")))
+        client.start()
+        for _ in range(3):
+            listener.accept()[0].close()
+        link, _ = listener.accept()
+        with link:
+            assert link.recv(1_000)
+            link.sendall(b'{"type":"answer","id":1,"slug":"accepted","text":"at last"}\n')
+            client.join()
+        for each in waiting:
+            each.close()
+    assert found == [Answered("accepted", "at last")]
+    with pytest.raises(ConnectionRefusedError):
+        hand_in(path, b"paper", patience_s=5)
 
 
 def test_a_path_that_is_listened_at_is_not_taken_away(agents: AgentSocket) -> None:

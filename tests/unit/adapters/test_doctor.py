@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.signing import SignedLink, State
@@ -322,3 +322,11 @@ def test_two_vehicles_of_one_id() -> None:
     found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
     assert "an id of its own" in found["link/other-vehicle"].found
     assert found["link/loss"].verdict is MissionVerdict.OK, "the other one's frames are not counted as this one's"
+
+
+@pytest.mark.parametrize(("user", "own", "apart"), [(1001, 1000, True), (1000, 1000, False), (0, 1000, False)])
+def test_an_agent_that_runs_as_the_operator_is_not_told_apart(user: int, own: int, apart: bool) -> None:
+    found = told_apart("openclaw", user, own)
+    assert found.verdict is (MissionVerdict.OK if apart else MissionVerdict.WARN)
+    assert "`openclaw`" in found.found
+    assert bool(found.advice) != apart

@@ -1,10 +1,14 @@
 """A whole run over the agent socket: an agent follows it, is refused, replans, and a person calls it home."""
 
 import json
+import os
 import socket
 import tempfile
+import threading
+import time
 from base64 import b64encode
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +17,12 @@ import pytest
 from reference.documents import approval, low, recall, replacement
 from reference.world import Run
 from rtshcua.adapters.agent_socket import GAP_US
-from rtshcua.cli.agents import Agents
+from rtshcua.cli.agents import ALIKE, Agents
+from rtshcua.cli.app import main
 from rtshcua.cli.live.telling import Teller
-from rtshcua.onboard.ports import Ending, Event
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.ports import Ending, Event, Presented, Reply
 
 
 class Followed(Run):
@@ -120,3 +127,71 @@ def test_the_view_follows_a_replacement_and_shows_no_signature(run: Followed) ->
     far = teller.tell(longest)
     assert far is not None
     assert far.subject == ""
+
+
+def test_operators_have_a_socket_of_their_own_and_are_looked_at_first(tmp_path: Path) -> None:
+    of = low()
+    with tempfile.TemporaryDirectory(dir="/tmp") as name, ExitStack() as stack:
+        paths = [Path(name) / "a", Path(name) / "o"]
+        agents = stack.enter_context(Agents(paths[0], of, operators=paths[1], group=os.getegid()))
+        assert [path.stat().st_mode & 0o777 for path in paths] == [0o660, 0o600]
+        links = [stack.enter_context(socket.socket(socket.AF_UNIX)) for _ in paths]
+        for link, path, number in zip(links, paths, (1, 2), strict=True):
+            link.connect(str(path))
+            link.sendall(b'{"id": %d, "document": "AAA%s"}\n' % (number, b"ABCD"[number : number + 1]))
+        first, second = agents.events(Now(1, 1, 0))
+        assert isinstance(first, Presented)
+        assert isinstance(second, Presented)
+        assert (first.document[-1], second.document[-1]) == (2, 1), "the operator's comes first"
+        assert first.sender != second.sender
+        assert agents.notes() == [ALIKE], "both run as one user"
+        agents.events(Now(GAP_US * 2, 1, 0))
+        assert agents.notes() == [], "which is told once"
+        agents.watch([Reply(second.sender, "accepted", "to the agent"), Reply(first.sender, "expired", "to the other")])
+        for link, number, slug in zip(links, (1, 2), ("accepted", "expired"), strict=True):
+            lines = [json.loads(line) for line in link.recv(1 << 20).splitlines()]
+            assert [each["type"] for each in lines] == ["hello", "mission", "answer"]
+            assert (lines[-1]["id"], lines[-1]["slug"]) == (number, slug)
+
+
+def test_what_agents_make_the_flight_look_at_keeps_no_operator_waiting(tmp_path: Path) -> None:
+    """Large documents are looked at ahead, by a thread for each socket, and no more of them than that."""
+    of, over, large = low(), threading.Event(), b64encode(bytes(3_000)).decode()
+    with tempfile.TemporaryDirectory(dir="/tmp") as name, ExitStack() as stack:
+        paths = [Path(name) / "a", Path(name) / "o"]
+        agents = stack.enter_context(Agents(paths[0], of, operators=paths[1]))
+        stack.callback(over.set)
+        agents._sockets[1].worker.submit(over.wait)
+        links = [stack.enter_context(socket.socket(socket.AF_UNIX)) for _ in paths]
+        for link, path, times in zip(links, paths, (12, 1), strict=True):
+            link.connect(str(path))
+            for _ in range(times):
+                link.sendall(json.dumps({"document": large}).encode() + b"\n")
+        found: list[Event] = []
+        for turn in range(1, 200):
+            found += agents.events(Now(turn * GAP_US, 1, 0))
+            time.sleep(0.001)
+        assert len(found) == 1, "the operator's; eight of the agent's wait, and the others are told that"
+        slugs = [json.loads(line).get("slug") for line in links[0].recv(1 << 20).splitlines()]
+        assert slugs.count("busy") == 4
+
+
+def test_a_socket_that_cannot_be_made_leaves_no_other_behind(tmp_path: Path) -> None:
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        path = Path(name) / "o"
+        with pytest.raises(OSError, match="No such file"):
+            Agents(Path(name) / "missing" / "a", low(), operators=path)
+        assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--agent-socket", "s", "--operator-socket", "s"], "a socket each"),
+        (["--agent-group", "root"], "goes with `--agent-socket`"),
+        (["--agent-socket", "s", "--agent-group", "no-such-group"], "no group `no-such-group`"),
+    ],
+)
+def test_sockets_that_make_no_sense(words: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "b", *words]) == ExitCode.USAGE
+    assert text in capsys.readouterr().err

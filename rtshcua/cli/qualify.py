@@ -1,6 +1,5 @@
 """`rtshcua qualify`: a flight test of the autopilot itself, and the signed record of it."""
 
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,20 +20,21 @@ from rtshcua.adapters.qualification.checks import ends_after, judge
 from rtshcua.adapters.qualification.missions import NAME, Trial, source_of, trials
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
+from rtshcua.adapters.store.writing import write_new
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.cli.clock_error import duration_us, utc_error_text
-from rtshcua.cli.faults import code_of, fail, misaddressed, tell, untrusted
+from rtshcua.cli.faults import code_of, fail, misaddressed, say, tell, untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.flight import EXIT_CODES
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.cli.sources import compile_sources, read_text
+from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
-from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.compiler.sign import sign
@@ -172,7 +172,7 @@ def qualify(
     except Refused as refused:
         if as_json:
             said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
-            print(msgspec.json.encode(said).decode())
+            out_json(msgspec.json.encode(said).decode())
         return (tell if as_json else fail)(refused.code, str(refused), refused.help)
 
 
@@ -228,7 +228,7 @@ class _Flown:
 
 
 def _ask(text: str) -> None:
-    print(f">>> {text}", file=sys.stderr, flush=True)
+    say(f">>> {text}")
 
 
 # ---------------------------------------------------------------- all of it
@@ -279,7 +279,7 @@ class Qualifying:
             _announce(sortie, as_json=as_json)
             flown = _Flown(sortie, sends=not self.pilot)
             bundle = folder / f"{NAME}-{sortie.name}.bundle"
-            bundle.write_bytes(self._bundle(sortie))
+            write_new(bundle, self._bundle(sortie))
             launch(replace(order, bundle=bundle, sortie=flown))
             assert flown.observed is not None
             self.flown.append(flown)
@@ -307,12 +307,11 @@ class Qualifying:
         else:
             code = ExitCode.OK if record.qualifies else ExitCode.TESTS
         if as_json:
-            print(msgspec.json.encode(_described(record, path, code)).decode())
+            out_json(msgspec.json.encode(_described(record, path, code)).decode())
         else:
-            for line in told(record, ended if broken else None):
-                print(visible(line))
+            out(*told(record, ended if broken else None))
             if path is not None:
-                print(f"the record is in {path}")
+                out(f"the record is in {path}")
         return code
 
     def _compiled(self, sortie: Sortie, trial: Trial) -> Compiled:
@@ -380,9 +379,9 @@ _PERMIT_HELP: Final = (
 def _announce(sortie: Sortie, *, as_json: bool) -> None:
     if as_json:
         said = {"event": "sortie", "name": sortie.name, "about": sortie.about}
-        print(msgspec.json.encode(said).decode(), flush=True)
+        out_json(msgspec.json.encode(said).decode(), flush=True)
     else:
-        print(f"sortie {sortie.name}: {sortie.about}", flush=True)
+        out(f"sortie {sortie.name}: {sortie.about}", flush=True)
 
 
 _MARKS: Final[Mapping[int, str]] = {

@@ -46,7 +46,7 @@ from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
-from rtshcua.onboard.ports import Ending
+from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, open_bundle
@@ -71,6 +71,10 @@ class Sortied(Protocol):
 
     def driver(self, policy: Policy, frames: Gate, slack: int, **more: Any) -> Driver:
         """The driver that flies it."""
+        ...
+
+    def before(self, vehicle: ConnectedVehicle, clock: LinkClock) -> list[Event]:
+        """The vehicle was met, and nothing sent; what happened meanwhile. Raises `Refused` for one not to be flown."""
         ...
 
     def after(
@@ -148,7 +152,9 @@ def launch(order: Launch) -> ExitCode:
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
             _hold_trust(bundle, signed_root, loaded, clock)
-            if order.link is not None and order.sortie is None:
+            if order.sortie is not None:
+                events += order.sortie.before(vehicle, clock)
+            elif order.link is not None:
                 note, meanwhile = unqualified(record_of(loaded.vehicle, root, order.data), vehicle, clock)
                 events += meanwhile
                 signing.notes += [note] if note is not None else []

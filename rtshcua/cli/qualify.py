@@ -32,6 +32,7 @@ from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.flight import EXIT_CODES
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.launch import Launch, Refused, launch
+from rtshcua.cli.opening import AIR_S
 from rtshcua.cli.sources import compile_sources, read_text
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
@@ -43,7 +44,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import Mode
-from rtshcua.onboard.ports import Ending
+from rtshcua.onboard.ports import Ending, Event
 from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.qualification import (
@@ -61,6 +62,7 @@ app = typer.Typer(add_completion=False)
 #: s that a vehicle which somebody else flies is watched until it is down
 _LANDS_S: Final = 180.0
 _POLL_S: Final = 0.05
+_DOWN_HELP: Final = "whoever flies it lands it first; `rtshcua doctor` says what it tells of itself"
 #: nothing is recorded of a qualification that ends so: it says nothing of the autopilot
 _BROKEN_OFF: Final = (
     Ending.INTERRUPTED, Ending.REFUSED, Ending.LINK_LOST, Ending.EVIDENCE_LOST, Ending.RECALLED, Ending.STOOD_DOWN,
@@ -205,12 +207,25 @@ class _Flown:
     observed: ObservedSortie | None = None
     final_hash: str = ""
     slack: int = 1
+    left: bool = False
+    """Whoever waited for the landing was told to leave."""
 
     def driver(self, policy: Policy, frames: Gate, slack: int, **more: Any) -> Driver:
         """Its driver, which observes it."""
         self.slack = slack
         self.driven = QualifyingDriver(policy, frames, slack, sortie=self.sortie, sends=self.sends, ask=_ask, **more)
         return self.driven
+
+    def before(self, vehicle: ConnectedVehicle, clock: LinkClock) -> list[Event]:
+        """It stands, with its motors off: nobody else flies it. Raises `Refused`."""
+        seen, events = vehicle.driver.seen, list[Event]()
+        until_s = time.monotonic() + AIR_S
+        while not seen.down and not (seen.landed_state and seen.armed) and time.monotonic() < until_s:
+            events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+        if seen.down:
+            return events
+        what = "its motors run, or it flies" if seen.armed or seen.airborne else "it does not say that it stands"
+        raise Refused(ExitCode.REFUSED, "not-down", f"{what}: a qualification begins on the ground", _DOWN_HELP)
 
     def after(
         self, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, ending: Ending, final_hash: str
@@ -222,6 +237,7 @@ class _Flown:
         until_s = time.monotonic() + _LANDS_S
         while not self.driven.seen.down and ending is Ending.STOOD_DOWN and time.monotonic() < until_s:
             if interrupts.wish() is not None:
+                self.left = True
                 break
             vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
         self.observed, self.final_hash = self.driven.finish(ending), final_hash
@@ -283,12 +299,13 @@ class Qualifying:
             launch(replace(order, bundle=bundle, sortie=flown))
             assert flown.observed is not None
             self.flown.append(flown)
-            why = ends_after(flown.observed)
+            why = "interrupted" if flown.left else ends_after(flown.observed)
             if why is not None:
                 left = self.sorties[len(self.flown) :]
                 self.missing |= {each.name: why for each in left}
                 break
-        return Ending(self.flown[-1].observed.ending) if self.flown[-1].observed is not None else Ending.REFUSED
+        last = self.flown[-1]
+        return Ending.INTERRUPTED if last.left or last.observed is None else Ending(last.observed.ending)
 
     def finish(self, ended: Ending, *, as_json: bool) -> ExitCode:
         """Judge, print the table, and keep the record, unless it was broken off."""
@@ -296,7 +313,7 @@ class Qualifying:
         checks = judge(observed, self.policy)
         record = self._record(observed, checks)
         last = self.flown[-1]
-        planned = last.observed is not None and ends_after(last.observed) is None
+        planned = not last.left and last.observed is not None and ends_after(last.observed) is None
         broken = ended in _BROKEN_OFF and not planned
         path = None
         if not broken:

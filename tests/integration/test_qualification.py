@@ -5,7 +5,8 @@ from functools import cache
 
 import pytest
 
-from rtshcua.adapters.qualification.sortie import SILENCES_US, SORTIES
+from rtshcua.adapters.qualification.sortie import BY_PILOT, SILENCES_US, SORTIES
+from rtshcua.model.faults import Mode, PilotMode
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from rtshcua.wire.qualification import CheckOutcome, QualificationCheck
 from virtual import wrong_vehicles as wrong
@@ -113,3 +114,38 @@ def test_nothing_is_flown_after_a_sortie_that_did_not_go_as_planned() -> None:
     assert [each.name for each in flown.observed.sorties] == ["climb"]
     assert checks["return/home"].outcome == CheckOutcome.UNCHECKED
     assert "sortie `climb` did not go as planned" in checks["return/home"].measured
+
+
+def lands(vehicle: VirtualVehicle, text: str) -> None:
+    """A pilot who does as asked, after a moment."""
+    assert text.startswith("PILOT: take over now")
+    vehicle.simulation.inject(PilotMode(vehicle.clock.elapsed_us + 2 * SECOND, Mode.LAND))
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_the_pilot_of_a_real_vehicle_is_asked_and_waited_for(flavour: str) -> None:
+    flown = Qualifying(flavour, pilot=lands)
+    checks = {each.slug: each for each in flown.fly([BY_PILOT])}
+    assert checks["takeover/mode"].outcome == CheckOutcome.HELD
+    assert checks["takeover/mode"].measured.endswith("how late is not known")
+    assert checks["takeover/pause"].outcome == CheckOutcome.UNCHECKED
+    assert flown.observed.sorties[0].down
+
+
+def test_a_pilot_who_does_not_take_over_is_told_so_and_it_comes_home() -> None:
+    flown = Qualifying("px4", pilot=lambda vehicle, text: None)
+    checks = {each.slug: each for each in flown.fly([BY_PILOT])}
+    assert checks["takeover/mode"].outcome == CheckOutcome.FAILED
+    assert checks["takeover/mode"].measured == "it did not show"
+    assert flown.observed.sorties[0].ending == "completed"
+
+
+def test_a_takeover_that_nobody_asked_for_ends_it() -> None:
+    """A pilot's abort, at whatever stage: it stands down, and no other sortie is flown."""
+
+    def taken(vehicle: VirtualVehicle) -> None:
+        vehicle.simulation.inject(PilotMode(12 * SECOND, Mode.LAND))
+
+    flown = Qualifying("px4", taken)
+    flown.fly(SORTIES)
+    assert [(each.name, each.ending) for each in flown.observed.sorties] == [("climb", "stood-down")]

@@ -28,6 +28,7 @@ from virtual.flight import TICK_US, UTC_US, Flight
 
 TRIAL = Trial(10_000, 40_000, 5_000, 0)
 Wrong = Callable[[VirtualVehicle], None]
+Pilot = Callable[[VirtualVehicle, str], None]
 
 
 @cache
@@ -43,10 +44,10 @@ def _source() -> Path:
 
 
 @cache
-def bundle(sortie: Sortie) -> tuple[bytes, Policy, Mission]:
+def bundle(sortie: Sortie, *, by_pilot: bool) -> tuple[bytes, Policy, Mission]:
     policy, mission = compiled()
     source = _source()
-    text = source_of(sortie, TRIAL, source.name, policy, mission, by_pilot=False)
+    text = source_of(sortie, TRIAL, source.name, policy, mission, by_pilot=by_pilot)
     program = read_text(str(source.parent / f"{NAME}.rts"), text).program
     found = compile_program(program, dialect.load(), mission=NAME, issued_at_us=case.flat.ISSUED)
     assert found.policy is not None, found.diagnostics
@@ -55,9 +56,12 @@ def bundle(sortie: Sortie) -> tuple[bytes, Policy, Mission]:
 
 
 class Qualifying:
-    """One simulated vehicle, and what is flown with it. `wrong` makes it another than it should be."""
+    """One simulated vehicle, and what is flown with it. `wrong` makes it another than it should be; `pilot` is asked to
+    take over, where it counts as a real one.
+    """
 
-    def __init__(self, flavour: str, wrong: Wrong = lambda _: None, **chosen: Any) -> None:
+    def __init__(self, flavour: str, wrong: Wrong = lambda _: None, pilot: Pilot | None = None, **chosen: Any) -> None:
+        self._pilot = pilot
         self._policy, _ = compiled()
         self._config: SimulationConfig = fitting(self._policy, flavour=Kind(flavour), **chosen)
         self._wrong = wrong
@@ -81,12 +85,19 @@ class Qualifying:
 
     def sortie(self, sortie: Sortie) -> ObservedSortie:
         """One sortie, from the ground to the ground."""
-        data, policy, mission = bundle(sortie)
+        data, policy, mission = bundle(sortie, by_pilot=self._pilot is not None)
         before, clock = self._vehicle, self._clock
+
+        def asked(text: str) -> None:
+            if self._pilot is not None:
+                self._pilot(vehicle, text)
+
         vehicle = VirtualVehicle(policy, self._config, clock, FrameSession(), tick_us=TICK_US)
         if before is not None:
             vehicle.simulation = before.simulation
-        driver = QualifyingDriver(policy, vehicle.frames, sortie=sortie, sends=True, steps=mission.invocations)
+        driver = QualifyingDriver(
+            policy, vehicle.frames, sortie=sortie, sends=self._pilot is None, steps=mission.invocations, ask=asked
+        )
         vehicle.driver = driver
         if before is None:
             self._wrong(vehicle)

@@ -1,0 +1,220 @@
+"""The checks as functions of what was observed: made by hand, at the edge of each limit."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding
+from rtshcua.adapters.qualification.checks import ends_after, judge
+from rtshcua.adapters.qualification.observed import (
+    ObservedAnswer,
+    ObservedCommand,
+    ObservedQualification,
+    ObservedSilence,
+    ObservedSortie,
+    ObservedTakeover,
+    Sample,
+    TakeoverKind,
+)
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.wire.qualification import CheckOutcome, Firmware, QualificationCheck
+from virtual.policy import POLICY
+
+S, M = 1_000_000, 1_000
+HELD, FAILED, TOLD, UNCHECKED = CheckOutcome
+#: 2 m/s^2 after 0.5 s: from 4 m/s 6 m, and 1.3 m more for reports that are late and off
+BRAKED = replace(POLICY, vehicle=replace(POLICY.vehicle, braking=2_000, reaction_us=S // 2, return_altitude=30 * M))
+
+
+def place(north_mm: int) -> int:
+    return 473_977_400 + round(north_mm / 11.1319)
+
+
+def checks(policy: Any = BRAKED, *sorties: ObservedSortie, **about: Any) -> dict[str, QualificationCheck]:
+    given: dict[str, Any] = {
+        "firmware": Firmware("px4", 0x01100000, bytes(8)), "mode_within_us": 300_000, "round_trip_us": 20_000,
+        "settings": (), "missing": {},
+    }  # fmt: skip
+    observed = ObservedQualification(sorties=sorties, **(given | about))
+    return {each.slug: each for each in judge(observed, policy)}
+
+
+def leg(way_mm: int, took_us: int, **about: Any) -> ObservedSortie:
+    """A leg at 4 m/s that is told to stop at 10 s, stands after so long, so far on, and stays."""
+    samples = [Sample(at, 0, 0, 10 * M, 4 * M, 0) for at in (9_900_000, 10 * S)]
+    samples = [each._replace(latitude=place(0)) for each in samples]
+    samples += [Sample(10 * S + took_us // 2, place(way_mm // 2), 0, 10 * M, 3 * M, 0)]
+    samples += [Sample(10 * S + took_us + at, place(way_mm), 0, 10 * M, 0, 0) for at in (0, S, 2 * S)]
+    flown = ObservedCommand(MotionKind.FLY, "goto", 5 * S, 4 * M, True, 5 * S, 10 * S, "succeeded")
+    hold = ObservedCommand(MotionKind.HOLD, "hover", 10 * S, 0, False, 10 * S, 30 * S, "succeeded")
+    return ObservedSortie("leg", samples, [flown, hold], ending="completed", down=True, **about)
+
+
+@pytest.mark.parametrize(
+    ("way_mm", "took_us", "outcome"),
+    [
+        (7_250, 4 * S, HELD),
+        (7_400, 4 * S, FAILED),  # further than 4 m/s * 0.5 s + 4 m of braking, and 0.8 m + 0.5 m of reports
+        (7_000, 6_500_000, HELD),
+        (7_000, 6_600_000, FAILED),  # later than 0.5 s + 2 s of braking, and 4 s of lag
+    ],
+)
+def test_a_stop_is_held_to_the_brakes_that_are_declared(way_mm: int, took_us: int, outcome: CheckOutcome) -> None:
+    found = checks(BRAKED, leg(way_mm, took_us))["stop/fly"]
+    assert found.outcome == outcome, found
+    assert found.limit == 7_300
+
+
+def test_where_none_are_declared_it_is_held_to_what_is_taken_for_granted_then() -> None:
+    found = checks(POLICY, leg(7_400, 4 * S))["stop/fly"]
+    assert found.outcome == HELD
+    assert "no `brakes` declared" in found.expected
+
+
+def test_what_never_stands_does_not_stop_and_does_not_hold() -> None:
+    flown = leg(7_000, 4 * S)
+    flown.samples[-1] = flown.samples[-1]._replace(speed=900)
+    found = checks(BRAKED, flown)
+    assert found["stop/fly"].outcome == found["hold/fly"].outcome == FAILED
+    assert found["stop/fly"].measured.startswith("it does not stop")
+
+
+def test_what_strays_while_it_holds_is_seen_at_any_speed() -> None:
+    flown = leg(7_000, 4 * S)
+    flown.samples[-1] = flown.samples[-1]._replace(latitude=place(10_500))
+    assert checks(BRAKED, flown)["hold/fly"].outcome == FAILED
+
+
+def answered(late_us: int | None, result: int = 0) -> ObservedSortie:
+    answer = ObservedAnswer(176, S, None if late_us is None else S + late_us, None if late_us is None else result)
+    return ObservedSortie("climb", answers=[answer], ending="completed", down=True)
+
+
+@pytest.mark.parametrize(
+    ("sortie", "failed"),
+    [
+        (answered(S), set()),
+        (answered(S + 1), {"answers/late"}),
+        (answered(None), {"answers/come"}),
+        (answered(10, result=2), {"answers/accepted"}),
+    ],
+)
+def test_answers_come_in_time_and_accept(sortie: ObservedSortie, failed: set[str]) -> None:
+    found = checks(BRAKED, sortie)
+    assert {slug for slug, each in found.items() if slug.startswith("answers/") and each.outcome == FAILED} == failed
+
+
+def taken(kind: TakeoverKind, shown_us: int | None, how: str = "another target", **about: Any) -> ObservedSortie:
+    late = None if shown_us is None else S + shown_us
+    takeover = ObservedTakeover(kind, S, mode_us=late, shown_us=late, how=how, **about)
+    return ObservedSortie(kind, takeover=takeover, ending="stood-down", down=True)
+
+
+@pytest.mark.parametrize(
+    ("sortie", "outcome"),
+    [
+        (taken(TakeoverKind.MODE, 320_000), HELD),
+        (taken(TakeoverKind.MODE, 321_000), FAILED),
+        (taken(TakeoverKind.MODE, None), FAILED),
+        (taken(TakeoverKind.TARGET, 320_000, moved_us=S + 320_000), HELD),
+        (taken(TakeoverKind.TARGET, 320_000, moved_us=S + 400_000), FAILED),
+        (taken(TakeoverKind.PAUSE, 9 * S, "stopped-short"), HELD),  # ArduCopter's: no progress is all that shows
+        (taken(TakeoverKind.TARGET, 9 * S, "stopped-short"), FAILED),
+        (taken(TakeoverKind.PAUSE, 11 * S, "stopped-short"), FAILED),
+    ],
+)
+def test_a_takeover_shows_within_what_is_declared_and_the_links_delay(
+    sortie: ObservedSortie, outcome: CheckOutcome
+) -> None:
+    assert checks(BRAKED, sortie)[f"takeover/{sortie.name}"].outcome == outcome
+
+
+def silenced(**about: Any) -> ObservedSortie:
+    given: dict[str, Any] = {
+        "for_us": 3 * S, "began_us": S, "ended_us": 4 * S, "lost_us": 2 * S + 50_000, "back_us": 4 * S,
+        "fresh_us": 5 * S, "kept": True,
+    }  # fmt: skip
+    return leg(7_000, 4 * S, silences=[ObservedSilence(**(given | about))])
+
+
+@pytest.mark.parametrize(
+    ("about", "outcome"),
+    [
+        ({}, HELD),
+        ({"fresh_us": 4 * S + 1_500_001}, FAILED),
+        ({"fresh_us": None}, FAILED),
+        ({"kept": False}, FAILED),
+        ({"lost_us": None}, FAILED),
+        ({"lost_us": 3 * S}, FAILED),
+        ({"back_us": None}, FAILED),
+        ({"for_us": 4 * S}, UNCHECKED),
+    ],
+)
+def test_a_silence_changes_nothing_and_is_over_at_once(about: dict[str, Any], outcome: CheckOutcome) -> None:
+    assert checks(BRAKED, silenced(**about))["silence/3s"].outcome == outcome
+
+
+def test_gaps_between_heartbeats_count_but_for_those_of_a_silence() -> None:
+    beats = [300_000 * number for number in range(30)]
+    flown = leg(7_000, 4 * S)
+    flown.beats = beats
+    assert checks(BRAKED, flown)["heartbeat/asked"].outcome == HELD
+    flown.beats = [400_000 * number for number in range(30)]
+    assert checks(BRAKED, flown)["heartbeat/asked"].outcome == FAILED
+    flown = silenced()
+    flown.beats = [900_000, 5_200_000, 5_400_000]
+    assert checks(BRAKED, flown)["heartbeat/asked"].outcome == HELD
+
+
+def climbed(climb: int, mean: int) -> ObservedSortie:
+    samples = [Sample(at * S, 0, 0, mean * at, 0, climb) for at in range(1, 5)]
+    command = ObservedCommand(MotionKind.CLIMB, "takeoff", S, 0, False, S, 4 * S, "succeeded")
+    return ObservedSortie("climb", samples, [command], ending="completed", down=True)
+
+
+@pytest.mark.parametrize(
+    ("climb", "mean", "outcome"),
+    [(3_600, 990, HELD), (3_601, 2_000, FAILED), (1_000, 989, FAILED)],
+)
+def test_a_climb_is_neither_faster_nor_slower_than_declared(climb: int, mean: int, outcome: CheckOutcome) -> None:
+    """At most 3 m/s are declared: a tenth and 0.3 m/s more is of gusts and reports, less than a third is no climb."""
+    assert checks(BRAKED, climbed(climb, mean))["climb/speed"].outcome == outcome
+
+
+def test_settings_that_a_doctor_warns_of_are_told_and_fail_nothing() -> None:
+    warned = VehicleFinding("settings/nav_dll_act", MissionVerdict.WARN, "nothing", "return", "set it")
+    stopped = VehicleFinding("settings/x", MissionVerdict.STOP, "wrong", "right", "set it")
+    well = VehicleFinding("settings/y", MissionVerdict.OK, "fine")
+    found = checks(BRAKED, leg(7_000, 4 * S), settings=(warned, stopped, well))
+    assert found["settings/nav_dll_act"].outcome == TOLD
+    assert found["settings/x"].outcome == FAILED
+    assert found["settings/others"].measured.startswith("1 more")
+
+
+def test_a_fence_that_its_parameters_leave_off_is_no_fence() -> None:
+    flown = leg(7_000, 4 * S, fence="set", fence_read=True, switches={"FENCE_ENABLE": (1, 1.0), "FENCE_TYPE": (4, 3.0)})
+    found = checks(BRAKED, flown)
+    assert found["fence/read-back"].outcome == HELD
+    assert found["fence/on"].measured == "`FENCE_TYPE` is 3"
+    flown.switches = {"FENCE_ENABLE": (1, None)}
+    assert checks(BRAKED, flown)["fence/on"].measured == "`FENCE_ENABLE` is not told"
+    assert checks(BRAKED, leg(7_000, 4 * S))["fence/on"].outcome == UNCHECKED
+
+
+def test_what_was_not_flown_is_unchecked_with_the_reason() -> None:
+    found = checks(BRAKED, missing={"leg": "not today", "climb": "too windy"})
+    assert found["stop/fly"].measured == "not today"
+    assert found["land/down"].measured == "too windy"
+    assert {each.outcome for slug, each in found.items() if slug != "firmware/told"} == {UNCHECKED}
+
+
+def test_whatever_does_not_go_as_planned_ends_it() -> None:
+    assert ends_after(leg(7_000, 4 * S)) is None
+    assert ends_after(taken(TakeoverKind.MODE, 0)) is None
+    aloft = leg(7_000, 4 * S)
+    aloft.down = False
+    assert "not seen to be down" in (ends_after(aloft) or "")
+    ended = leg(7_000, 4 * S)
+    ended.ending = "stood-down"
+    assert "stood-down" in (ends_after(ended) or "")

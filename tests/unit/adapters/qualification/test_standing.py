@@ -1,0 +1,97 @@
+"""How a vehicle stands to its record, in words; what is asked of it; and where the record is kept."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.adapters.files.qualifications import keep_record, path_of, read_record
+from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.qualification.identity import IdentityQuestions, as_octets, those_that_matter
+from rtshcua.adapters.qualification.standing import standing
+from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification, QualificationCheck, parameters_digest
+
+PARAMETERS = (("GF_ACTION", as_octets(2)), ("RTL_RETURN_ALT", as_octets(30)))
+VERSION = Firmware("px4", 0x01100000, bytes(8))
+HELD = QualificationCheck("stop/fly", CheckOutcome.HELD, "", "")
+LEFT = QualificationCheck("takeover/mode", CheckOutcome.UNCHECKED, "", "")
+FAILED = QualificationCheck("fence/on", CheckOutcome.FAILED, "", "")
+RECORD = Qualification(
+    "quad-07", VERSION, PARAMETERS, parameters_digest(PARAMETERS), bytes(32), "", "0.1",
+    1_767_225_600_000_000, 0, (), (HELD, LEFT),
+)  # fmt: skip
+
+
+def test_one_that_is_as_it_was_is_qualified() -> None:
+    stands = standing(RECORD, VERSION, dict(PARAMETERS))
+    assert stands == (True, "qualified on 2026-01-01 for px4 1.16.0: 1 checks hold, 1 were not made")
+
+
+@pytest.mark.parametrize(
+    ("record", "says"),
+    [
+        (None, "there is no record"),
+        ("unknown key", "its record is not to be trusted: unknown key"),
+        (replace(RECORD, checks=(HELD, FAILED)), "1 checks did not hold: fence/on"),
+        (replace(RECORD, checks=(LEFT,)), "nothing was checked"),
+    ],
+)
+def test_one_that_was_not_or_did_not_hold_is_none(record: Any, says: str) -> None:
+    stands = standing(record, VERSION, dict(PARAMETERS))
+    assert not stands.qualified
+    assert stands.text.startswith("this vehicle is not qualified: ")
+    assert says in stands.text
+
+
+@pytest.mark.parametrize(
+    ("firmware", "parameters", "says"),
+    [
+        (
+            replace(VERSION, version=0x01110000),
+            PARAMETERS,
+            "is another now: its firmware is px4 1.17.0, and was px4 1.16.0",
+        ),
+        (VERSION, (("GF_ACTION", as_octets(0)), PARAMETERS[1]), "is another now: changed since: `GF_ACTION`"),
+        (None, PARAMETERS, "it does not tell its version now"),
+        (VERSION, PARAMETERS[:1], "1 of its parameters are not told now"),
+    ],
+)
+def test_one_that_changed_or_does_not_say_is_none(firmware: Any, parameters: Any, says: str) -> None:
+    stands = standing(RECORD, firmware, dict(parameters))
+    assert not stands.qualified
+    assert says in stands.text
+
+
+def test_what_a_run_switches_itself_does_not_matter() -> None:
+    from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+
+    values = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_RADIUS": 150.0, "UNHEARD_OF": 1.0}
+    assert those_that_matter(ARDUPILOT, values) == {"FENCE_RADIUS": as_octets(150)}
+
+
+def test_it_asks_for_what_was_recorded_until_that_is_told() -> None:
+    questions = IdentityQuestions(PX4, names=["GF_ACTION"])
+    asked = [message.get_type() for message in questions.due(1, 1_000_000)]
+    assert asked == ["PARAM_REQUEST_READ", "COMMAND_LONG"]
+    assert questions.due(1, 1_100_000) == []
+    questions.take("PARAM_VALUE", SimpleNamespace(param_id="GF_ACTION", param_value=2.0, param_type=9))
+    assert not questions.told
+    questions.take("AUTOPILOT_VERSION", SimpleNamespace(flight_sw_version=1, flight_custom_version=[0] * 8))
+    assert questions.told
+    assert questions.parameters == {"GF_ACTION": as_octets(2)}
+    assert questions.due(1, 9_000_000) == []
+    silent = IdentityQuestions(PX4, names=[])
+    asks = [len(silent.due(1, second * 1_000_000)) for second in range(1, 12)]
+    assert sum(asks) == 6, "one that does not tell its version is not asked for ever"
+
+
+def test_one_record_a_vehicle_and_the_last_one_counts(tmp_path: Path) -> None:
+    assert read_record(tmp_path, "quad/07") is None
+    keep_record(tmp_path, "quad/07", b"one")
+    path = keep_record(tmp_path, "quad/07", b"two")
+    assert path == path_of(tmp_path, "quad/07")
+    assert path.parent == tmp_path / "qualifications"
+    assert read_record(tmp_path, "quad/07") == b"two"
+    assert read_record(tmp_path, "quad-07") is None

@@ -386,6 +386,8 @@ def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
 _MOST_GAPS: Final = 95
 #: us without progress after which a leg counts as stopped short, and by when that is told
 _STALLS_US: Final = 8 * _SECOND
+#: us in which an autopilot obeys; the slowest that was recorded took 94 ms
+_OBEYS_US: Final = 100_000
 
 
 def _heartbeat(observed: ObservedQualification) -> QualificationCheck:
@@ -439,6 +441,8 @@ def _takeover(
     advice = "a pilot would be flown over: do not fly it"
     if shown is None:
         return _check(slug, False, expected, "it did not show", limit, None, _US, advice)
+    # W counts from when it took effect, which is not long after it was sent
+    sent = max(sent, min(takeover.obeyed_us or sent, sent + (observed.round_trip_us or 0) + _OBEYS_US, shown))
     late = shown - sent
     if takeover.kind is TakeoverKind.MODE:
         late = max(late, (takeover.mode_us or shown + limit) - sent)

@@ -59,12 +59,14 @@ class ObservedAnswer:
 
 @dataclass(slots=True)
 class ObservedTakeover:
-    """Somebody else took over. `sent_us` None: a pilot did, and nobody knows when. `mode_us`: another mode showed in a
-    heartbeat; `shown_us`: the driver told of it, as `how`; `moved_us`: the last frame of ours that moves it left.
+    """Somebody else took over. `sent_us` None: a pilot did, nobody knows when. `obeyed_us`: that was acknowledged to
+    whoever sent it; `mode_us`: another mode showed in a heartbeat; `shown_us`: the driver told of it, as `how`;
+    `moved_us`: the last frame of ours that moves it left.
     """
 
     kind: TakeoverKind
     sent_us: int | None
+    obeyed_us: int | None = None
     mode_us: int | None = None
     shown_us: int | None = None
     how: str = ""

@@ -30,7 +30,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.effects import Effect, apart
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
 from rtshcua.adapters.vehicle.link import Heard
-from rtshcua.adapters.vehicle.manoeuvre import LATE_US
+from rtshcua.adapters.vehicle.manoeuvre import AGAIN_US, LATE_US
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
@@ -275,12 +275,11 @@ class QualifyingDriver(Driver):
 
     def _asks_mode(self, now_us: int) -> list[Message]:
         """Once something showed the takeover a driver asks no more who flies: how soon the mode does is of interest."""
-        takeover, flavour = self.found.takeover, self.flavour
-        if takeover is None or flavour is None or takeover.kind is not TakeoverKind.MODE or takeover.sent_us is None:
+        takeover = self.found.takeover
+        if takeover is None or takeover.kind is not TakeoverKind.MODE or takeover.sent_us is None:
             return []
-        every_us = flavour.mode_within_us // 2
         asked_us = self._mode_asked_us or takeover.sent_us
-        if takeover.mode_us is not None or takeover.shown_us is None or now_us - asked_us < every_us:
+        if takeover.mode_us is not None or takeover.shown_us is None or now_us - asked_us < AGAIN_US * self._slack:
             return []
         self._mode_asked_us = now_us
         return [messages.request(self.system, "HEARTBEAT")] if now_us - takeover.sent_us < _SHOWS_US else []
@@ -304,6 +303,8 @@ class QualifyingDriver(Driver):
                     takeover.mode_us = now_us
             case "COMMAND_ACK" if message.target_component in (0, OURS):
                 self._answered(message.command, message.result, now_us)
+            case "COMMAND_ACK" if found.takeover is not None and found.takeover.obeyed_us is None:
+                found.takeover.obeyed_us = now_us
         if self._silent is not None and self._silent.ended_us is not None and self._silent.fresh_us is None:
             self._awaited.discard(name)
             if not self._awaited:

@@ -1,0 +1,68 @@
+"""`rtshcua qualify` over real UDP, and what `run` and `doctor` make of its record: one sortie for it all."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from rtshcua import library
+from rtshcua.diagnostics.exits import ExitCode
+
+SHORT = str(library.root() / "missions/short.rts")
+SPEED = 3
+
+
+def notes(run: Any) -> list[str]:
+    (rehearsal,) = run.events
+    return list(rehearsal["notes"])
+
+
+def simulated(ground: Any, port: int, return_m: int) -> Any:
+    """A vehicle in a process of its own, whose owner has set the height of its return."""
+    module, pace = [sys.executable, "-m", "rtshcua.simulation"], ["--port", str(port), "--speed", str(SPEED)]
+    own, ground.command = ground.command, module
+    vehicle = ground.start(*pace, "--flavour", "ardupilot", "--return-at", str(return_m))
+    ground.command = own
+    vehicle.until("ready")
+    return vehicle
+
+
+def doctor(ground: Any, link: list[str]) -> dict[str, Any]:
+    (found,) = ground.start("doctor", *link, "short.bundle", "--seconds", "6", "--json").end().events
+    return next(each for each in found["findings"] if each["slug"] == "autopilot/qualified")
+
+
+def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_path: Path) -> None:
+    link = ["--connect", f"udpin:127.0.0.1:{port}"]
+    as_quad = [*link, "--vehicle", "quad-07", "--speed", str(SPEED), "--json"]
+    words = [*ground.command, "compile", SHORT, "-o", "short.bundle"]
+    subprocess.run(words, cwd=tmp_path, env=ground.environment, check=True, capture_output=True)
+    vehicle = simulated(ground, port, 30)
+
+    rehearsal = ground.start("run", "short.bundle", "--dry-run", *as_quad).end()
+    assert any("is not qualified: there is no record" in text for text in notes(rehearsal)), rehearsal.events
+
+    flown = ground.start("qualify", SHORT, "--sitl", "--only", "climb", *as_quad).end()
+    said = flown.events[-1]
+    checks = {each["slug"]: each for each in said["checks"]}
+    assert flown.code == said["exit_code"] == ExitCode.OK, (flown.stderr, said)
+    assert said["qualified"]
+    assert {checks[slug]["outcome"] for slug in ("stop/climb", "land/down", "fence/on", "sortie/climb")} == {"held"}
+    assert checks["takeover/mode"]["outcome"] == "unchecked"
+    assert Path(said["record"]).parent.name == "qualifications"
+    assert [event["event"] for event in flown.events if event["event"] in ("sortie", "summary")] == [
+        "sortie",
+        "summary",
+    ]
+
+    rehearsal = ground.start("run", "short.bundle", "--dry-run", *as_quad).end()
+    assert not any("qualified" in text for text in notes(rehearsal)), notes(rehearsal)
+    assert doctor(ground, link)["verdict"] == "ok"
+
+    vehicle.signal(signal.SIGTERM)
+    vehicle.end()
+    simulated(ground, port, 40)  # somebody has set it otherwise
+    finding = doctor(ground, link)
+    assert finding["verdict"] == "warn"
+    assert "is another now: changed since: `RTL_ALT`" in finding["found"]

@@ -1,0 +1,100 @@
+"""`rtshcua qualify`, up to where something would fly: who consents, to what, and under which policy."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua import library
+from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES
+from rtshcua.cli.qualify import _planned, told
+from rtshcua.wire.qualification import (
+    CheckOutcome,
+    Firmware,
+    Qualification,
+    QualificationCheck,
+    parameters_digest,
+)
+from virtual.forked import Forked
+
+SHORT = str(library.root() / "missions/short.rts")
+LINK = ["--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        ([SHORT, *LINK], 2, "who consents to this flight?"),
+        ([SHORT, *LINK, "--sitl", "--pilot", "ada"], 2, "who consents to this flight?"),
+        ([SHORT, *LINK, "--pilot", " "], 2, "who consents to this flight?"),
+        ([SHORT, *LINK, "--sitl", "--takeover"], 2, "`--takeover` goes with `--pilot`"),
+        ([SHORT, *LINK, "--sitl", "--unsigned-radio"], 2, "goes with `--signing-key`"),
+        ([SHORT, *LINK, "--sitl", "--only", "loop"], 2, "there is no sortie `loop` here"),
+        ([SHORT, *LINK, "--pilot", "ada", "--only", "pause"], 2, "there is no sortie `pause` here"),
+        ([SHORT, *LINK, "--pilot", "ada", "--speed", "2"], 2, "a real one lives as fast as we do"),
+        ([SHORT, "--connect", "serial:/dev/ttyAMA0:57600", "--vehicle", "quad-07", "--sitl"], 2, "is no simulation"),
+        ([SHORT, "--connect", "udpin:nowhere", "--vehicle", "quad-07", "--sitl"], 2, "--connect"),
+        ([SHORT, *LINK[:2], "--vehicle", "quad-08", "--sitl"], 5, "the policy is for `quad-07`"),
+        (["missing.rts", *LINK, "--sitl"], 3, "missing.rts"),
+        ([SHORT, *LINK, "--sitl"], 4, "there are no keys"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fly(
+    commands: Forked, own_world: None, words: list[str], code: int, says: str, tmp_path: Path
+) -> None:
+    done = commands.run(["qualify", *words], tmp_path, 60)
+    assert done.code == code, done.err
+    assert says in done.err
+    assert "Traceback" not in done.err
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_policy_that_permits_no_leg_is_refused(commands: Forked, own_world: None, tmp_path: Path) -> None:
+    """The sorties are proved like any mission: nobody flies past the user's own policy to test it."""
+    policy = (library.root() / "policies/training_field.rts").read_text(encoding="utf-8")
+    (tmp_path / "tight.rts").write_text(policy.replace("permit  goto", "forbid  goto"), encoding="utf-8")
+    mission = (library.root() / "missions/short.rts").read_text(encoding="utf-8")
+    (tmp_path / "short.rts").write_text(
+        mission.replace("lib:policies/training_field.rts", "tight.rts"), encoding="utf-8"
+    )
+    done = commands.run(["qualify", "short.rts", *LINK, "--sitl"], tmp_path, 60)
+    assert done.code == 5
+    assert "permits none of the legs that were tried" in done.err
+    assert "E07" in done.err, "the findings on the first one are shown"
+
+
+@pytest.mark.parametrize(
+    ("words", "flown", "missing"),
+    [
+        ({"sitl": True, "takeover": False, "keyed": False}, list(SORTIES), set()),
+        ({"sitl": True, "takeover": False, "keyed": True}, list(SORTIES[:2]), {"mode", "pause", "target"}),
+        ({"sitl": False, "takeover": False, "keyed": True}, list(SORTIES[:2]), {"mode", "pause", "target"}),
+        ({"sitl": False, "takeover": True, "keyed": False}, [*SORTIES[:2], BY_PILOT], {"pause", "target"}),
+    ],
+)
+def test_nobody_takes_over_a_real_vehicle_but_its_pilot(words: Any, flown: Any, missing: set[str]) -> None:
+    sorties, why = _planned(**words)
+    assert sorties == flown
+    assert why.keys() == missing
+    assert all(why.values())
+
+
+def record(*checks: QualificationCheck) -> Qualification:
+    firmware = Firmware("px4", 0x01100000, bytes(8))
+    return Qualification("quad-07", firmware, (), parameters_digest(()), b"", "ada", "0", 0, 61_000_000, (), checks)
+
+
+def test_the_table_says_what_failed_and_why() -> None:
+    held = QualificationCheck("land/down", CheckOutcome.HELD, "lands", "0.1 m off", advice="")
+    failed = QualificationCheck("stop/fly", CheckOutcome.FAILED, "within 9.7 m", "14.3 m", advice="declare `brakes`")
+    left = QualificationCheck("takeover/mode", CheckOutcome.UNCHECKED, "it shows", "not asked for")
+    lines = list(told(record(held, failed, left), None))
+    assert lines[1:] == [
+        "ok    land/down      0.1 m off",
+        "FAIL  stop/fly       14.3 m",
+        "                     expected: within 9.7 m",
+        "                     help: declare `brakes`",
+        "-     takeover/mode  not asked for",
+        "NOT qualified: 1 hold, 1 do not, 1 not checked, in 61 s of flight",
+    ]
+    assert list(told(record(held), None))[-1].startswith("qualified: 1 hold")

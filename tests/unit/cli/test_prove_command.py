@@ -252,7 +252,7 @@ def test_a_log_that_was_changed(folder: Path, capsys: pytest.CaptureFixture[str]
     assert prove(3) == ExitCode.INCOMPLETE
     assert app.main(["prove", "nothing", "1"]) == ExitCode.INPUT
     assert app.main(["prove", "root.trust", "1"]) == ExitCode.INPUT
-    log.write_bytes(LOG.lines[0].replace(b'"version":3}', b'"version":2}'))
+    log.write_bytes(LOG.lines[0].replace(b'"version":4}', b'"version":3}'))
     assert prove(0) == ExitCode.UNTRUSTED
     log.write_bytes(b"")
     assert prove(0) == ExitCode.INPUT

@@ -232,6 +232,8 @@ class Autopilot:
         self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
         self.plans.listeners.append(partial(flavour.on_plan, self))
         self._mode_in_breach = self.vehicle.mode
+        #: when it acts on what made it hold, and how; nothing if somebody enters another mode before
+        self.delayed: tuple[int, Mode] | None = None
         self._told_mode = self.vehicle.mode
         self._remind_us = _REMIND_US
         self._text_id = 0
@@ -337,7 +339,16 @@ class Autopilot:
             self.take_over(Taker.FAILSAFE, partial(flavour.on_breach, self, began))
         elif breached and fence.breach is None:
             flavour.on_breach_cleared(self)
-        self._mode_in_breach = mode
+        self._mode_in_breach = vehicle.mode if self._acts_late() else mode
+
+    def _acts_late(self) -> bool:
+        if self.delayed is None or self.now_us < self.delayed[0]:
+            return False
+        (_, mode), self.delayed = self.delayed, None
+        if self.vehicle.mode is not Mode.LOITER or not self.vehicle.in_air:
+            return False
+        self._fail_over(mode)
+        return True
 
     def _where(self) -> Point:
         return self.here

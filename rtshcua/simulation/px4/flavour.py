@@ -47,6 +47,7 @@ _BY_RECEIVER = frozenset({mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_M
 
 _WARN, _HOLD, _RETURN, _TERMINATE, _LAND = 1, 2, 3, 4, 5
 """GF_ACTION; 0 is nothing."""
+_LATE: dict[float, Mode] = {_RETURN: Mode.RETURN, _LAND: Mode.LAND}
 
 
 def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
@@ -250,11 +251,17 @@ class Px4(Flavour):
     def on_breach(self, a: Autopilot, breach: Breach) -> None:
         """Does what GF_ACTION asks for, once; whoever then commands something else is obeyed, as recorded.
 
-        Holding is at the place where the breach was seen: it comes back to there.
+        Holding is at the place where the breach was seen: it comes back to there. It holds for COM_FAIL_ACT_T before it
+        returns or lands, so that somebody may enter another mode (docs.px4.io/v1.15/en/config/safety).
         """
         action, vehicle = a.parameters.value("GF_ACTION"), a.vehicle
+        waits_s = a.parameters.value("COM_FAIL_ACT_T")
         if action == _WARN:
             a.say(mavlink.MAV_SEVERITY_WARNING, "Geofence exceeded\t")
+        elif action in _LATE and waits_s > 0:
+            a.say(_CRITICAL, f"Failsafe activated: holding for {waits_s:g} s\t")
+            self._hold(vehicle)
+            a.delayed = a.now_us + round(waits_s * 1e6), _LATE[action]
         elif action == _RETURN:
             a.say(_CRITICAL, "Failsafe activated: switching to Return\t")
             vehicle.set_mode(Mode.RETURN)
@@ -266,5 +273,9 @@ class Px4(Flavour):
             vehicle.set_mode(Mode.LAND)
         else:
             a.say(_CRITICAL, "Failsafe activated: switching to Hold\t")
-            vehicle.set_mode(Mode.LOITER)
-            vehicle.go_to(Point(vehicle.body.north, vehicle.body.east, vehicle.body.up))
+            self._hold(vehicle)
+
+    @staticmethod
+    def _hold(vehicle: Vehicle) -> None:
+        vehicle.set_mode(Mode.LOITER)
+        vehicle.go_to(Point(vehicle.body.north, vehicle.body.east, vehicle.body.up))

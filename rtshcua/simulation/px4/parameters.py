@@ -13,6 +13,7 @@ PARAMETERS = (
     Parameter("BAT_LOW_THR", value=0.15),
     Parameter("COM_DISARM_LAND", attribute="landed_disarm_s"),
     Parameter("COM_DISARM_PRFLT", attribute="idle_disarm_s"),
+    Parameter("COM_FAIL_ACT_T", value=5),
     Parameter("COM_LOW_BAT_ACT", INT32, value=3),
     Parameter("COM_RC_IN_MODE", INT32, value=4),
     Parameter("GF_ACTION", INT32, value=2),

@@ -32,6 +32,7 @@ from rtshcua.ground.testing.run import run_case
 from rtshcua.ground.testing.suite import suite
 from rtshcua.ground.versions.raised import compare
 from rtshcua.mavlink import dialect
+from rtshcua.model.ir.scenarios import ScenarioDecl
 
 app = typer.Typer(add_completion=False)
 
@@ -102,7 +103,7 @@ def docs(
     if findings.report((*found.values(), *failed), sources | trials.sources):
         wrong = tuple(found.values())
         return findings.finish(exit_code(wrong) if has_errors(wrong) else ExitCode.TESTS)
-    parts = [_part(each, one, trials.tried[each.name]) for each, one in zip(asked, checked, strict=True)]
+    parts = [_part(each, one, trials) for each, one in zip(asked, checked, strict=True)]
     if not any(part.policies for part in parts):
         help = "a policy and a vehicle make what is signed; the sources may import both"
         return findings.refuse(ExitCode.INPUT, "no-policy", "the sources have no policy with a vehicle", help)
@@ -152,11 +153,12 @@ def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
 
 
 class _Trials(NamedTuple):
-    """The cases of the files that were asked for, decided, by the program that each file is part of; what is wrong with
-    them, and the texts that this is about.
+    """The cases of the files that were asked for, decided, and their scenarios, by the program that each file is part
+    of; what is wrong with the cases, and the texts that this is about.
     """
 
     tried: dict[str, list[Tried]]
+    scenarios: dict[str, list[ScenarioDecl]]
     diagnostics: list[Diagnostic]
     sources: dict[str, Source]
 
@@ -164,12 +166,16 @@ class _Trials(NamedTuple):
 def _trials(asked: Sequence[Asked], files: Sequence[Path]) -> _Trials:
     """Each file's own tests in its own program, as `rtshcua test` runs them; those of what it imports are not asked."""
     paths = {shown(str(path)): path for path in files}
-    trials = _Trials({}, [], {})
+    trials = _Trials({}, {}, [], {})
     for each in asked:
         own = trials.tried[each.name] = []
+        scenarios = trials.scenarios[each.name] = []
         for unit in each.reading.program.units:
             path = paths.pop(unit.file, None)
-            if path is None or not unit.tests:
+            if path is None:
+                continue
+            scenarios += unit.scenarios
+            if not unit.tests:
                 continue
             program = each.reading.program if unit.file == each.name else read_sources([path]).program
             cases = suite(program, dialect.load())
@@ -179,9 +185,10 @@ def _trials(asked: Sequence[Asked], files: Sequence[Path]) -> _Trials:
     return trials
 
 
-def _part(asked: Asked, checked: Checked, tried: Sequence[Tried]) -> Part:
+def _part(asked: Asked, checked: Checked, trials: _Trials) -> Part:
     """A program with those of its missions that need no further values."""
     program = asked.reading.program
+    tried, scenarios = trials.tried[asked.name], trials.scenarios[asked.name]
     flown = []
     for unit in program.units:
         for mission in unit.missions:
@@ -191,4 +198,4 @@ def _part(asked: Asked, checked: Checked, tried: Sequence[Tried]) -> Part:
             compiled = compile_program(program, dialect.load(), mission=name, issued_at_us=0)
             if compiled.policy is not None and compiled.mission is not None:
                 flown.append(Flown(compiled.policy, compiled.mission, mission, checked.bounds.get(name)))
-    return Part(program, checked.policies, tuple(flown), checked.diagnostics, tuple(tried))
+    return Part(program, checked.policies, tuple(flown), checked.diagnostics, tuple(tried), tuple(scenarios))

@@ -12,6 +12,7 @@ from rtshcua.ground.handbook.model import (
     MissionTold,
     ParameterTold,
     RuleTold,
+    ScenarioTold,
     SignalTold,
     SkillTold,
     Start,
@@ -47,6 +48,7 @@ def chapter(
     missions: Iterable[MissionTold] = (),
     starts: Iterable[Start] = (),
     cases: Iterable[CaseTold] = (),
+    scenarios: Iterable[ScenarioTold] = (),
     old: Policy | None = None,
     since: str = "",
 ) -> Chapter:
@@ -89,6 +91,7 @@ def chapter(
         missions=tuple(missions),
         starts=tuple(starts),
         cases=tuple(cases),
+        scenarios=tuple(scenarios),
         since=since if old is not None else "",
         changes=changed.told,
     )

@@ -1,17 +1,19 @@
 """The whole handbook: a chapter for each policy of the programs that were asked for."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.checker.symbols import collect
 from rtshcua.ground.compiler.bounds import Bounds
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.ground.handbook.cases import Tried, starts_and_cases
 from rtshcua.ground.handbook.chapter import chapter, digest_of
 from rtshcua.ground.handbook.missions import mission_told
-from rtshcua.ground.handbook.model import Chapter, FindingTold, Handbook, MissionTold
+from rtshcua.ground.handbook.model import Chapter, FindingTold, Handbook, MissionTold, ScenarioTold
 from rtshcua.ground.handbook.subject import Subject, place_of
 from rtshcua.ground.handbook.words.places import utc
+from rtshcua.ground.handbook.words.scenarios import told_scenario
 from rtshcua.ground.handbook.words.values import told_value
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, listed
 from rtshcua.ground.language.load import Program
@@ -21,6 +23,7 @@ from rtshcua.ground.versions.raised import before
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.scenarios import ScenarioDecl
 
 _SECOND = 1_000_000  # us: the date of a page has no parts of one
 
@@ -37,8 +40,8 @@ class Flown:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A program without errors: its policies for their vehicles, its missions, what was found, and the cases of those
-    of its files that were asked for.
+    """A program without errors: its policies for their vehicles, its missions, what was found, and the cases and
+    scenarios of those of its files that were asked for.
     """
 
     program: Program
@@ -46,6 +49,7 @@ class Part:
     missions: tuple[Flown, ...]
     findings: tuple[Diagnostic, ...]
     tried: tuple[Tried, ...] = ()
+    scenarios: tuple[ScenarioDecl, ...] = ()
 
 
 def handbook(
@@ -59,12 +63,13 @@ def handbook(
 ) -> Handbook:
     """The handbook of some programs: the same for the same parts, texts and time.
 
-    A policy that several programs share has one chapter, with the missions and tests of all. `earlier` are the policies
-    to tell changes against; of several of one name and vehicle the newest counts.
+    A policy that several programs share has one chapter, with the missions, tests and scenarios of all. `earlier` are
+    the policies to tell changes against; of several of one name and vehicle the newest counts.
     """
     shared: dict[str, Subject] = {}
     flown: dict[str, dict[MissionTold, None]] = {}
     tried: dict[str, list[Tried]] = {}
+    scenarios: dict[str, dict[ScenarioTold, None]] = {}
     for part in parts:
         for lowered in part.policies:
             subject, digest = Subject(part.program, lowered), digest_of(lowered.policy)
@@ -72,6 +77,8 @@ def handbook(
         for each in part.missions:
             told = mission_told(each.mission, each.policy, each.bounds, _values(each.declaration))
             flown.setdefault(digest_of(each.policy), {})[told] = None
+        for policy, scenario in _scenarios(part):
+            scenarios.setdefault(digest_of(policy), {})[scenario] = None
         for one in part.tried:
             for tested, cases in _by_policy(one).items():
                 digest = digest_of(tested.lowered.policy)
@@ -82,6 +89,7 @@ def handbook(
             subject,
             flown.get(digest, {}),
             *starts_and_cases(tried.get(digest, ())),
+            scenarios.get(digest, {}),
             before(subject.policy, earlier),
             since,
         )
@@ -94,6 +102,20 @@ def handbook(
         chapters=chapters,
         findings=tuple(_findings(parts)),
     )
+
+
+def _scenarios(part: Part) -> Iterator[tuple[Policy, ScenarioTold]]:
+    """The scenarios that were asked for, with the policy of the mission that each flies."""
+    if not part.scenarios:
+        return
+    symbols = collect(part.program.units, part.program.broken)
+    names = Vocabulary(frozenset(symbols.signals), frozenset(symbols.zones))
+    policies = {each.declaration.name.text: each.policy for each in part.missions}
+    for scenario in part.scenarios:
+        policy = policies.get(scenario.mission.text)
+        if policy is not None:
+            place = place_of(part.program, scenario.span)
+            yield policy, ScenarioTold(scenario.name.text, place, tuple(told_scenario(scenario, names)))
 
 
 def _by_policy(tried: Tried) -> Mapping[Tested, list[Ran]]:

@@ -208,6 +208,15 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
+class ScenarioTold:
+    """A flight on which things go wrong, and what must come of it. It is told here, and flown by `rtshcua test`."""
+
+    name: str
+    place: str
+    told: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ChangeTold:
     """What is new or other than before, and its words then and now: none where there was, or is, no such thing."""
 
@@ -243,6 +252,7 @@ class Chapter:
     missions: tuple[MissionTold, ...]
     starts: tuple[Start, ...]
     cases: tuple[CaseTold, ...]
+    scenarios: tuple[ScenarioTold, ...]
     since: str  # what it was compared with; empty where with nothing
     changes: tuple[ChangeTold, ...]
 

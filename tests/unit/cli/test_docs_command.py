@@ -204,6 +204,19 @@ def test_with_a_test_that_fails_nothing_is_written(capsys: pytest.CaptureFixture
     assert "came out as they must" in Path("page.html").read_text(encoding="utf-8")
 
 
+def test_scenarios_of_the_files_that_were_asked_for_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = (
+        'import "lib:missions/short.rts"\nscenario "{}" {{ flies short  at 9 s gps_loss()  expect ends aborted }}\n'
+    )
+    Path("flights.rts").write_text(scenario.format("no fix"))
+    Path("all.rts").write_text('import "flights.rts"\n' + scenario.format("again no fix"))
+    for words, names in ((["all.rts"], ["again no fix"]), (["."], ["again no fix", "no fix"])):
+        assert main(["docs", *words, "--json", *AT]) == ExitCode.OK
+        (chapter,) = json.loads(capsys.readouterr().out)["handbook"]["chapters"]
+        assert sorted(each["name"] for each in chapter["scenarios"]) == names
+        assert chapter["scenarios"][0]["told"][-1] == "it ends `aborted`"
+
+
 def test_as_json_a_refusal_is_an_object(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["docs", "missing.rts", "--json"]) == ExitCode.INPUT
     assert json.loads(capsys.readouterr().out)["exit"] == "input"

@@ -43,7 +43,7 @@ def part_of(path: Path) -> Part:
         assert compiled.mission is not None
         flown.append(Flown(compiled.policy, compiled.mission, mission, checked.bounds.get(mission.name.text)))
     tried = Tried(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
-    return Part(program, checked.policies, tuple(flown), checked.diagnostics, (tried,))
+    return Part(program, checked.policies, tuple(flown), checked.diagnostics, (tried,), program.units[0].scenarios)
 
 
 @cache

@@ -179,6 +179,12 @@ def test_tests_and_missions_are_in_the_page(everything: Handbook, text: str) -> 
     assert [step.number for step in mission.steps] == [1, 2, 3, 4, 5]
     assert mission.steps[2].tighter == ("it begins within 4 s of its turn", "before it begins: `battery > 50 %`")
     assert "an approval is &#34;waited&#34; for" in text
+    (scenario,) = chapter.scenarios
+    assert scenario.name == "a gust on the way"
+    assert scenario.told[0] == "the mission `look` is flown on the simulated vehicle"
+    assert 'id="p1-scenarios"' in text
+    assert "They were not flown when this page was made" in text
+    assert "a breach is answered within " in text
 
 
 def luminance(colour: str) -> float:

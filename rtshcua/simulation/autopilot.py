@@ -103,6 +103,8 @@ class Flavour(ABC):
     transfer: TransferRules
     missions: MissionRules
     fence: FenceRules
+    key_ahead_us: int = 0
+    """How far ahead of the time that came with a key its time stamps begin."""
     target_timeout_us: int | None = None
     """In GUIDED, how long one position target is good for; then LOITER."""
     tells_fence: bool
@@ -206,7 +208,7 @@ class Autopilot:
         if config.signing_key is not None:
             self.parameters.assign("MAV_SIGN_CFG", 1)
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
-        self.signing = VehicleSigning(config.signing_key, config.utc_us, config.speed)
+        self.signing = VehicleSigning(config.signing_key, config.utc_us, config.speed, flavour.key_ahead_us)
         self.plans = Plans()
         self._home_item = flavour.home_item(self.home)
         if self._home_item is not None:

@@ -8,7 +8,7 @@ is the flavour's (`obeys_unsigned`), and so is whether it takes a key at all (`o
 from typing import Final
 
 from rtshcua.codec.frames import Message, Received
-from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
+from rtshcua.mavlink.signing import EPOCH_US, UNIT_US, SignedLink, State
 
 _FULL_SPEED: Final = 100
 _LATEST: Final = 1 << 47
@@ -16,14 +16,17 @@ _LATEST: Final = 1 << 47
 
 
 class VehicleSigning:
-    """One vehicle's key, if it has one. `speed`: see `SimulationConfig.speed`."""
+    """One vehicle's key, if it has one. `speed`: see `SimulationConfig.speed`; `ahead_us`: how far ahead of the time
+    that it was given with a key begins.
+    """
 
-    def __init__(self, key: bytes | None, utc_us: int, speed: int) -> None:
+    def __init__(self, key: bytes | None, utc_us: int, speed: int, ahead_us: int) -> None:
+        self._ahead_us = ahead_us
         self._speed = speed
         self._before_us = 0  # how long it ran before it was started again
         self._link: SignedLink | None = None
         if key is not None:
-            self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US), 0)
+            self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US) + ahead_us, 0)
 
     @property
     def on(self) -> bool:
@@ -38,7 +41,7 @@ class VehicleSigning:
         """SETUP_SIGNING: another key and the first time stamp, or none at all if the key is nothing but zeros."""
         key = bytes(message.secret_key)
         if any(key):
-            first = min(message.initial_timestamp, _LATEST)
+            first = min(message.initial_timestamp + self._ahead_us // UNIT_US, _LATEST)
             self._link = SignedLink(key, State(first, {}), EPOCH_US, self._clock(now_us))
         else:
             self._link = None

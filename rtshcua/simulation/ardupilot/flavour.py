@@ -186,6 +186,7 @@ class ArduCopter(Flavour):
     beats_on_mode = reminds = tells_fence = True
     fix = mavlink.GPS_FIX_TYPE_RTK_FIXED
     coast_s = 7.0
+    key_ahead_us = 60_000_000  # recorded; against what was heard before a restart (`load_signing_key`)
     handling, parameters = HANDLING, PARAMETERS
     bytewise = False
     commands = COMMANDS

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from recorded.trace import Trace
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.config import SimulationConfig
@@ -21,7 +22,7 @@ class Signer:
 
     def __init__(self, pilot: Any, key: bytes = KEY, timestamp: int = START) -> None:
         self.pilot = pilot
-        self.link = SignedLink(key, State(timestamp, {}), EPOCH_US, pilot.simulation.now_us, link=1)
+        self.link = SignedLink(key, State(timestamp + ahead(pilot), {}), EPOCH_US, pilot.simulation.now_us, link=1)
 
     def frame(self, message: Any) -> bytes:
         return self.link.sign(self.pilot.codec.pack(message), self.pilot.simulation.now_us)
@@ -34,6 +35,11 @@ class Signer:
         padded = [*params, *[0.0] * (7 - len(params))]
         answers = self.put(self.frame(mavlink.MAVLink_command_long_message(1, 1, command, 0, *padded)))
         return [f.message.result for f in answers if f.name == "COMMAND_ACK"]
+
+
+def ahead(pilot: Any) -> int:
+    """How far a key begins ahead of the time that came with it: as recorded of ArduCopter, a minute."""
+    return 0 if pilot.px4 else 6_000_000
 
 
 def setup(key: bytes, timestamp: int = START) -> Any:
@@ -63,6 +69,22 @@ def test_as_recorded_on_the_second_channel(pilot: Pilots) -> None:
     assert a.long(512, 148) == [0]
 
 
+def test_its_time_stamps_begin_as_recorded(pilot: Pilots) -> None:
+    trace = Trace("arducopter-signing")
+    given = next(h.message.initial_timestamp for h in trace.heard if h.name == "SETUP_SIGNING")
+    real = next(h.received for h in trace.of_vehicle if h.received.signed and h.received.component == 1)
+    a = pilot("ardupilot").ready()
+    keyed(a)
+    own = next(f for f in a.wait(1) if f.signed)
+    began = [stamp(real) - given, stamp(own) - START]
+    assert began[0] == 6_000_000
+    assert began[1] == pytest.approx(began[0], abs=100_000), "within a second of it"
+
+
+def stamp(received: Any) -> int:
+    return int.from_bytes(received.frame[-12:-6], "little")
+
+
 def test_as_recorded_on_the_first_channel(pilot: Pilots) -> None:
     a = pilot("ardupilot", usb=True).ready()
     keyed(a)
@@ -86,7 +108,7 @@ def test_what_it_sends_is_signed_and_rises(pilot: Pilots, flavour: str) -> None:
     assert all(ground.accept(f.frame, 0) for f in seen)
     stamps = [int.from_bytes(f.frame[-12:-6], "little") for f in seen]
     assert stamps == sorted(set(stamps))
-    assert stamps[-1] - START == pytest.approx(500_000, rel=0.15)
+    assert stamps[-1] - START - ahead(a) == pytest.approx(500_000, rel=0.15)
     assert not any(f.signed for f in a.seen if f.name == "RADIO_STATUS")
 
 

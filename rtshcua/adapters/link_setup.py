@@ -137,6 +137,12 @@ class LinkSetup:
         for frame in self._codec.parse(octets):
             self._hear(frame)
 
+    def overhear(self, octets: bytes) -> None:
+        """Take in what another sender said: nothing, but that a vehicle speaks there too, under whatever id."""
+        for frame in Codec(0, 0).parse(octets):
+            if _is_autopilot(frame) and self._wanted in (None, frame.system):
+                self._other = frame.system
+
     def tick(self, now_us: int) -> list[bytes]:
         """Go on; the frames to send."""
         self._now_us = now_us
@@ -152,7 +158,7 @@ class LinkSetup:
 
     def _hear(self, frame: Received) -> None:
         message = frame.message
-        if frame.name == "HEARTBEAT" and frame.component == _AUTOPILOT and message.autopilot in KNOWN:
+        if _is_autopilot(frame):
             self._meet(frame)
         if frame.system != self._system or frame.component != _AUTOPILOT:
             return
@@ -190,9 +196,11 @@ class LinkSetup:
                 "no-vehicle", "no heartbeat of a vehicle within 10 s", "is it on, and does it send there?"
             )
             return
-        yield from self._until(lambda: self._other is not None, _ANOTHER_US if self._wanted is None else 0)
+        yield from self._until(lambda: self._other is not None, _ANOTHER_US)
         if self._other is not None:
-            text = f"there are several vehicles: systems {self._system} and {self._other}"
+            text = f"several vehicles speak there: system {self._system}, and another sender's {self._other}"
+            if self._other != self._system:
+                text = f"several vehicles speak there: systems {self._system} and {self._other}"
             self.result = Refusal("two-vehicles", text, "`--system` names the one that is meant")
             return
         already = self._verified > 0
@@ -311,6 +319,11 @@ class LinkSetup:
         return told is not None and self._now_us - told[1] <= _FRESH_US
 
 
+def _is_autopilot(frame: Received) -> bool:
+    known = frame.name == "HEARTBEAT" and frame.message.autopilot in KNOWN
+    return known and frame.component == _AUTOPILOT
+
+
 def carry_out(setup: LinkSetup, transport: Transport, now_us: Callable[[], int]) -> SetUp | Refusal:
     """Run a set-up over a transport, in real time."""
     peer: Hashable | None = None
@@ -319,8 +332,11 @@ def carry_out(setup: LinkSetup, transport: Transport, now_us: Callable[[], int])
         select.select(transport.readable(), [], [], _WAIT_S)
         while (received := transport.receive()) is not None:
             octets, sender = received
+            if peer is not None and sender != peer:
+                setup.overhear(octets)
+                continue
             setup.receive(octets, now_us())
-            peer = sender if setup.met and peer is None else peer
+            peer = sender if setup.met else None
         for frame in setup.tick(now_us()):
             if peer is not None or transport.begins:
                 transport.send(frame, peer)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.link_setup import LinkSetup, SetUp, after_setup
+from rtshcua.adapters.link_setup import LinkSetup, SetUp, after_setup, carry_out
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.simulation.config import Answers, Kind, SimulationConfig
@@ -149,6 +149,42 @@ def test_several_vehicles_silence_and_deafness_are_refused() -> None:
                 break
         assert isinstance(setup.result, Refusal)
         assert setup.result.slug == slug
+
+
+class TwoSenders:
+    """A transport at which a vehicle speaks, and then somebody else, under an id of their own; `sent` is to whom."""
+
+    begins = False
+
+    def __init__(self, other: int) -> None:
+        self.waiting = [(1, 1), (2, other)]
+        self.sent: list[object] = []
+
+    def readable(self) -> list[int]:
+        return []
+
+    def receive(self) -> tuple[bytes, int] | None:
+        if not self.waiting:
+            return None
+        sender, system = self.waiting.pop(0)
+        return Codec(system, 1).pack(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)), sender
+
+    def send(self, frame: bytes, to: object) -> None:
+        self.sent.append(to)
+
+    def tend(self, _now_us: int) -> list[str]:
+        return []
+
+
+@pytest.mark.parametrize(
+    ("other", "wanted", "slug"), [(2, None, "two-vehicles"), (1, 1, "two-vehicles"), (2, 1, "no-answer")]
+)
+def test_another_sender_is_noticed_and_gets_nothing(other: int, wanted: int | None, slug: str) -> None:
+    transport, times = TwoSenders(other), iter(range(0, 10**9, 200_000))
+    result = carry_out(LinkSetup(KEY, UTC_US, 0, wanted), transport, lambda: next(times))  # type: ignore[arg-type]
+    assert isinstance(result, Refusal)
+    assert result.slug == slug
+    assert set(transport.sent) <= {1}
 
 
 @BOTH

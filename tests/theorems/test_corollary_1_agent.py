@@ -1,0 +1,215 @@
+"""Corollary 1: an agent that is taken over proposes, and does nothing else.
+
+Statement. From theorem 1: whatever an agent signs with its own key, what flies of it is what the policy permits to
+agents, under the policy's contracts or tighter ones, on this vehicle; its word approves nothing, recalls nothing, and
+sets nothing aside that a person ordered. The key is bound by the trust root to its source, roles and policies;
+approvals are bound to a person, the mission and the flight.
+
+Attacker: the agent, with the mission key that `keys init` makes for agents, and all that was ever signed. It compiles
+whatever it likes: it need not use our compiler.
+"""
+
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from reference import worlds
+from reference.documents import MIN, approval, low_mission, recall, replacement
+from reference.flat_case import BATTERY, HEIGHT, MISSION, POLICY, POSITION_X, POSITION_Y
+from reference.naive_code import TooNear
+from reference.oracle import Oracle
+from reference.world import FLIGHT, MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, answer_to, request_for
+from rtshcua.decision.checks import mission as mission_checks
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.situation import Context, State
+from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.ports import Dispatch
+from rtshcua.wire import binding, bundle
+from rtshcua.wire.document import DocumentError
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.receipt import REPLACEMENT, Receipt
+from rtshcua.wire.receipt import decode as read_receipt
+from rtshcua.wire.response import Answer
+
+AGENT_SEED = b"\xa9" * 32
+AGENT = SigningKey.from_seed(AGENT_SEED, duty=Duty.MISSION, development=True)
+#: the same secret, claimed for another duty: all that an agent can sign an approval with
+AS_APPROVER = SigningKey.from_seed(AGENT_SEED, duty=Duty.APPROVAL, development=True)
+BOUND = AGENT.verification(roles=("operator",), sources=("agent",), vehicles=(VEHICLE,), policies=(POLICY.name,))
+TRUST = replace(ROOT, keys=(*ROOT.keys, BOUND))
+LAX = {"require": (), "assume": (), "maintain": (), "energy": 0}
+
+
+def opened(mission: Mission, key: SigningKey = AGENT) -> Loaded | Refusal:
+    """What the boundary makes of a mission that somebody signed under the policy."""
+    payload = bundle.policy_payload(POLICY)
+    bound = binding.bind(mission, bundle.policy_digest(payload))
+    data = bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY_KEY, mission_key=key)
+    return load(
+        data, root=TRUST, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
+        peer_is_own_simulator=True,
+    )  # fmt: skip
+
+
+def proposed(of: Random) -> Mission:
+    """A mission of the agent's own making: it names sources, roles and policies, and writes contracts as it likes."""
+    mission = of.choice([MISSION, low_mission()])
+    steps = list(mission.invocations)
+    for _ in range(of.choice([0, 1, 1, 2])):
+        at = of.randrange(len(steps))
+        steps[at] = twisted(of, steps[at])
+    claims: dict[str, Any] = {"proposer": "operator"}
+    if of.random() < 0.1:
+        claims |= of.choice([{"policy": "lax"}, {"policy_version": 6}, {"vehicle": "quad-08"}])
+    return replace(mission, invocations=tuple(steps), **claims)
+
+
+def twisted(of: Random, step: Invocation) -> Invocation:
+    """A step with something that suits the agent."""
+    match of.randrange(6):
+        case 0:
+            return replace(step, source=of.choice([*SourceKind]))
+        case 1:
+            return replace(step, role=of.randrange(3))
+        case 2:
+            name = of.choice([*LAX])
+            return replace(step, contract=replace(step.contract, **{name: LAX[name]}))
+        case 3:
+            return replace(step, contract=replace(step.contract, deadline_us=600_000_000, validity_us=1 << 40))
+        case 4:
+            other = worlds.invocation(of, POLICY)
+            return replace(other, step=step.step, phase=step.phase, phases=step.phases)
+        case _:
+            return replace(step, arguments=worlds.arguments(of, step.skill))
+
+
+def broken(of: Random) -> list[str]:
+    """What of the corollary does not hold for one agent."""
+    found = opened(proposed(of))
+    if isinstance(found, Refusal):
+        return []
+    wrong = papers(of, found)
+    for step in found.bundle.mission.invocations:
+        if step.source != SourceKind.AGENT:
+            wrong.append("it speaks as somebody else")
+        state = told(of, step)
+        answer = answer_to(found, request_for(found, step=step.step, state=state))
+        if not isinstance(answer, Answer) or not answer.permit:
+            break
+        found.executor.ended()
+        if isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Dispatch):
+            wrong += judged(found, step, state)
+    return wrong
+
+
+def told(of: Random, step: Invocation) -> State:
+    """A state that is well, or near some threshold."""
+    values: dict[int, int | None] = {HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0} if step.step == 0 else {}
+    if of.random() < 0.3:
+        slot = of.choice([*worlds.NEAR])
+        values[slot] = of.choice(worlds.NEAR[slot])
+    return flat.state(values)
+
+
+def judged(found: Loaded, step: Invocation, state: State) -> list[str]:
+    """Something flew: by the oracle, under the policy's own contract, as what agents may do."""
+    as_agent = replace(step, source=SourceKind.AGENT, contract=POLICY.contracts[step.skill])
+    approvals = found.in_force.approvals(step, START)
+    context = Context(step.binding, VEHICLE, POLICY.version, 0, START.monotonic_us, step.phase, 20_000, approvals)
+    try:
+        outcome, reason, _ = Oracle(POLICY, state, START).decide(as_agent, context)
+    except TooNear:
+        return []
+    return [] if outcome is Outcome.ALLOW else [f"it did what agents may not: {reason}"]
+
+
+def papers(of: Random, found: Loaded) -> list[str]:
+    """It signs documents too: approvals and recalls as somebody, and a replacement of what a person ordered."""
+    step = of.randrange(len(found.bundle.mission.invocations))
+    for paper in (approval(found, step, AS_APPROVER), recall(found, AS_APPROVER, expires_at_us=START.utc_us + MIN)):
+        receipt = read_receipt(found.boundary.present(paper, START, 0))
+        assert isinstance(receipt, Receipt)
+        if receipt.accepted:
+            return ["its word was taken for a person's"]
+    return []
+
+
+@given(worlds.CHANCES)
+def test_no_agent_does_what_agents_may_not(of: Random) -> None:
+    assert broken(of) == []
+
+
+@pytest.mark.soak
+@settings(max_examples=20_000)
+@given(worlds.CHANCES)
+def test_no_agent_at_all_does(of: Random) -> None:
+    assert broken(of) == []
+
+
+def test_it_does_not_set_aside_what_a_person_ordered() -> None:
+    """A person's mission, of the key for both, is replaced by that person and not by the agent."""
+    ordered = replace(
+        MISSION, invocations=tuple(replace(each, source=SourceKind.OPERATOR) for each in MISSION.invocations)
+    )
+    for key, accepted in ((AGENT, False), (MISSION_KEY, True)):
+        found = opened(ordered, MISSION_KEY)
+        assert isinstance(found, Loaded), found
+        first, *_, last = found.bundle.mission.invocations
+        source = SourceKind.AGENT if key is AGENT else SourceKind.OPERATOR
+        shorter = replace(
+            found.bundle.mission, issued_at_us=START.utc_us, invocations=(first, replace(last, step=1, source=source))
+        )
+        try:
+            paper = replacement(found, 1, shorter, key)
+        except DocumentError:
+            assert not accepted
+            continue
+        receipt = read_receipt(found.boundary.present(paper, START, 1))
+        assert isinstance(receipt, Receipt)
+        assert (receipt.kind, receipt.accepted) == (REPLACEMENT, accepted), receipt
+
+
+def test_what_agents_may_do_flies() -> None:
+    """Else nothing could be broken."""
+    found = opened(MISSION)
+    assert isinstance(found, Loaded)
+    for step in MISSION.invocations[:3]:
+        answer = answer_to(found, request_for(found, step=step.step))
+        assert isinstance(answer, Answer)
+        found.executor.ended()
+        assert isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Dispatch)
+
+
+def breaks(what: str, most: int = 400) -> bool:
+    return any(what in each for seed in range(most) for each in broken(Random(seed)))
+
+
+def test_a_key_that_is_bound_to_nothing_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bundle, "check_proposer", lambda *_: None)
+    assert breaks("it speaks as somebody else")
+
+
+def test_a_contract_that_may_be_loosened_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = MISSION.invocations[0]
+    lax = replace(MISSION, invocations=(replace(first, contract=replace(first.contract, **LAX)),))
+    assert isinstance(opened(lax), Refusal)
+    monkeypatch.setattr(mission_checks, "invocation", lambda *_: iter(()))
+    found = opened(lax)
+    assert isinstance(found, Loaded)
+    step, state = found.bundle.mission.invocations[0], flat.state({HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0, BATTERY: 0})
+    answer = answer_to(found, request_for(found, state=state))
+    assert isinstance(answer, Answer)
+    assert judged(found, step, state) != [], "it would fly, on an empty battery"
+
+
+def test_an_approval_that_anybody_may_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    named = AS_APPROVER.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,), person="agent")
+    monkeypatch.setitem(globals(), "TRUST", replace(TRUST, keys=(*TRUST.keys, named)))
+    assert breaks("its word was taken for a person's", 5)

@@ -1,0 +1,303 @@
+"""Theorem 1: no dispatch without admission.
+
+Statement. Let the executor be the only way to the vehicle (assumption 1) and `enforce` the only source of permits
+(assumption 2), both behind a boundary that shares no key with anyone (assumption 4). Then each step that is dispatched
+was admissible when its permit was made: valid_T and valid_S and L_rem <= ddl - t, with authority, and an approval where
+a rule asks for one. It is the command that was signed, sent once, within its deadline and validity, and not after a
+recall.
+
+Attacker: a runtime that is wholly taken over. It asks for whatever it likes, in any order, with any state, time,
+release and phase; it keeps and alters every permit; it hands in documents that people signed, that strangers signed,
+damaged ones, and all of them again. It holds no key. (What it says of the state is believed: the stated limit.)
+
+The oracle that admission is held against is `reference.oracle`, written apart from `decide`.
+"""
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from reference import worlds
+from reference.documents import MIN, approval, low_mission, recall, replacement
+from reference.flat_case import (
+    BATTERY,
+    HEIGHT,
+    NOMINAL,
+    OBSTACLE,
+    POSITION_X,
+    POSITION_Y,
+    SLOTS,
+    WIND,
+    M,
+    S,
+    apply,
+    clause,
+    const,
+    signal,
+)
+from reference.naive_code import TooNear
+from reference.oracle import Oracle
+from reference.world import APPROVAL_KEY, START, VEHICLE, loaded, renewed
+from rtshcua.decision import decide
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import RuleKind
+from rtshcua.model.flat.situation import Context, State
+from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement import executor as executors
+from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.ports import Dispatch
+from rtshcua.wire import permit as permits
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.permit import Permit
+from rtshcua.wire.receipt import APPROVAL, RECALL, Receipt
+from rtshcua.wire.receipt import decode as read_receipt
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, encode
+from rtshcua.wire.response import Answer, decode
+
+WINDY = clause("wind.speed > 15 m/s", apply(Op.GT, signal(WIND), const(15 * M)))
+POLICY = replace(flat.POLICY, rules=(*flat.POLICY.rules, flat.rule(RuleKind.FORBID, when=WINDY)))
+OF, UNENFORCED = (loaded(POLICY, low_mission(), mode) for mode in (Mode.SOFTWARE, Mode.NONE))
+STRANGER = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.APPROVAL, development=True)
+ACTS = ("ask", "ask", "ask", "send", "send", "stand in", "ended", "sign", "again", "wait", "fly", "fly", "fly")
+STRANGE = {BATTERY: 1_000, WIND: 20 * M, OBSTACLE: None, HEIGHT: 130 * M, POSITION_X: 600 * M}
+
+
+class TakenOver:
+    """A runtime in the hands of an attacker, and a notary who knows what was admissible. `broken` says what of the
+    theorem did not hold."""
+
+    def __init__(self, of: Random, template: Loaded = OF) -> None:
+        self.of, self.loaded, self.now = of, renewed(template), START
+        self.permits: list[bytes] = []
+        self.papers: list[bytes] = []
+        self.step = 0  # where an honest runtime would be
+        self.admitted: dict[bytes, tuple[Invocation, int]] = {}  # by permit: what, and until when at most
+        self.sent: set[bytes] = set()
+        self.confirmed: set[bytes] = set()
+        self.recalled = False
+        self.broken: list[str] = []
+
+    def go(self, acts: int) -> list[str]:
+        for _ in range(acts):
+            match self.of.choice(ACTS):
+                case "ask":
+                    self.ask()
+                case "send":
+                    self.send()
+                case "stand in":
+                    self.stand_in()
+                case "ended":
+                    self.loaded.executor.ended()
+                case "sign":
+                    self.hand(self.signed())
+                case "again" if self.papers:
+                    self.hand(self.of.choice(self.papers))
+                case "wait":
+                    us = self.of.choice([50_000, S, 11 * S, 11 * MIN])
+                    self.now = replace(self.now, monotonic_us=self.now.monotonic_us + us, utc_us=self.now.utc_us + us)
+                case "fly":
+                    self.fly()
+        return self.broken
+
+    # ------------------------------------------------------------------------------------------------ what it does
+
+    def fly(self) -> None:
+        """What an honest runtime would do, so that the rest of the mission is reached."""
+        steps = self.loaded.bundle.mission.invocations
+        if self.step >= len(steps):
+            return
+        meant, at = steps[self.step], self.now.monotonic_us
+        state = self.told(meant, strange=0.25)
+        asked = Request(STEP, meant.step, -1, meant.binding, self.now, state, at, meant.phase, 5_000)
+        self.enforce(asked, meant)
+        if self.permits and self.permits[-1] in self.admitted and self.admitted[self.permits[-1]][0] is meant:
+            self.loaded.executor.ended()
+            self.send(self.permits[-1])
+            self.loaded.executor.ended()
+            self.step += 1
+
+    def ask(self) -> None:
+        of, steps = self.of, self.loaded.bundle.mission.invocations
+        kind = of.choice([STEP] * 6 + [FALLBACK_LINK, CONTINGENCY_LINK])
+        step = of.choice([min(self.step, len(steps) - 1)] * 4 + [0, 1, 2, 3, of.randrange(-1, 6)])
+        step = -1 if kind == CONTINGENCY_LINK else step
+        link = -1 if kind == STEP else of.randrange(-1, 3)
+        meant = steps[min(max(step, 0), len(steps) - 1)]
+        binding = self.loaded.bundle.policy_digest if kind == CONTINGENCY_LINK else meant.binding
+        if of.random() < 0.1:
+            binding = of.choice([bytes(32), of.choice(steps).binding])
+        at = self.now.monotonic_us
+        released = max(of.choice([at, at, at - S, at - 9 * S]), 0)
+        phase = of.choice([meant.phase] * 8 + [0, 1, 2])
+        state = self.told(meant)
+        asked = Request(kind, step, link, binding, self.now, state, released, phase, of.choice([5_000, 20_000, 20 * S]))
+        self.enforce(asked, meant)
+
+    def enforce(self, asked: Request, meant: Invocation) -> None:
+        answer = decode(self.loaded.boundary.enforce(encode(asked)))
+        if isinstance(answer, Answer) and answer.permit:
+            self.permits.append(answer.permit)
+            if asked.kind == STEP:
+                self.judge(asked, meant, answer.permit)
+
+    def told(self, meant: Invocation, strange: float = 0.3) -> State:
+        """A state: well, or near a threshold, or with something missing."""
+        values = dict(NOMINAL)
+        if meant.step == 0:
+            values |= {HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0}
+        else:
+            values |= {HEIGHT: 8 * M}
+        if self.of.random() < strange:
+            slot = self.of.choice([*STRANGE, WIND, WIND, OBSTACLE])
+            values[slot] = STRANGE[slot]
+        return State(tuple(values[slot] for slot in range(SLOTS)), (10_000,) * SLOTS)
+
+    def send(self, permit: bytes = b"") -> None:
+        if not self.permits:
+            return
+        chosen = permit or self.of.choice(self.permits)
+        if not permit and self.of.random() < 0.2:
+            at = self.of.randrange(8 * len(chosen))
+            chosen = chosen[: at // 8] + bytes([chosen[at // 8] ^ 1 << at % 8]) + chosen[at // 8 + 1 :]
+        try:
+            found = self.loaded.executor.dispatch(chosen, self.now.monotonic_us)
+        except LookupError:  # believed, and naming nothing
+            self.hold(False, "a permit that nobody made")
+        else:
+            if isinstance(found, Dispatch):
+                self.witness(found, chosen)
+
+    def stand_in(self) -> None:
+        if not self.permits:
+            return
+        permit, kind = self.of.choice(self.permits), self.of.choice([FALLBACK_LINK, CONTINGENCY_LINK])
+        found = self.loaded.executor.stand_in(permit, kind, self.of.randrange(-1, 4), self.now.monotonic_us)
+        if isinstance(found, Dispatch):
+            self.hold(permit in self.sent, "a link stood in for a step that never flew")
+
+    def signed(self) -> bytes:
+        """A document: what people signed, or what strangers did."""
+        of, now, steps = self.of, self.now, len(self.loaded.bundle.mission.invocations)
+        match of.randrange(8):
+            case 0:
+                return recall(self.loaded, now=now, expires_at_us=now.utc_us + MIN) if of.random() < 0.2 else b""
+            case 1:
+                kept = min(2, steps - 1)
+                return replacement(self.loaded, kept) if steps == 4 and of.random() < 0.3 else b""
+            case 2:
+                return approval(self.loaded, of.randrange(steps), STRANGER, now)
+            case 3:
+                paper = bytearray(approval(self.loaded, of.randrange(steps), APPROVAL_KEY, now))
+                paper[of.randrange(len(paper))] ^= 1
+                return bytes(paper)
+            case 4:
+                return approval(self.loaded, of.randrange(steps), APPROVAL_KEY, now, granted=0)
+            case _:
+                return approval(self.loaded, min(2, steps - 1), APPROVAL_KEY, now)
+
+    def hand(self, paper: bytes) -> None:
+        self.papers.append(paper)
+        before = self.loaded.bundle.mission.invocations
+        receipt = read_receipt(self.loaded.boundary.present(paper, self.now, self.step))
+        assert isinstance(receipt, Receipt)
+        if receipt.accepted and receipt.kind == APPROVAL and receipt.granted:
+            self.confirmed.add(before[receipt.step].invocation_id)
+        self.recalled = self.recalled or (receipt.accepted and receipt.kind == RECALL)
+
+    # ------------------------------------------------------------------------------------------- what must hold of it
+
+    def judge(self, asked: Request, meant: Invocation, permit: bytes) -> None:
+        """A permit was made for a step: was it admissible?"""
+        approvals = self.loaded.in_force.approvals(meant, asked.now)
+        context = Context(asked.binding, VEHICLE, 7, 0, asked.released_us, asked.phase, asked.remaining_us, approvals)
+        try:
+            outcome, reason, _ = Oracle(self.loaded.bundle.policy, asked.state, asked.now).decide(meant, context)
+        except TooNear:
+            return
+        self.hold(outcome is Outcome.ALLOW, f"a permit for what is inadmissible: {reason}")
+        again = any(known.invocation_id == meant.invocation_id for known, _ in self.admitted.values())
+        self.hold(not again, "an id was admitted twice")
+        due = max([asked.released_us, *(each.monotonic_us for each in approvals)]) + meant.contract.deadline_us
+        valid = asked.now.monotonic_us + meant.issued_at_us + meant.contract.validity_us - asked.now.utc_us
+        self.admitted[permit] = meant, min(due, valid)
+
+    def witness(self, found: Dispatch, permit: bytes) -> None:
+        """Something was sent."""
+        self.hold(permit in self.permits, "a permit that nobody made")
+        self.hold(permit not in self.sent, "a permit was used twice")
+        self.sent.add(permit)
+        if permit not in self.admitted:
+            return
+        meant, until_us = self.admitted[permit]
+        command = found.command
+        told = (command.skill, command.kind, command.path, command.altitude, command.speed)
+        plan = meant.plan
+        signed = (meant.contract.name, plan.kind, plan.path, plan.altitude, plan.speed)
+        self.hold(told == signed, "another command than the one that was signed")
+        self.hold(self.now.monotonic_us <= until_us, "sent after its deadline or validity")
+        self.hold(not self.recalled, "a step was sent after a recall")
+        self.hold(meant.step != 2 or plan.altitude != 8 * M or meant.invocation_id in self.confirmed, "unconfirmed")
+
+    def hold(self, truth: bool, what: str) -> None:
+        if not truth:
+            self.broken.append(what)
+
+
+@given(worlds.CHANCES)
+def test_no_history_dispatches_what_was_not_admitted(of: Random) -> None:
+    assert TakenOver(of).go(40) == []
+
+
+@pytest.mark.soak
+@settings(max_examples=20_000)
+@given(worlds.CHANCES)
+def test_no_longer_history_does_either(of: Random) -> None:
+    assert TakenOver(of).go(120) == []
+
+
+def breaks(what: str = "", template: Loaded = OF, most: int = 300) -> bool:
+    """Whether some history breaks the theorem, in such a way."""
+    return any(what in each for seed in range(most) for each in TakenOver(Random(seed), template).go(60))
+
+
+def test_the_histories_reach_what_the_theorem_speaks_of() -> None:
+    """Steps are sent, also one that was confirmed, and some mission is recalled; else nothing could be broken."""
+    reached: set[object] = set()
+    for seed in range(300):
+        history = TakenOver(Random(seed))
+        history.go(60)
+        reached |= {history.admitted[permit][0].step for permit in history.sent & history.admitted.keys()}
+        reached |= {"recalled"} if history.recalled else set()
+        if {0, 1, 2, 3, "recalled"} <= reached:
+            return
+    raise AssertionError(reached)
+
+
+def test_without_enforcement_it_does_not_hold() -> None:
+    assert breaks("a permit for what is inadmissible", UNENFORCED)
+
+
+@pytest.mark.parametrize("number", range(len(decide.STEPS)), ids=[step.__name__ for _, step in decide.STEPS])
+def test_a_decision_that_forgets_a_step_is_noticed(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(decide, "STEPS", decide.STEPS[:number] + decide.STEPS[number + 1 :])
+    assert breaks("a permit for what is inadmissible")
+
+
+def test_an_executor_that_believes_any_permit_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permits, "compare_digest", lambda _, __: True)
+    assert breaks("a permit that nobody made")
+
+
+def test_an_executor_that_does_not_look_at_the_time_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    dispatch = executors.Executor._dispatch
+
+    def whenever(self: executors.Executor, permit: Permit, now_us: int) -> Dispatch | Refusal:
+        return dispatch(self, permit, min(now_us, permit.not_after_us))
+
+    monkeypatch.setattr(executors.Executor, "_dispatch", whenever)
+    assert breaks("sent after its deadline or validity")

@@ -1,0 +1,180 @@
+"""Theorem 3: what was done is in evidence, and the evidence cannot be bent.
+
+Statement. Each command that was sent has before it, in a log that verifies, the record that permits it, with everything
+that was read (the evidence tuple); the decision derives again from it. Who holds no key changes, adds or takes out
+nothing of a closed log unnoticed. Who took the vehicle, and with it the key of the present epoch, changes nothing that
+an earlier epoch sealed.
+
+Attacker: whoever holds the file. First without keys, but diligent: lines are edited, moved, doubled, cut, swapped with
+those of another log, and all hashes, counts and links that need no key are then made anew. Then with the secrets of the
+last epoch. (Who holds the log key can write another log; only a witness tells: tests/attacks/test_log_anchored.py.)
+"""
+
+from collections.abc import Callable
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+
+from reference import worlds
+from reference.forgery import (
+    as_log_key,
+    by_one_key,
+    captured,
+    edit,
+    flight,
+    other_flight,
+    read,
+    rehashed,
+    renumbered,
+    rewritten,
+    seed_of,
+    signed,
+    signers,
+    sound,
+)  # fmt: skip
+from reference.verifiers import ROOT_KEY
+from rtshcua.evidence import note, seals
+from rtshcua.evidence.report import Verdict
+from rtshcua.ground.auditor import meaning
+from rtshcua.ground.auditor.audit import audit
+from rtshcua.wire.keys import Duty, SigningKey
+
+STRANGER = SigningKey.from_seed(b"\x77" * 32, duty=Duty.LOG, development=True)
+#: how the rest of a log is made to fit, by whoever has no key
+FITTED = (list, renumbered, rehashed, rewritten, lambda lines: rewritten(renumbered(lines)))
+#: what the paper's evidence tuple has of a decision, by the fields of its record
+TUPLE = ("invocation", "state", "context", "outcome", "reason", "at_us", "utc_us", "binding", "target_link")
+
+
+def bent(of: Random, lines: tuple[bytes, ...], least: int = 0) -> list[bytes]:
+    """The log with some change in or after line `least`, and everything made to fit that needs no key."""
+    made = list(lines)
+    for _ in range(of.choice([1, 1, 2, 3])):
+        at, other = (of.randrange(least, len(made)) for _ in range(2))
+        match of.randrange(8):
+            case 0 if len(made) > least + 2:
+                del made[at]
+            case 1:
+                made.insert(at, made[other])
+            case 2:
+                made[at], made[other] = made[other], made[at]
+            case 3 if len(made) > least + 2:
+                del made[max(at, least + 1) :]
+            case 4:
+                made[at] = of.choice(other_flight())
+            case _:
+                made[at] = edited(of, made[at])
+    return made
+
+
+def edited(of: Random, line: bytes) -> bytes:
+    """A line with one field changed, to something of its kind."""
+    fields = read(line)
+    name = of.choice(sorted(fields))
+    value = fields[name]
+    match value:
+        case int():
+            return edit(line, **{name: max(value + of.choice([-1, 1, 1_000]), 0)})
+        case str() if value:
+            at = of.randrange(len(value))
+            return edit(line, **{name: value[:at] + of.choice("0a9f") + value[at + 1 :]})
+        case dict():
+            inner = of.choice(sorted(value))
+            if isinstance(value[inner], int):
+                return edit(line, **{name: value | {inner: value[inner] + 1}})
+            if isinstance(value[inner], list) and value[inner]:
+                return edit(line, **{name: value | {inner: [5, *value[inner][1:]]}})
+    return edit(line, event="noted")
+
+
+def accepted(lines: list[bytes]) -> bool:
+    """Whether the log is taken for whole, by whoever pins the root key."""
+    return audit(lines, ROOT_KEY).report.verdict is Verdict.VERIFIED
+
+
+def survives(of: Random) -> bool:
+    """Whether some forgery without a key is taken for a log."""
+    lines = flight()
+    forged = of.choice(FITTED)(bent(of, lines))
+    if of.random() < 0.1:
+        forged = signed(as_log_key(forged, STRANGER), STRANGER)
+    return tuple(forged) != lines and tuple(forged) != other_flight() and accepted(forged)
+
+
+def survives_captured(of: Random) -> bool:
+    """Whether who holds the last epoch's key changes what was sealed before, unnoticed."""
+    lines = flight()
+    sealed = signers(lines)[:-1]
+    last = read(lines[sealed[-1]])["next_key"]
+    head = bent(of, lines[: sealed[-1] + 1])
+    forged = captured([*head, *lines[sealed[-1] + 1 :]], seed_of(last))
+    return tuple(forged[: len(head)]) != lines[: len(head)] and accepted(forged)
+
+
+@given(worlds.CHANCES)
+def test_without_a_key_nothing_is_changed_unnoticed(of: Random) -> None:
+    assert not survives(of)
+
+
+@given(worlds.CHANCES)
+def test_with_the_last_epochs_key_nothing_is_changed_that_was_sealed(of: Random) -> None:
+    assert not survives_captured(of)
+
+
+@pytest.mark.soak
+@settings(max_examples=20_000)
+@given(worlds.CHANCES)
+def test_many_more_changes_are_noticed(of: Random) -> None:
+    assert not survives(of)
+    assert not survives_captured(of)
+
+
+@pytest.mark.parametrize("lines", [flight, other_flight], ids=["completed", "came home early"])
+def test_each_command_has_its_evidence_tuple_before_it(lines: Callable[[], tuple[bytes, ...]]) -> None:
+    """The log verifies and each decision derives again, so the tuples are those of what was decided."""
+    records = [read(line) for line in lines()]
+    sound(lines())
+    granted: set[tuple[int, int]] = set()
+    genesis = records[0]
+    assert {"bundle", "mode", "received_us", "root"} <= genesis.keys()
+    for record in records:
+        if record["type"] == "decision":
+            assert all(name in record for name in TUPLE)
+            assert record["context"]["policy_version"] == 7
+            granted |= {(record["kind"], record["step"])} if record["outcome"] == "allow" else set()
+        if record.get("event") == "dispatched":
+            assert granted & {(record["kind"], record["step"]), (0, record["step"])} or record["kind"] == 2
+    assert sum(record.get("event") == "dispatched" for record in records) >= 3
+
+
+def breaks(survivor: Callable[[Random], bool], most: int = 150) -> bool:
+    return any(survivor(Random(seed)) for seed in range(most))
+
+
+def test_a_verifier_that_believes_any_signature_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the signatures are for: with them believed, a forged segment is found by no hash."""
+    monkeypatch.setattr(seals, "open_note", lambda text, *_: note.parse(note.split(text)[0]))
+    assert breaks(by_a_stranger)
+
+
+def by_a_stranger(of: Random) -> bool:
+    """All counts, roots and texts made anew, signed by somebody: taken for a log only where nobody verifies."""
+    lines = flight()
+    forged = by_one_key(bent(of, lines, 1), STRANGER.private.private_bytes_raw())
+    return tuple(forged) != lines and accepted(forged)
+
+
+@given(worlds.CHANCES)
+def test_a_strangers_signatures_are_worth_nothing(of: Random) -> None:
+    assert not by_a_stranger(of)
+
+
+def test_an_auditor_that_does_not_derive_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With all keys a decision can be signed that does not follow from what it read: only deriving finds it."""
+    lines = flight()
+    number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
+    forged = signed([*lines[:number], edit(lines[number], reason="state/violated"), *lines[number + 1 :]])
+    assert not accepted(forged)
+    monkeypatch.setattr(meaning.Deriver, "check", lambda *_: None)
+    assert accepted(forged)

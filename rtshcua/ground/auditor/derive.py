@@ -82,6 +82,12 @@ class Deriver:
             return Flaw("decision/inputs", f"the state has not the {slots} slots of the policy")
         if len(state.monitors) != monitors or not SINGLE.issuperset(state.monitors):
             return Flaw("decision/inputs", f"the state has not a truth for each of the policy's {monitors} monitors")
+        identity, version, given = policy.policy.vehicle.identity, policy.policy.version, record.context
+        if given.vehicle != identity:
+            return Flaw("decision/vehicle", "it was made for another vehicle than the log's", given.vehicle, identity)
+        if given.policy_version != version:
+            text = "it was made under another version of the policy than the log's"
+            return Flaw("decision/policy-version", text, str(given.policy_version), str(version))
         flaw = self._observed.check(state, now)
         if flaw is None and record.kind != STEP and record.context.approvals:
             return Flaw("decision/approvals", "a link of a chain is decided without approvals")

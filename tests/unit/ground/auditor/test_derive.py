@@ -58,6 +58,25 @@ def test_a_forged_link_of_the_contingency(fields: dict[str, object], slug: str) 
     assert forged(lines, number, **fields) == (slug, number)
 
 
+@pytest.mark.parametrize("kind", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("field", "value", "slug"),
+    [("vehicle", "quad-08", "decision/vehicle"), ("policy_version", 8, "decision/policy-version")],
+)
+def test_a_decision_is_of_the_vehicle_and_the_policy_of_its_log(
+    kind: int, field: str, value: object, slug: str
+) -> None:
+    """Whatever was decided: a refusal for the wrong vehicle would derive from the vehicle that its record names."""
+    lines = [flight(), fallen_back("px4").lines, denied_in_the_air()][kind]
+    number = decisions(lines, kind)[0]
+    context = read(lines[number])["context"] | {field: value}
+    assert forged(lines, number, context=context) == (slug, number)
+    if kind == 0:
+        reason = {"vehicle": "integrity/wrong-vehicle", "policy_version": "integrity/policy-version"}[field]
+        denied = {"outcome": "deny", "reason": reason, "rule_step": 1, "valid_until_us": read(lines[number])["at_us"]}
+        assert forged(lines, number, context=context, **denied) == (slug, number)
+
+
 @pytest.mark.parametrize("by_us", [-1, 1])
 def test_a_step_is_released_after_it_was_received_and_before_it_is_decided(by_us: int) -> None:
     lines = flight()

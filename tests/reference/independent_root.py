@@ -60,6 +60,21 @@ def open_root(envelope: bytes, pinned: bytes, now_us: int) -> Root:
 
 
 def _open(envelope: bytes, pinned: bytes, now_us: int) -> Root:
+    protected, payload, signature, kid = _parts(envelope, _CONTENT)
+    body = _body(payload)
+    keys = body["keys"]
+    signer = next((key for key in keys if key["duty"] == "root" and key_id("root", key["public"]) == kid), None)
+    if signer is None or pinned not in (signer["public"], kid):
+        raise Untrusted("not signed by the pinned key")
+    if not holds(signer["public"], signature, _signed(protected, "root", payload)):
+        raise Untrusted("the signature does not hold")
+    if now_us >= body["expires_at_us"] or (signer["expires_us"] is not None and now_us >= signer["expires_us"]):
+        raise Untrusted("expired")
+    return Root(keys, body["thresholds"].get("witness", 1))
+
+
+def _parts(envelope: bytes, content: str) -> tuple[bytes, bytes, bytes, bytes]:
+    """The protected header, the payload, the signature and the key's name of a COSE_Sign1."""
     if envelope[:1] != b"\xd2":
         raise Untrusted("no COSE_Sign1")
     match _whole(envelope[1:]):
@@ -68,19 +83,61 @@ def _open(envelope: bytes, pinned: bytes, now_us: int) -> Root:
         case _:
             raise Untrusted("not the four parts of a COSE_Sign1")
     headers = _whole(protected)
-    if not isinstance(headers, dict) or set(headers) != {1, 3, 4} or headers[1] != -19 or headers[3] != _CONTENT:
+    if not isinstance(headers, dict) or set(headers) != {1, 3, 4} or headers[1] != -19 or headers[3] != content:
         raise Untrusted("other headers")
-    body = _body(payload)
-    keys = body["keys"]
-    signer = next((key for key in keys if key["duty"] == "root" and key_id("root", key["public"]) == headers[4]), None)
-    if signer is None or pinned not in (signer["public"], headers[4]):
-        raise Untrusted("not signed by the pinned key")
-    signed = _head(4, 4) + _text("Signature1") + _bytes(protected) + _bytes(b"rtshcua/duty/root") + _bytes(payload)
-    if not holds(signer["public"], signature, signed):
-        raise Untrusted("the signature does not hold")
-    if now_us >= body["expires_at_us"] or (signer["expires_us"] is not None and now_us >= signer["expires_us"]):
-        raise Untrusted("expired")
-    return Root(keys, body["thresholds"].get("witness", 1))
+    return protected, payload, signature, headers[4]
+
+
+def _signed(protected: bytes, duty: str, payload: bytes) -> bytes:
+    """What a COSE_Sign1 signs (RFC 9052 section 4.4)."""
+    label = f"rtshcua/duty/{duty}".encode()
+    return _head(4, 4) + _text("Signature1") + _bytes(protected) + _bytes(label) + _bytes(payload)
+
+
+def check_bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) -> None:
+    """Step 3 of section 5: the bundle is signed by keys that may, and is of this vehicle and mission."""
+    try:
+        _bundle(bundle, root, vehicle, mission, now_us)
+    except (AttributeError, IndexError, KeyError, TypeError) as error:
+        raise Untrusted("not of the form of a bundle") from error
+
+
+def _bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) -> None:
+    match _whole(bundle):
+        case ["rtshcua/bundle", 1, [bytes(first), bytes(second)]]:
+            pass
+        case _:
+            raise Untrusted("not a bundle, version 1")
+    policy_payload, _ = _envelope(first, root, "policy", vehicle, now_us)
+    mission_payload, key = _envelope(second, root, "mission", vehicle, now_us)
+    match _whole(policy_payload), _whole(mission_payload):
+        case ["rtshcua/policy", 5, [*policy]], ["rtshcua/mission", 1, [*flown]]:
+            pass
+        case _:
+            raise Untrusted("not a policy, version 5, and a mission, version 1")
+    name, version, identity, roles = policy[0], policy[1], policy[2][1], policy[4]
+    digest = hashlib.sha256(b"rtshcua/policy\0" + policy_payload).digest()
+    if flown[3:7] != [vehicle, name, version, digest] or identity != vehicle:
+        raise Untrusted("mission, policy and vehicle do not belong together")
+    if flown[0] != mission:
+        raise Untrusted("another mission")
+    if name not in key["policies"] and "*" not in key["policies"]:
+        raise Untrusted("a mission key of other policies")
+    for step in flown[9]:
+        source, role = ("agent", "operator", "onboard", "reflex")[step[4]], roles[step[5]]
+        if source not in key["sources"] or (role not in key["roles"] and "*" not in key["roles"]):
+            raise Untrusted("a mission key of other sources or roles")
+
+
+def _envelope(envelope: bytes, root: Root, duty: str, vehicle: str, now_us: int) -> tuple[bytes, dict]:
+    """What a key of a duty signed for a vehicle, and that key."""
+    protected, payload, signature, kid = _parts(envelope, f"application/vnd.rtshcua.{duty}+cbor")
+    keys = [each for each in root.keys if each["duty"] == duty and key_id(duty, each["public"]) == kid]
+    if not keys or keys[0]["public"] not in root.public(duty, vehicle, now_us):
+        raise Untrusted(f"not signed by a key of duty {duty} for this vehicle")
+    if not holds(keys[0]["public"], signature, _signed(protected, duty, payload)):
+        raise Untrusted(f"the signature of the {duty} does not hold")
+    return payload, keys[0]
 
 
 def _body(payload: bytes) -> dict:

@@ -17,7 +17,7 @@ if __package__ in (None, ""):
 
 from reference.independent_note import Broken, claimed, cosigned, ident, notes_of, read_note
 from reference.independent_records import LONGEST, SIGNED, Malformed, canonical, parse, unbase64
-from reference.independent_root import Root, Untrusted, holds, key_id, open_root
+from reference.independent_root import Root, Untrusted, check_bundle, holds, key_id, open_root
 
 MOST_LINES, LONGEST_US = 2048, 20_000_000
 _ANCHORED = "anchored"
@@ -159,6 +159,7 @@ class Walk:
             raise Untrusted("the root does not name the log key for this vehicle")
         if record["log_kid"] != key_id("log", key).hex():
             raise Untrusted("log_kid is not the name of the log key")
+        check_bundle(unbase64(record["bundle"]), self.trust, record["vehicle"], record["mission"], record["utc_us"])
         self.origin = f"rtshcua/log/{quote(record['vehicle'], safe='')}/{record['boot']}"
 
     def _clocks(self, record: dict) -> None:

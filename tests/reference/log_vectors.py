@@ -15,6 +15,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from msgspec.structs import replace
 
 from reference.forgery import LOG_KEY, flight, public_of, read, resealed, seed_of
 from reference.independent_note import read_note
@@ -29,6 +30,8 @@ WITNESSES = {f"rtshcua/witness/{n}": bytes([0xA0 + n]) * 32 for n in (1, 2, 3)}
 SECRET = b"\x5e" * 32
 MONOTONIC_US, UTC_US = 7_000_000, case.flat.ISSUED + 60_000_000
 NULL = "0" * 64
+#: a name that the origin escapes
+ODD = "M\u00f6we 7/+~%"
 
 
 @cache
@@ -60,6 +63,15 @@ def genesis(**fields: object) -> Fields:
     first = read(flight()[0]) | times(0)
     first["received_us"] = first["at_us"] - 2_000
     return first | {"root": b64encode(root()).decode(), "next_key": _epoch(0)} | fields
+
+
+def bundle(vehicle: str, **signers: SigningKey) -> str:
+    """The short mission for a vehicle, of the usual keys but for what is given, as a genesis holds it."""
+    shipped = case.policy()
+    under = replace(shipped, vehicle=replace(shipped.vehicle, identity=vehicle))
+    keys = case.KEYS | {Duty(duty): key for duty, key in signers.items()}
+    mission = case.mission(case.short_steps())
+    return b64encode(case.seal(replace(mission, vehicle=vehicle), under, keys)).decode()
 
 
 def effect(ms: int, **fields: object) -> Fields:
@@ -137,19 +149,19 @@ def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
     """Name, which rule of the page is broken, lines."""
     good = sealed()
     text = good[1]
-    yield "chain", "3: a record edited", [*good[:1], text.replace(b'"note"', b'"nose"'), *good[2:]]
+    yield "chain", "4: a record edited", [*good[:1], text.replace(b'"note"', b'"nose"'), *good[2:]]
     yield "not_canonical", "1: a space", [*good[:1], text.replace(b",", b", ", 1), *good[2:]]
     yield "duplicate_key", "1: a key twice", [*good[:1], text.replace(b'"seq":1', b'"seq":1,"seq":1'), *good[2:]]
-    yield "after_close", "6: a record after the close", [*good, good[1]]
+    yield "after_close", "7: a record after the close", [*good, good[1]]
     edited = [*good[:1], line_of(read(text) | {"detail": "edited"}), *good[2:]]
-    yield "rehashed", "5: root", resealed(edited, seed_of, keep=("checkpoint",))
+    yield "rehashed", "6: root", resealed(edited, seed_of, keep=("checkpoint",))
     yield "later_key", "2: sealed by a later key", _with_key(good, 2)
     yield "stripped", "2: no signature", [*good[:-1], line_of(read(good[-1]) | {"checkpoint": None})]
     yield "unsealed", "3: more than 20 s and no seal", log(genesis(), effect(20_001), close(20_002))
-    yield "clock", "4: monotonic time goes back", log(genesis(), effect(10), effect(9), close(20))
+    yield "clock", "5: monotonic time goes back", log(genesis(), effect(10), effect(9), close(20))
     later = genesis(received_us=MONOTONIC_US + 1)
-    yield "received", "4: the bundle received after the log began", log(later, effect(10), close(20))
-    yield "utc_jump", "4: the clocks part", log(genesis(), effect(10, utc_us=UTC_US + 2_011_000), close(20))
+    yield "received", "5: the bundle received after the log began", log(later, effect(10), close(20))
+    yield "utc_jump", "5: the clocks part", log(genesis(), effect(10, utc_us=UTC_US + 2_011_000), close(20))
     yield "origin", "2: the origin of another boot", _with_text(good, lambda _, text: text.replace("00\n", "01\n", 1))
     larger = _with_text(good, lambda n, text: text.replace(f"\n{n}\n", f"\n{n + 1}\n", 1))
     yield "size", "2: the size one too large", larger
@@ -159,6 +171,13 @@ def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
     left = _with_text(good, lambda n, text: text if n != 4 else text.rpartition("after ")[0])
     yield "after_none", "2: it names no checkpoint before", left
     yield "wrong_kid", "5, step 2: the name of another key", log(genesis(log_kid="00" * 16), close(10))
+    yield "other_vehicle", "3: the bundle of another vehicle", log(genesis(vehicle=ODD), close(10))
+    yield "other_mission", "3: the bundle of another mission", log(genesis(mission="another"), close(10))
+    own = read(flight()[0])["vehicle"]
+    for duty in ("policy", "mission"):
+        stranger = SigningKey.from_seed(b"\x77" * 32, duty=Duty(duty), development=True)
+        forged = log(genesis(bundle=bundle(own, **{duty: stranger})), close(10))
+        yield f"bundle_{duty}", f"3: the {duty} signed by a stranger", forged
     yield "second_genesis", "1: a genesis that is not line 0", log(genesis(), genesis(), close(10))
 
 
@@ -198,7 +217,7 @@ def made() -> dict[str, bytes]:
     """All files by name."""
     whole, torn = recovered()
     witnessed, beside = anchored()
-    odd = log(genesis(vehicle="M\u00f6we 7/+~%"), effect(10), close(20))
+    odd = log(genesis(vehicle=ODD, bundle=bundle(ODD)), effect(10), close(20))
     logs = {
         "closed": (list(flight()), "closed", 0),
         "sealed": (sealed(), "closed", 0),

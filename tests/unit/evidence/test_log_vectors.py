@@ -8,11 +8,14 @@ import pytest
 
 from reference import independent_verifier
 from reference.log_vectors import FOLDER, made
+from reference.verifiers import agree
 from rtshcua.evidence.merkle import Tree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, parse, split
 from rtshcua.evidence.proofs.disclosure import disclosure_root
+from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
+from rtshcua.ground.auditor.audit import audit
 from virtual.rows import rows
 
 FILES = made()
@@ -55,6 +58,22 @@ def test_this_verifier(name: str) -> None:
 
 
 @rows("name", EXPECTED)
+def test_the_audit_and_the_quick_verifier(name: str) -> None:
+    """All that this program asks of a log, the bundle too; what it says agrees with the page, either way."""
+    found = audit(lines_of(name), ROOT_KEY)
+    assert found.report.failure is None
+    assert found.report.verdict.value == WORDS[EXPECTED[name]["verdict"]]
+    agree(b"".join(lines_of(name)), found)
+
+
+@rows("name", REJECTED)
+def test_what_the_audit_rejects(name: str) -> None:
+    found = audit(lines_of(f"rejected/{name}"), ROOT_KEY)
+    assert found.report.verdict is Verdict.FAILED
+    agree(b"".join(lines_of(f"rejected/{name}")), found)
+
+
+@rows("name", EXPECTED)
 def test_leaves_roots_and_checkpoints(name: str) -> None:
     wanted, tree = EXPECTED[name], Tree()
     for number, leaf in enumerate(wanted["leaves"]):
@@ -76,7 +95,7 @@ def test_leaves_roots_and_checkpoints(name: str) -> None:
 @rows("name", REJECTED)
 def test_what_no_verifier_accepts(name: str) -> None:
     lines = lines_of(f"rejected/{name}")
-    assert verify(lines).failure is not None
+    assert audit(lines, ROOT_KEY).report.failure is not None
     assert independent_verifier.verify(b"".join(lines), ROOT_KEY).kind in ("broken", "untrusted")
 
 

@@ -18,6 +18,7 @@ from rtshcua.evidence.records import (
     encode,
 )
 from rtshcua.model.outcome import Outcome
+from rtshcua.wire import names
 
 #: the longest line in bytes; a genesis carries a whole bundle
 LONGEST = 1 << 26
@@ -108,4 +109,6 @@ def _words(error: msgspec.DecodeError) -> str:
 
 def _unknown_format(name: str, version: int) -> Flaw:
     text = "its format is not one that this program reads"
+    if name == FORMAT and version < VERSION:
+        text += f"; {names.COMPATIBILITY} says what verifies logs of earlier versions"
     return Flaw("genesis/format", text, f"{name} version {version}", f"{FORMAT} version {VERSION}")

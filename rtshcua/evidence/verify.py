@@ -8,8 +8,8 @@
 6. the epochs: each sealed in time, by the key that the signed record before names (`seals`)
 7. the end: a close, or else what is missing
 
-That is section 5 of docs/log-format.md but for its steps 2 and 3. What the caller must do: trust the genesis' log key, bundle
-and trust root, and derive the decisions again (`rtshcua.ground.auditor`).
+That is section 5 of docs/log-format.md but for its steps 2 and 3. What the caller must do: trust the genesis' log key,
+bundle and trust root, and derive the decisions again (`rtshcua.ground.auditor`).
 """
 
 from collections.abc import Iterable

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import msgspec
 
-from rtshcua.wire import cbor
+from rtshcua.wire import cbor, names
 from rtshcua.wire.cbor import CborError, Value
 from rtshcua.wire.names import Artefact
 from rtshcua.wire.untrusted import Untrusted
@@ -35,10 +35,9 @@ def unwrap(artefact: Artefact, data: bytes) -> Value:
             if name != artefact.name:
                 raise ArtefactError("unknown-format", f"this is `{name[:80]}`, not `{artefact.name}`")
             if version != artefact.version:
-                raise ArtefactError(
-                    "unknown-version",
-                    f"`{name}` version {version} is unknown here; only version {artefact.version} is read",
-                )
+                text = f"`{name}` version {version} is unknown here; only version {artefact.version} is read"
+                older = f"; {names.COMPATIBILITY} says what reads earlier ones" if version < artefact.version else ""
+                raise ArtefactError("unknown-version", text + older)
             return body
     raise ArtefactError("malformed", f"this is no `{artefact.name}`: not an array of format name, version and body")
 

@@ -18,6 +18,9 @@ class Artefact:
         return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
 
 
+#: what says which revision reads earlier versions of these
+COMPATIBILITY: Final = "docs/compatibility.md"
+
 ROOT: Final = Artefact("rtshcua/root", 2)  # 2: with policies of mission keys, persons of approval keys
 POLICY: Final = Artefact("rtshcua/policy", 5)  # 5: a rule may ask for two different people
 MISSION: Final = Artefact("rtshcua/mission", 1)

@@ -37,7 +37,8 @@ def test_bytes_begin_with_name_and_version():
         (
             cbor.encode(("rtshcua/policy", 4, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 4 is unknown here; only version 5 is read",
+            "`rtshcua/policy` version 4 is unknown here; only version 5 is read; "
+            "docs/compatibility.md says what reads earlier ones",
         ),
     ],
 )

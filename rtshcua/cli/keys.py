@@ -105,13 +105,11 @@ def init(
     if not development and not policy:
         help = "`--policy NAME` names one: whoever may choose the policy may choose a laxer one"
         return fail(ExitCode.USAGE, "mission keys that are in earnest are for named policies", help)
-    passphrase = None
-    if not development:
-        passphrase = _new_passphrase(passphrase_file)
-        if passphrase is None:
-            return fail(ExitCode.USAGE, _NO_PASSPHRASE)
     now_us = time.time_ns() // 1000
     try:
+        passphrase = None if development else _new_passphrase(passphrase_file)
+        if passphrase is None and not development:
+            return fail(ExitCode.USAGE, _NO_PASSPHRASE)
         store.create(
             lambda: secrets.token_bytes(SEED_BYTES),
             development=development,
@@ -388,7 +386,10 @@ def link(
 def _make_link_key(file: Path, passphrase_file: Path | None) -> ExitCode:
     key = secrets.token_bytes(KEY_OCTETS)
     if passphrase_file is not None:
-        passphrase = read_passphrase(passphrase_file)
+        try:
+            passphrase = read_passphrase(passphrase_file)
+        except Untrusted as error:
+            return _refused(error)
         if len(passphrase.decode(errors="replace")) < _SHORTEST:
             return fail(ExitCode.USAGE, f"a link key needs a passphrase of {_SHORTEST} characters or more")
         key = hashlib.sha256(passphrase).digest()

@@ -5,6 +5,7 @@ from getpass import getpass
 from pathlib import Path
 
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, KeyStoreError, read_key, whose
+from rtshcua.adapters.store.reading import exposed
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -12,6 +13,9 @@ from rtshcua.wire.bundle import check_proposer
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root
+
+#: octets of a passphrase, in a file
+_LONGEST = 4096
 
 
 def unlock(
@@ -82,8 +86,18 @@ def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mis
 
 
 def read_passphrase(path: Path) -> bytes:
-    """The passphrase in a file: its content without the line ending."""
-    return path.read_bytes().rstrip(b"\r\n")
+    """The passphrase in a file, or from a pipe, that nobody else may read: its content without the line ending.
+
+    Raises `KeyStoreError` (`exposed`, `too-large`) and OSError.
+    """
+    with path.open("rb") as file:
+        if why := exposed(file):
+            text = f"others may read the passphrase in `{path}`: {why}. `chmod 600` it, or choose another passphrase"
+            raise KeyStoreError("exposed", text)
+        data = file.read(_LONGEST + 1)
+    if len(data) > _LONGEST:
+        raise KeyStoreError("too-large", f"`{path}` is longer than any passphrase, {_LONGEST} octets")
+    return data.rstrip(b"\r\n")
 
 
 def _load(store: KeyStore, duty: Duty, path: Path | None, passphrase: bytes | None, whose: str) -> SigningKey:

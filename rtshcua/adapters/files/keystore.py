@@ -263,8 +263,8 @@ def whose(key: VerificationKey) -> str:
 def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:
     """The signing key in a file. Raises `KeyStoreError` (`exposed`), `KeyFileError`, `WrongDuty` and OSError."""
     with open_regular(path) as file:
-        if mode := exposed(file):
-            raise KeyStoreError("exposed", f"others may read the key `{path}`: its mode is {mode}")
+        if why := exposed(file):
+            raise KeyStoreError("exposed", f"others may read the key `{path}`: {why}")
         data = file.read(MAX_KEY_FILE + 1)
     return load_signing_key(data, duty=duty, passphrase=passphrase)
 

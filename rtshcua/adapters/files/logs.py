@@ -102,8 +102,8 @@ def write_secret(folder: Path, secret: bytes) -> None:
 def read_secret(path: Path, root: Path | None = None) -> bytes:
     """The secret in a file that its owner alone may read. Raises `SecretError` and OSError, as `open_regular`."""
     with open_regular(path, root) as file:
-        if mode := exposed(file):
-            raise SecretError("exposed", f"others may read the secret `{path}`: its mode is {mode}")
+        if why := exposed(file):
+            raise SecretError("exposed", f"others may read the secret `{path}`: {why}")
         data = file.read(SECRET_BYTES + 1)
     if len(data) != SECRET_BYTES:
         raise SecretError("malformed", f"`{path}` is no secret of a log: it has not {SECRET_BYTES} bytes")

@@ -44,8 +44,8 @@ class LinkKeyError(Exception):
 def read_link_key(path: Path) -> bytes:
     """The key in a file that its owner alone may read. Raises LinkKeyError and OSError."""
     with open_regular(path) as file:
-        if mode := exposed(file):
-            raise LinkKeyError("exposed", f"others may read the key `{path}`: its mode is {mode}", "`chmod 600`")
+        if why := exposed(file):
+            raise LinkKeyError("exposed", f"others may read the key `{path}`: {why}", "`chmod 600`")
         data = file.read(_LONGEST)
     if len(data) != KEY_OCTETS:
         try:

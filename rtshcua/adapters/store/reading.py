@@ -14,6 +14,10 @@ UNAWAITED: Final = os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 
 
+#: the user who may read whatever there is
+ROOT = 0
+
+
 class NotRegular(OSError):
     """Something else than a regular file: a pipe, a device, a socket, a folder; or a link where none is followed."""
 
@@ -65,9 +69,16 @@ def expect_regular(handle: int, path: str | Path) -> None:
 
 
 def exposed(file: BinaryIO) -> str | None:
-    """The mode of an open file that others than its owner may read, write or run, as in `0644`; else None."""
-    mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-    return f"{mode:04o}" if mode & 0o077 else None
+    """Why others may read, write or run an open file, in words: its mode, or whose it is; None where nobody may but who
+    runs this (and root, who may anything).
+    """
+    found = os.fstat(file.fileno())
+    mode = stat.S_IMODE(found.st_mode)
+    if mode & 0o077:
+        return f"its mode is {mode:04o}"
+    if found.st_uid not in (os.geteuid(), ROOT):
+        return f"it belongs to the user {found.st_uid}"
+    return None
 
 
 @contextmanager

@@ -8,13 +8,22 @@ import pytest
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
+from rtshcua.adapters.store import reading
+from rtshcua.adapters.store.writing import write_new
 from rtshcua.cli import app, keys, unlock
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire import key_file
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted
 
 PASSPHRASE = "correct horse battery"
+
+
+@pytest.fixture(autouse=True)
+def _cheap_guesses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Encrypted keys are many here."""
+    monkeypatch.setattr(key_file, "COST", key_file.COSTS[0])
 
 
 def keys_of(store: KeyStore) -> list[SigningKey]:
@@ -98,7 +107,7 @@ def test_a_damaged_root_is_not_listed(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_encrypted_keys_from_a_passphrase_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "passphrase"
-    file.write_text(PASSPHRASE + "\n")
+    write_new(file, (PASSPHRASE + "\n").encode(), mode=0o600)
     assert app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(file)]) == ExitCode.OK
     assert "development" not in capsys.readouterr().out
     store = KeyStore(data_folder())
@@ -106,16 +115,62 @@ def test_encrypted_keys_from_a_passphrase_file(tmp_path: Path, capsys: pytest.Ca
     assert unlock.unlock(store, Duty.LOG, path=store.key_path(Duty.LOG), passphrase_file=file).duty is Duty.LOG
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file"],
+        ["keys", "link", "link.key", "--passphrase-file"],
+        ["keys", "rotate-root", "--passphrase-file"],
+    ],
+)
+@pytest.mark.parametrize("what", ["0644", "0640", "another user"])
+def test_a_passphrase_file_that_others_may_read_is_refused(
+    what: str, words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if words[1] == "rotate-root":
+        app.main(["keys", "init"])
+    file = tmp_path / "passphrase"
+    write_new(file, PASSPHRASE.encode(), mode=int(what, 8) if what[0] == "0" else 0o600)
+    if what == "another user":
+        monkeypatch.setattr(os, "geteuid", lambda: file.stat().st_uid + 1)
+        monkeypatch.setattr(reading, "ROOT", -1)
+    capsys.readouterr()
+    assert app.main([*words, str(file)]) == ExitCode.UNTRUSTED
+    said = capsys.readouterr().err
+    assert (f"its mode is {what}" if what[0] == "0" else "it belongs to the user") in said
+    assert "passphrase" in said
+    assert not (tmp_path / "link.key").exists()
+
+
+def test_a_passphrase_may_come_from_a_pipe() -> None:
+    """As a shell gives it: `--passphrase-file <(pass show drone)`."""
+    out, into = os.pipe()
+    os.write(into, PASSPHRASE.encode() + b"\n")
+    os.close(into)
+    try:
+        assert unlock.read_passphrase(Path(f"/dev/fd/{out}")) == PASSPHRASE.encode()
+    finally:
+        os.close(out)
+
+
+def test_a_passphrase_is_no_book(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_new(tmp_path / "book", b"a" * 5_000, mode=0o600)
+    words = ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "book")]
+    assert app.main(words) == ExitCode.UNTRUSTED
+    assert "longer than any passphrase" in capsys.readouterr().err
+
+
 def test_mission_keys_in_earnest_are_for_named_policies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "passphrase"
-    file.write_text(PASSPHRASE)
+    write_new(file, PASSPHRASE.encode(), mode=0o600)
     assert app.main(["keys", "init", "--encrypted", "--passphrase-file", str(file)]) == ExitCode.USAGE
     assert "`--policy NAME`" in capsys.readouterr().err
     assert not KeyStore(data_folder()).exists()
 
 
 def test_a_short_passphrase_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "short").write_text("12345678901\n")
+    write_new(tmp_path / "short", b"12345678901\n", mode=0o600)
     words = ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "short")]
     assert app.main(words) == ExitCode.USAGE
     assert not KeyStore(data_folder()).exists()
@@ -126,7 +181,7 @@ def test_without_a_terminal_nobody_is_asked(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr(unlock, "getpass", lambda prompt: pytest.fail("asked"))
     monkeypatch.setattr(keys, "getpass", lambda prompt: pytest.fail("asked"))
     assert app.main(["keys", "init", "--encrypted", "--policy", "field"]) == ExitCode.USAGE
-    (tmp_path / "passphrase").write_text(PASSPHRASE)
+    write_new(tmp_path / "passphrase", PASSPHRASE.encode(), mode=0o600)
     app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "passphrase")])
     with pytest.raises(Untrusted) as refused:
         unlock.unlock(KeyStore(data_folder()), Duty.LOG)
@@ -225,8 +280,8 @@ def test_a_further_mission_key_is_for_what_it_names(capsys: pytest.CaptureFixtur
 
 def test_keys_in_earnest_are_added_under_passphrases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first, own = tmp_path / "first", tmp_path / "own"
-    first.write_text(PASSPHRASE)
-    own.write_text("another long passphrase")
+    write_new(first, PASSPHRASE.encode(), mode=0o600)
+    write_new(own, b"another long passphrase", mode=0o600)
     app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(first)])
     words = ["keys", "approver", "ada", "--role", "supervisor"]
     assert app.main([*words, "--passphrase-file", str(first)]) == ExitCode.USAGE
@@ -285,7 +340,7 @@ def test_a_key_is_revoked_by_id_by_its_first_digits_or_by_its_file(capsys: pytes
 
 def test_a_key_is_replaced_by_one_with_its_bounds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "passphrase"
-    file.write_text(PASSPHRASE)
+    write_new(file, PASSPHRASE.encode(), mode=0o600)
     words = ["--passphrase-file", str(file)]
     app.main(["keys", "init", "--encrypted", "--policy", "field", *words])
     store = KeyStore(data_folder())

@@ -12,6 +12,7 @@ from reference import flat_case as flat
 from reference.forgery import edit, flight, other_flight
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.store.writing import write_new
 from rtshcua.cli import app
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page
@@ -23,6 +24,7 @@ from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.policy import LeftOut, Monitor, MonitorKind, Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone
+from rtshcua.wire import key_file
 from rtshcua.wire.bundle import envelopes
 from rtshcua.wire.keys import Duty
 from virtual import case
@@ -170,8 +172,9 @@ def test_a_root_and_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert store.signing_key(Duty.LOG).private.private_bytes_raw().hex() not in key
 
 
-def test_an_encrypted_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "passphrase").write_text("correct horse battery")
+def test_an_encrypted_key(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(key_file, "COST", key_file.COSTS[0])
+    write_new(tmp_path / "passphrase", b"correct horse battery", mode=0o600)
     app.main(["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "passphrase")])
     capsys.readouterr()
     assert "Signing key of duty log, encrypted" in shown(KeyStore(data_folder()).key_path(Duty.LOG), capsys)

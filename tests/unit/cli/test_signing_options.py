@@ -54,6 +54,7 @@ def test_a_key_is_made_once_and_never_shown(tmp_path: Path, capsys: pytest.Captu
 def test_a_key_of_a_passphrase_is_the_ground_stations(tmp_path: Path) -> None:
     words = tmp_path / "words"
     words.write_text("correct horse battery\n")
+    words.chmod(0o600)
     assert app.main(["keys", "link", str(tmp_path / "key"), "--passphrase-file", str(words)]) == ExitCode.OK
     assert read_link_key(tmp_path / "key") == hashlib.sha256(b"correct horse battery").digest()
     words.write_text("short")

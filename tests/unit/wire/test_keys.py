@@ -2,13 +2,16 @@
 
 import hashlib
 import pickle
+from base64 import b64encode
 
 import pytest
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey
+from cryptography.hazmat.primitives.ciphers.aead import ChaCha20Poly1305
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtshcua.wire import key_file
 from rtshcua.wire.key_file import MAX_KEY_FILE, KeyFileError, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey, WrongDuty, key_id
 from rtshcua.wire.untrusted import Untrusted
@@ -16,6 +19,15 @@ from virtual.rows import rows
 
 SEED = bytes(range(32))
 PASSPHRASE = b"correct horse"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _cheap_guesses():
+    """Encrypted keys are many here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(key_file, "COST", key_file.COSTS[0])
+        yield
+
 
 # RFC 8032, section 7.1, tests 1 to 3: seed, public key, message, signature.
 RFC_8032 = [
@@ -127,8 +139,9 @@ def test_a_passphrase_is_not_needed_for_what_is_not_encrypted():
 
 def test_an_encrypted_file_does_not_hold_the_seed():
     data = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
-    assert b"ENCRYPTED" in data
+    assert b"PRIVATE KEY" not in data
     assert b"AAECAwQFBgcICQoLDA0ODw" not in data
+    assert SEED.hex().encode() not in data
 
 
 @pytest.mark.parametrize("passphrase", [None, b""])
@@ -145,7 +158,65 @@ def refusal(data, *, duty=Duty.POLICY, passphrase=None):
 
 
 PLAIN = dump_signing_key(signing_key(development=True), passphrase=None)
-SEALED = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
+#: as version 0.1.0 wrote it before it had scrypt
+EARLIER = b"duty: policy\ndevelopment: no\n" + signing_key().private.private_bytes(
+    serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.BestAvailableEncryption(PASSPHRASE)
+)
+SALT = bytes(range(32, 64))
+
+
+def by_hand(cost: int = key_file.COSTS[0], duty: str = "policy", seed: bytes = SEED) -> bytes:
+    """A sealed key file by the text of its format, with hashlib's scrypt."""
+    head = f"duty: {duty}\ndevelopment: no\nscrypt: {cost} 8 1 {SALT.hex()}\n".encode()
+    made = hashlib.scrypt(PASSPHRASE, salt=SALT, n=1 << cost, r=8, p=1, maxmem=1 << 30, dklen=32)
+    return head + b"sealed: " + b64encode(ChaCha20Poly1305(made).encrypt(bytes(12), seed, head)) + b"\n"
+
+
+SEALED = by_hand()
+
+
+def test_a_sealed_key_by_hand():
+    assert load_signing_key(SEALED, duty=Duty.POLICY, passphrase=PASSPHRASE).kid == signing_key().kid
+
+
+def test_a_key_that_an_earlier_version_encrypted_is_read():
+    assert refusal(EARLIER) == "passphrase-needed"
+    assert refusal(EARLIER, passphrase=b"wrong") == "wrong-passphrase"
+    assert load_signing_key(EARLIER, duty=Duty.POLICY, passphrase=PASSPHRASE).kid == signing_key().kid
+
+
+COST = key_file.COST
+
+
+def test_a_guess_costs_what_the_page_says(monkeypatch):
+    """N is 2**17 in what is written: 128 MiB a guess. Salts are drawn."""
+    first = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
+    monkeypatch.setattr(key_file, "COST", COST)
+    second = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
+    assert b"\nscrypt: 17 8 1 " in second
+    assert first.split()[8] != second.split()[8]
+
+
+@rows(
+    ("old", "new", "slug"),
+    [
+        (b"scrypt: 14 8 1", b"scrypt: 13 8 1", "malformed"),  # too cheap to be ours
+        (b"scrypt: 14 8 1", b"scrypt: 19 8 1", "malformed"),  # would take half a gigabyte
+        (b"scrypt: 14 8 1", b"scrypt: 15 8 1", "wrong-passphrase"),
+        (b"scrypt: 14 8 1", b"scrypt: 14 8 2", "malformed"),
+        (b"development: no", b"development: yes", "wrong-passphrase"),
+        (SALT.hex().encode(), bytes(32).hex().encode(), "wrong-passphrase"),
+        (b"sealed: ", b"sealed:  ", "malformed"),
+    ],
+)
+def test_a_sealed_key_whose_head_was_changed(old, new, slug):
+    assert refusal(SEALED.replace(old, new), passphrase=PASSPHRASE) == slug
+
+
+def test_a_sealed_key_is_for_its_duty_alone():
+    assert refusal(SEALED, duty=Duty.MISSION, passphrase=PASSPHRASE) == "wrong-duty"
+    relabelled = SEALED.replace(b"duty: policy", b"duty: mission")
+    assert refusal(relabelled, duty=Duty.MISSION, passphrase=PASSPHRASE) == "wrong-passphrase"
 
 
 def test_loading_refuses_the_wrong_duty():

@@ -7,6 +7,7 @@ import pytest
 
 from rtshcua.adapters.files import folders, keystore
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, KeyStoreError, read_root
+from rtshcua.wire import key_file
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.trust import open_root
@@ -14,6 +15,12 @@ from rtshcua.wire.untrusted import Untrusted
 
 NOW = 1_750_000_000_000_000
 LATER = NOW + 1_000_000
+
+
+@pytest.fixture(autouse=True)
+def _cheap_guesses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Encrypted keys are many here."""
+    monkeypatch.setattr(key_file, "COST", key_file.COSTS[0])
 
 
 @pytest.fixture

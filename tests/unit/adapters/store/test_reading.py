@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.adapters.store import reading
 from rtshcua.adapters.store.reading import NotRegular, exposed, open_regular, read_regular
 
 
@@ -63,4 +64,16 @@ def test_what_is_missing_is_named_in_full(root: Path) -> None:
 def test_what_others_may_read_is_told(mode: int, told: str | None, root: Path) -> None:
     (root / "sub/a").chmod(mode)
     with open_regular(root / "sub/a") as file:
-        assert exposed(file) == told
+        assert exposed(file) == (told and f"its mode is {told}")
+
+
+def test_whose_file_it_is_counts_too(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (root / "sub/a").chmod(0o600)
+    own = os.geteuid()
+    monkeypatch.setattr(reading, "ROOT", -1)
+    with open_regular(root / "sub/a") as file:
+        assert exposed(file) is None
+        monkeypatch.setattr(os, "geteuid", lambda: own + 1)
+        assert exposed(file) == f"it belongs to the user {own}"
+        monkeypatch.setattr(reading, "ROOT", own)
+        assert exposed(file) is None, "root may read it anyway"

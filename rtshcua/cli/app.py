@@ -19,6 +19,8 @@ from rtshcua.diagnostics.exits import ExitCode
 
 #: the commands whose `--json` is that of `Findings`
 _REPORTING = ("check", "compile", "fmt", "lint", "test")
+#: when the collector looks for garbage while sources are checked: syntax trees come by thousands, and stay
+_COLLECTING = (50_000, 20, 100)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,7 +62,12 @@ def _call(row: Row, words: list[str]) -> int:
     if row.quick:
         from rtshcua.cli.quick import QUICK
 
-        code = QUICK[row.name](words)
+        before = gc.get_threshold()
+        gc.set_threshold(*_COLLECTING)
+        try:
+            code = QUICK[row.name](words)
+        finally:
+            gc.set_threshold(*before)
         if code is not None:
             return code
     collecting = gc.isenabled()

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable, Sequence
 
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.ground.analysis.plane import Plane
-from rtshcua.ground.analysis.solve import Answer, Goal, satisfiable
+from rtshcua.ground.analysis.solve import Answer, Goal, search
 from rtshcua.ground.analysis.space import Space, space_of
 
 
@@ -17,7 +17,7 @@ class Questions:
         self._prepared = prepared
         self._plane: Plane | None = None
         self._spaces: dict[int, Space] = {}
-        self._answers: dict[Hashable, Answer] = {}
+        self._answers: dict[Hashable, tuple[Answer, int]] = {}
         self.instances: dict[str, list[tuple[tuple[int, tuple[int, ...]], ...]]] = {}
 
     def space(self, skill: int) -> Space:
@@ -33,8 +33,14 @@ class Questions:
         """The answer to a question; `key` says all that it depends on."""
         found = self._answers.get(key)
         if found is None:
-            found = self._answers[key] = satisfiable(goals(), space)
-        return found
+            asked = goals()
+            answer, boxes = search(asked, space)
+            found = self._answers[key] = answer, boxes * len(asked)
+        return found[0]
+
+    def effort(self, key: Hashable) -> int:
+        """What a question took that was asked, whoever asked it first: boxes times conditions."""
+        return self._answers[key][1]
 
     def again(self) -> "Questions":
         """For another program with the same policy: it shares all answers, and has no instances yet."""
@@ -44,7 +50,8 @@ class Questions:
 
     def known(self, key: Hashable) -> Answer | None:
         """The answer to a question, if it was asked."""
-        return self._answers.get(key)
+        found = self._answers.get(key)
+        return None if found is None else found[0]
 
     def forget(self) -> None:
         """As before the first question."""

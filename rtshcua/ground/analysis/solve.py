@@ -39,6 +39,12 @@ Answer: TypeAlias = Yes | No | Undecided
 
 def satisfiable(goals: Sequence[Goal], space: Space, budget: int = BUDGET) -> Answer:
     """Whether a situation of the space gives each condition one of its truths."""
+    return search(goals, space, budget)[0]
+
+
+def search(goals: Sequence[Goal], space: Space, budget: int = BUDGET) -> tuple[Answer, int]:
+    """The same, and how many boxes were looked at."""
+    most = budget
     first = Box({}, {}, {}, {}, space.utc, space.phases, 0)
     conditions = [(over_boxes(node, space, first), wanted) for node, wanted in goals]
     doubt: str | None = None
@@ -46,7 +52,7 @@ def satisfiable(goals: Sequence[Goal], space: Space, budget: int = BUDGET) -> An
     while waiting:
         budget -= 1
         if budget < 0:
-            return Undecided("there are too many cases to tell apart")
+            return Undecided("there are too many cases to tell apart"), most
         box = waiting.pop()
         if not narrow(box, space.plane):
             continue
@@ -56,14 +62,14 @@ def satisfiable(goals: Sequence[Goal], space: Space, budget: int = BUDGET) -> An
         if open_ is None:
             found = witness(box, space)
             if found is not None and all(found.truth(node, space) & wanted for node, wanted in goals):
-                return Yes(found)
+                return Yes(found), most - budget
             pieces = halves(box)
             if found is not None or not pieces:
                 doubt = "no place was found that lies so between the zones"
             waiting += pieces
             continue
         waiting += reversed(undecided(open_, box).split(box))
-    return No() if doubt is None else Undecided(doubt)
+    return (No() if doubt is None else Undecided(doubt)), most - budget
 
 
 def _look(conditions: list[tuple[Condition, Truth]], box: Box) -> tuple[bool, Condition | None]:

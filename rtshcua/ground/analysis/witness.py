@@ -47,6 +47,11 @@ def witness(box: Box, space: Space) -> Witness | None:
     return Witness(_environment(fixed, cells, places, space), cells, places, fixed)
 
 
+def plain(space: Space) -> Environment:
+    """One situation of a space: of each value the plainest, and nothing of what may be missing."""
+    return _environment(Box({}, {}, {}, {}, space.utc, space.phases, 0), {}, {}, space)
+
+
 def halves(box: Box) -> list[Box]:
     """The box with the first half of the widest value that a sum ties to others, and with the other half."""
     tied = [

@@ -56,5 +56,6 @@ def check_condition(scope: Scope, node: Condition, *, observed: bool = False) ->
 
 def references(node: Part) -> list[Reference]:
     """All names that a condition refers to, in source order; the names of phases are none, nor is `phase`."""
-    phases = {name for part in walk(node) if is_about_phase(part) for name in children(part)}
-    return [part for part in walk(node) if isinstance(part, Reference) and part not in phases]
+    parts = tuple(walk(node))
+    phases = {name for part in parts if is_about_phase(part) for name in children(part)}
+    return [part for part in parts if isinstance(part, Reference) and part not in phases]

@@ -1,6 +1,7 @@
 """What conditions and values are made of: one place that knows every node."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from rtshcua.model.ir.expression import (
     Arithmetic,
@@ -24,25 +25,22 @@ from rtshcua.model.ir.expression import (
 Part = Condition | Value | Grow
 
 
+#: of each kind of node that consists of others, which
+_CHILDREN: dict[type, Callable[[Any], tuple[Part, ...]]] = {
+    **dict.fromkeys((Arithmetic, Comparison, Near), lambda node: (node.left, node.right)),
+    **dict.fromkeys((Function, Junction), lambda node: node.operands),
+    Within: lambda node: (node.subject, node.range.low, node.range.high),
+    **dict.fromkeys((OneOf, Known), lambda node: (node.subject,)),
+    Inside: lambda node: (node.subject, node.region),
+    Grow: lambda node: (node.zone, node.margin),
+    **dict.fromkeys((Not, ForLast, WithinLast, Edge), lambda node: (node.operand,)),
+}
+
+
 def children(node: Part) -> tuple[Part, ...]:
     """The conditions and values that a node consists of, in source order."""
-    match node:
-        case Arithmetic() | Comparison() | Near():
-            return (node.left, node.right)
-        case Function() | Junction():
-            return node.operands
-        case Within():
-            return (node.subject, node.range.low, node.range.high)
-        case OneOf() | Known():
-            return (node.subject,)
-        case Inside():
-            return (node.subject, node.region)
-        case Grow():
-            return (node.zone, node.margin)
-        case Not() | ForLast() | WithinLast() | Edge():
-            return (node.operand,)
-        case _:
-            return ()
+    parts = _CHILDREN.get(type(node))
+    return () if parts is None else parts(node)
 
 
 def walk(node: Part) -> Iterator[Part]:

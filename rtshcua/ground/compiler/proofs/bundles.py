@@ -25,10 +25,12 @@ def prove(rules: Ruleset, alive: list[Group], gone: AbstractSet[int]) -> None:
         # what all comes from one rule of the source was already asked about as that
         if not living.issuperset(numbers) or not left_out.isdisjoint(numbers) or frozenset(numbers) in alone:
             continue
-        found = _covered(rules, numbers, left_out | set(numbers))
-        if not found:
-            continue  # nothing else says it, or there is nothing in it, which is reported as that
         left_out.update(numbers)
+        found = _covered(rules, numbers, left_out)
+        if not found:
+            left_out.difference_update(numbers)
+            continue  # nothing else says it, or there is nothing in it, which is reported as that
+        rules.drop(numbers)
         word = "use" if isinstance(node, Use) else "delegate"
         rules.ground.context.report.add(
             codes.REDUNDANT_RULE,
@@ -58,12 +60,7 @@ def _covered(rules: Ruleset, numbers: list[int], but: set[int]) -> tuple[Span, .
         if kind in (RuleKind.PERMIT, RuleKind.FORBID):
             spans = said(rules, group, but, quiet=True)
         else:
-            others = (
-                each._replace(rules=tuple(one for one in each.rules if one not in but))
-                for each in rules.groups
-                if each.kind == kind
-            )
-            one = covering(rules, group, (each for each in others if each.rules))
+            one = covering(rules, group, but)
             spans = None if one is None else (one,)
         if spans is None:
             return None

@@ -40,11 +40,11 @@ def prove(ground: Ground) -> None:
     for number, contract in enumerate(policy.contracts):
         words = f"the fallback of `{contract.name}` flies for whoever may ask for that"
         links(contract.fallback, askers[number], words, None)
-    for place, rule in enumerate(policy.rules):
+    for rule in policy.rules:
         if rule.target is not None:
             asking: dict[Asker, dict[int, Rule | None]] = {}
             for number in rule.skills or range(len(policy.contracts)):
-                applies = {phase for phase in _every(policy) if _may(ground, rule, place, number, phase)}
+                applies = {phase for phase in _every(policy) if _may(ground, rule, number, phase)}
                 for asker, phases in askers[number].items():
                     kept = {phase: permit for phase, permit in phases.items() if phase in applies}
                     asking.setdefault(asker, {}).update(kept)
@@ -64,10 +64,10 @@ def _valid(policy: Policy, contract: Contract) -> Iterator[int]:
     yield from (number for number, name in enumerate(policy.phases) if not names or name in names)
 
 
-def _may(ground: Ground, rule: Rule, place: int, skill: int, phase: int) -> bool:
-    """Whether the rule at some place of the policy may apply to a skill in a phase, with any arguments in any state."""
+def _may(ground: Ground, rule: Rule, skill: int, phase: int) -> bool:
+    """Whether a rule may apply to a skill in a phase, with any arguments in any state."""
     at = ground.environment(ground.questions.space(skill).arguments, phase)
-    return bool(ground.prepared.compiler.condition(rule, place)(at) & TRUE)
+    return bool(ground.condition(rule)(at) & TRUE)
 
 
 def _askers(ground: Ground, skill: int) -> dict[Asker, dict[int, Rule | None]]:
@@ -75,9 +75,9 @@ def _askers(ground: Ground, skill: int) -> dict[Asker, dict[int, Rule | None]]:
     policy = ground.prepared.policy
     valid = tuple(_valid(policy, policy.contracts[skill]))
     found: dict[Asker, dict[int, Rule | None]] = {}
-    for place, rule in enumerate(policy.rules):
+    for rule in policy.rules:
         if rule.kind == RuleKind.PERMIT and (not rule.skills or skill in rule.skills):
-            phases = [phase for phase in valid if _may(ground, rule, place, skill, phase)]
+            phases = [phase for phase in valid if _may(ground, rule, skill, phase)]
             for role in rule.roles or (len(policy.roles),):
                 for source in rule.sources or tuple(map(int, SourceKind)):
                     asked = found.setdefault((role, source), {})

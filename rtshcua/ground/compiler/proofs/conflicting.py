@@ -7,10 +7,15 @@ from flying, the other never does. Rules that merely overlap are left alone: whi
 more.
 """
 
+from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
+
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.extent import FAR
 from rtshcua.ground.analysis.solve import No, Yes
 from rtshcua.ground.analysis.words import words
+from rtshcua.ground.compiler.proofs.overlaps import About
 from rtshcua.ground.compiler.proofs.ruleset import Group, Ruleset
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import RuleKind
@@ -19,10 +24,57 @@ from rtshcua.model.flat.policy import RuleKind
 def prove(rules: Ruleset, alive: list[Group]) -> None:
     """Report each degrade rule that comes after one to another target that is wider, or has the same condition."""
     degrades = [group for group in alive if group.kind == RuleKind.DEGRADE]
+    place = {rules.group_of(group.rules[0]): at for at, group in enumerate(degrades)}
+    flown = {_target(rules, number) for group in degrades for number in group.rules}
+    last = -1  # of the rules of those before
     for at, later in enumerate(degrades):
-        for earlier in degrades[:at]:
-            if _after_wider(rules, earlier, later):
+        looked_at: set[int] = set()
+        for candidate in _candidates(rules, later, flown):
+            if candidate > last:
                 break
+            earlier = place.get(rules.group_of(candidate), at)
+            if earlier < at and earlier not in looked_at:
+                looked_at.add(earlier)
+                if _after_wider(rules, degrades[earlier], later):
+                    break
+        last = max(last, *later.rules)
+
+
+def _candidates(rules: Ruleset, later: Group, flown: AbstractSet[int]) -> Iterator[int]:
+    """The rules, in order, that may match wherever one does, and fly something else; each is to be asked about."""
+    pairs = [
+        (number, skill) for number in later.rules for skill in rules.skills(number) if skill != _target(rules, number)
+    ]
+    if not pairs:
+        return  # it is about nothing but what it flies itself
+    # an earlier rule that flies the very skill says nothing of it; so one is taken that none flies, if there is any
+    number, skill = next((pair for pair in pairs if pair[1] not in flown), pairs[0])
+    if skill in flown:
+        yield from (each for each, rule in enumerate(rules.policy.rules) if rule.kind == RuleKind.DEGRADE)
+        return
+    rule, effect = rules.rule(number), rules.effect(number)
+    points = list(rules.situations(number, skill))
+    after = -1
+    while not rules.exhausted:
+        candidate = min(
+            (
+                found
+                for effects in ((-FAR, effect - 1), (effect + 1, FAR))
+                for about in [About(skill, rule.roles, rule.sources, effects)]
+                for found in [next(rules.overlaps(RuleKind.DEGRADE).meeting(about, points, sure=True, after=after), -1)]
+                if found >= 0
+            ),
+            default=-1,
+        )
+        if candidate < 0:
+            return
+        after = candidate
+        if any(rules.holds(candidate, at) != TRUE for at in points):
+            continue
+        yield candidate
+        answer = rules.known([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill)
+        if isinstance(answer, Yes):  # nor does any other come before it that does not match there
+            points.append(answer.witness.at)
 
 
 def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
@@ -81,8 +133,7 @@ def _before(rules: Ruleset, earlier: Group, number: int, skill: int) -> int | No
             continue
         if not covers(rule.roles, later.roles) or not covers(rule.sources, later.sources):
             continue
-        condition = rules.ground.prepared.compiler.condition(rule, candidate)
-        if isinstance(matching, Yes) and condition(matching.witness.at) != TRUE:
+        if isinstance(matching, Yes) and rules.holds(candidate, matching.witness.at) != TRUE:
             continue
         if isinstance(rules.ask([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill), No):
             return candidate

@@ -25,6 +25,8 @@ def dead(rules: Ruleset, group: Group) -> bool:
     open_: str | None = None
     for number in group.rules:
         for skill in rules.skills(number):
+            if rules.exhausted or rules.may_match(number, skill):
+                return False
             answer = rules.ask([(number, wanted)], skill)
             if isinstance(answer, Yes):
                 return False

@@ -12,8 +12,7 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.analysis.witness import Witness
-from rtshcua.ground.compiler.proofs.ruleset import ALWAYS
-from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.compiler.proofs.situation import ALWAYS, Ground
 from rtshcua.model.flat.policy import Rule
 
 NEVER = tree.AtMost((), -1)

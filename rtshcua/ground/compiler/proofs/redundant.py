@@ -12,7 +12,7 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.analysis.solve import No, Undecided
+from rtshcua.ground.analysis.solve import Undecided
 from rtshcua.ground.compiler.proofs.nested import covering
 from rtshcua.ground.compiler.proofs.ruleset import Group, Ruleset
 from rtshcua.model.flat.policy import RuleKind
@@ -24,13 +24,15 @@ def prove(rules: Ruleset, alive: list[Group]) -> set[int]:
     for group in alive:
         if group.kind == RuleKind.PERMIT and _shadowed(rules, group):
             gone.update(group.rules)
+            rules.drop(group.rules)
     for group in reversed(alive):
         if not gone.intersection(group.rules):
             gone.update(group.rules)
-            said_by = _redundant(rules, group, alive, gone)
+            said_by = _redundant(rules, group, gone)
             if said_by is None:
                 gone.difference_update(group.rules)
             else:
+                rules.drop(group.rules)
                 _report(rules, group, said_by)
     return gone
 
@@ -50,13 +52,13 @@ def _shadowed(rules: Ruleset, group: Group) -> bool:
     return True
 
 
-def _redundant(rules: Ruleset, group: Group, alive: list[Group], gone: AbstractSet[int]) -> tuple[Span, ...] | None:
+def _redundant(rules: Ruleset, group: Group, gone: AbstractSet[int]) -> tuple[Span, ...] | None:
     """Where the rules are written that say all that a rule says; `gone` has its own numbers and those of rules that
     were already reported.
     """
     if group.kind in (RuleKind.PERMIT, RuleKind.FORBID):
         return said(rules, group, gone)
-    one = covering(rules, group, (each for each in alive if gone.isdisjoint(each.rules)))
+    one = covering(rules, group, gone)
     return None if one is None else (one,)
 
 
@@ -86,14 +88,14 @@ def _covered(
     open_: str | None = None
     for number in group.rules:
         for key in rules.keys(number):
-            others = rules.others(key, kind)
             for wanted, escape in questions:
-                answer, used = rules.escapes(number, wanted, others, but, escape, key.skill)
-                if isinstance(answer, Undecided):
-                    open_ = answer.why
-                elif not isinstance(answer, No) or _clock_matters(rules, number, used):
+                by = rules.covered(number, wanted, kind, but, escape, key)
+                if isinstance(by, Undecided):
+                    open_ = by.why
+                elif by is None or _clock_matters(rules, number, by):
                     return None
-                found.update(dict.fromkeys(rules.ground.span(rules.rule(each)) for each in used))
+                else:
+                    found.update(dict.fromkeys(rules.ground.span(rules.rule(each)) for each in by))
     if open_ is not None:
         if what is not None:
             rules.undecided(group, what, open_)

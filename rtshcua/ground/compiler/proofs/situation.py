@@ -1,11 +1,12 @@
 """What is known before the flight: all of a step's arguments, and nothing of the vehicle's state."""
 
 from dataclasses import dataclass, field
+from typing import Final
 
 from rtshcua.decision.case import Case
-from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.evaluate import Condition, Environment, build
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
-from rtshcua.decision.tree import Node
+from rtshcua.decision.tree import AtMost, Node
 from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
@@ -21,6 +22,8 @@ from rtshcua.model.flat.situation import Context as Standing
 
 #: us since the epoch: later than any flight
 EVER = 1 << 53
+#: the condition of a rule without one
+ALWAYS: Final = AtMost((), 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,7 @@ class Ground:
     `kept` are the ways that were found to keep its airspace (`ways`): the missions of one policy share many.
     `steps` are those that were prepared, `hopes` the conditions of rules as `hopeful` has them: the choices of a
     mission's parameters share many.
+    `nodes` and `conditions` are those of its rules, by their code.
     `impossible` are the skills whose contracts were reported to contradict themselves: no step of one is looked at.
     """
 
@@ -42,6 +46,25 @@ class Ground:
     steps: dict[tuple[Invocation, tuple[str, ...]], PreparedInvocation | Refusal] = field(default_factory=dict)
     hopes: dict[tuple[int, bool], Node | None] = field(default_factory=dict)
     impossible: set[int] = field(default_factory=set)
+    nodes: dict[tuple[int, ...], Node] = field(default_factory=dict)
+    conditions: dict[tuple[int, ...], Condition] = field(default_factory=dict)
+
+    def node(self, rule: Rule) -> Node:
+        """The condition of a rule as a tree; rules share those that are alike."""
+        code = () if rule.when is None else rule.when.code
+        found = self.nodes.get(code)
+        if found is None:
+            when = self.prepared.compiler.when(rule)
+            found = self.nodes[code] = ALWAYS if when is None else when
+        return found
+
+    def condition(self, rule: Rule) -> Condition:
+        """The condition of a rule, to be evaluated; rules share those that are alike."""
+        code = () if rule.when is None else rule.when.code
+        found = self.conditions.get(code)
+        if found is None:
+            found = self.conditions[code] = build(self.node(rule), self.prepared.tables)
+        return found
 
     def sets(self, at_us: int = 0) -> Sets:
         """Any state, at any time within a day from a UTC time; at any time at all where that is not known (0)."""

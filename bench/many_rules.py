@@ -1,0 +1,54 @@
+"""`rtshcua check` of policies with many rules, of several kinds: the time a rule takes among many and among few.
+
+Exits with 1 when a rule takes much longer among `MANY` than among `FEW`, or when `MANY` take longer than the limit.
+"""
+
+import sys
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from reference.many_rules import KINDS, policy
+from rtshcua import library
+from rtshcua.ground.compiler.program import examine_program
+from rtshcua.ground.language.load import load
+from rtshcua.ground.language.parse import parse
+from rtshcua.mavlink import dialect
+
+FEW, MANY = 1_250, 5_000
+SPREAD = 1.6  # how much longer a rule may take among many
+LIMIT_S = 5.0
+ROUNDS = 3
+
+
+def seconds(text: str) -> float:
+    """How long it takes to read a source and to find everything in it."""
+
+    def read(path: str) -> bytes:
+        return text.encode() if path == "many.rts" else Path(path).read_bytes()
+
+    start = process_time()
+    examine_program(load(["many.rts"], read, str(library.root()), parse=parse), dialect.load())
+    return process_time() - start
+
+
+def main() -> int:
+    """Measures each kind, and says whether the limits held."""
+    failed = False
+    seconds(policy("apart", 10))
+    for kind in KINDS:
+        few = median(seconds(policy(kind, FEW)) for _ in range(ROUNDS))
+        many = min(seconds(policy(kind, MANY)) for _ in range(ROUNDS))
+        spread = many / few * FEW / MANY
+        failed |= spread > SPREAD or many > LIMIT_S
+        print(
+            f"many rules: {kind}: a rule takes {spread:.2f} times as long among {MANY:,} as among {FEW:,}, limit "
+            f"{SPREAD:g} ({many:.2f} s, limit {LIMIT_S:g} s)"
+        )
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -40,6 +40,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.compiler.sign import sign
 from rtshcua.mavlink import dialect
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import Gate
@@ -62,7 +63,7 @@ app = typer.Typer(add_completion=False)
 #: s that a vehicle which somebody else flies is watched until it is down
 _LANDS_S: Final = 180.0
 _POLL_S: Final = 0.05
-_DOWN_HELP: Final = "whoever flies it lands it first; `rtshcua doctor` says what it tells of itself"
+_DOWN_HELP: Final = "land and disarm it first; `rtshcua doctor` shows what it reports"
 #: nothing is recorded of a qualification that ends so: it says nothing of the autopilot
 _BROKEN_OFF: Final = (
     Ending.INTERRUPTED, Ending.REFUSED, Ending.LINK_LOST, Ending.EVIDENCE_LOST, Ending.RECALLED, Ending.STOOD_DOWN,
@@ -118,36 +119,36 @@ def qualify(
     runs: Annotated[Path, typer.Option(help="where the folders of the sorties are made")] = Path("runs"),
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the record last")] = False,
 ) -> ExitCode:  # fmt: skip
-    """Fly a short sequence that tests what is taken for granted of this autopilot, and sign a record of what held.
+    """Fly a short test of the autopilot: does it do what the adapters assume? Sign a record of the result.
 
-    It flies. Somebody has to consent: `--sitl` or `--pilot NAME`. Ends with 0 when all that was checked holds, with 13
-    when something does not.
+    It flies, so somebody has to consent: `--sitl` or `--pilot NAME`. Ends with 0 when every check that was made holds,
+    with 13 when one does not.
     """
     if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
-        return fail(
-            ExitCode.USAGE, "who consents to this flight? `--sitl` or `--pilot NAME`, one of them", _CONSENT_HELP
-        )
+        return fail(ExitCode.USAGE, "`qualify` requires consent: either `--sitl` or `--pilot NAME`", _CONSENT_HELP)
     if takeover and sitl:
-        return fail(ExitCode.USAGE, "`--takeover` goes with `--pilot`: in a simulation it is always tried")
+        return fail(ExitCode.USAGE, "`--takeover` requires `--pilot`: in a simulation takeovers are always tried")
     if unsigned_radio and signing_key is None:
-        return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+        return fail(ExitCode.USAGE, "`--unsigned-radio` requires `--signing-key`")
     try:
         link = address.parse(connect)
     except AddressError as error:
         return misaddressed("--connect", error)
     if sitl and link.way is Way.SERIAL:
         return fail(
-            ExitCode.USAGE, f"`{link}` is no simulation: whatever is at a serial line may be real", _CONSENT_HELP
+            ExitCode.USAGE,
+            f"`--sitl` does not go with a serial line (`{link}`): the vehicle at its end may be real",
+            _CONSENT_HELP,
         )
     if speed != 1 and not (sitl and link.is_loopback):
-        return fail(ExitCode.USAGE, "`--speed` is for a simulated vehicle; a real one lives as fast as we do")
+        return fail(ExitCode.USAGE, "`--speed` requires a simulated vehicle: `--sitl`, at a loopback address")
     planned, missing = _planned(sitl=sitl, takeover=takeover, keyed=signing_key is not None)
     named = {each.name: each for each in planned}
     unknown = sorted(set(only or ()) - named.keys())
     if unknown:
-        return fail(ExitCode.USAGE, f"there is no sortie `{unknown[0]}` here", f"accepted: {', '.join(named)}")
+        return fail(ExitCode.USAGE, f"unknown sortie `{unknown[0]}`", f"accepted: {', '.join(named)}")
     if only:
-        missing |= {name: "not asked for (`--only`)" for name in named if name not in only}
+        missing |= {name: "not flown (`--only`)" for name in named if name not in only}
         planned = [each for each in planned if each.name in only]
     found = Findings(json=False)
     compiled, sources = compile_sources([source], mission=mission, issued_at_us=time.time_ns() // 1_000)
@@ -178,9 +179,9 @@ def qualify(
         return (tell if as_json else fail)(refused.code, str(refused), refused.help)
 
 
-_REAL: Final = "on a real vehicle nobody sends it: a second ground station takes over in a simulation alone"
-_UNASKED: Final = "not asked for: `--takeover` has the pilot take over"
-_KEYED: Final = "the link is signed, and a second ground station has no key"
+_REAL: Final = "not sent to a real vehicle: a second ground station takes over in simulation only"
+_UNASKED: Final = "not requested (`--takeover` asks the pilot to take over)"
+_KEYED: Final = "not possible on a signed link: the second ground station has no key"
 
 
 def _planned(*, sitl: bool, takeover: bool, keyed: bool) -> tuple[list[Sortie], dict[str, str]]:
@@ -224,8 +225,14 @@ class _Flown:
             events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
         if seen.down:
             return events
-        what = "its motors run, or it flies" if seen.armed or seen.airborne else "it does not say that it stands"
-        raise Refused(ExitCode.REFUSED, "not-down", f"{what}: a qualification begins on the ground", _DOWN_HELP)
+        what = (
+            "the vehicle is armed or in the air"
+            if seen.armed or seen.airborne
+            else "the vehicle does not report that it is on the ground"
+        )
+        raise Refused(
+            ExitCode.REFUSED, "not-down", f"{what}: a qualification starts on the ground, disarmed", _DOWN_HELP
+        )
 
     def after(
         self, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, ending: Ending, final_hash: str
@@ -269,15 +276,15 @@ class Qualifying:
         """Find a leg that the policy permits, and unlock the keys. Raises `Refused`."""
         first: Compiled | None = None
         for trial in trials():
-            legs = [self._compiled(sortie, trial) for sortie in self.sorties]
-            first = first or next(each for each in legs if each.mission is None or each is legs[-1])
-            if all(each.mission is not None for each in legs):
+            refused = self._refused(trial)
+            first = first or refused
+            if refused is None:
                 self.trial = trial
                 break
         if self.trial is None:
             assert first is not None
             Findings(json=False).report(first.diagnostics, first.sources)
-            text = f"`{self.policy.name}` permits none of the legs that were tried: of the first one, see above"
+            text = f"`{self.policy.name}` permits none of the candidate legs; the findings on the first one are above"
             raise Refused(ExitCode.REFUSED, "not-permitted", text, _PERMIT_HELP)
         store = KeyStore(data_folder())
         try:
@@ -330,6 +337,11 @@ class Qualifying:
             if path is not None:
                 out(f"the record is in {path}")
         return code
+
+    def _refused(self, trial: Trial) -> Compiled | None:
+        """The first of the missions that does not compile; those with a leg are tried before the others."""
+        legs = sorted(self.sorties, key=lambda each: MotionKind.FLY not in each.steps)
+        return next((each for sortie in legs if (each := self._compiled(sortie, trial)).mission is None), None)
 
     def _compiled(self, sortie: Sortie, trial: Trial) -> Compiled:
         by_pilot = sortie is BY_PILOT
@@ -388,9 +400,7 @@ class Qualifying:
         )
 
 
-_PERMIT_HELP: Final = (
-    "the sorties take off to 6 or 10 m, and fly 25 to 50 m from home at 2 to 5 m/s: permit that, and a hover"
-)
+_PERMIT_HELP: Final = "permit takeoff to 6 or 10 m, goto 30 or 50 m from home at 2 to 5 m/s, hover, return and landing"
 
 
 def _announce(sortie: Sortie, *, as_json: bool) -> None:

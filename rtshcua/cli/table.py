@@ -46,7 +46,7 @@ COMMANDS = (
     Row("recall", "fly", "call a flight home, with your signature"),
     Row("replace", "fly", "hand a flight the mission that takes the place of its own"),
     Row("doctor", "fly", "say what a vehicle supports, and what would stop a mission"),
-    Row("qualify", "fly", "fly a short test of the autopilot itself, and sign what held"),
+    Row("qualify", "fly", "fly a short test of the autopilot itself, and sign the result"),
     Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station"),
     Row("recover", "fly", "end the log of a flight that broke off, and lose nothing of it"),
     Row("witness", "fly", "cosign logs from the ground, so that they cannot be rewritten or cut"),

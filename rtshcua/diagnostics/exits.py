@@ -28,7 +28,7 @@ class ExitCode(IntEnum):
     TESTS = (
         13,
         "tests",
-        "a test, a scenario or a flight of a campaign fails, no test was found, or they cover less than is asked",
+        "a test, scenario, flight of a campaign or check of `qualify` fails, no test is found, or coverage is too low",
     )
     CRASHED = 14, "crashed", "the vehicle came down as no landing does; nothing more was sent to it"
     FAULT = 70, "fault", "an internal fault, never your input: please report it"

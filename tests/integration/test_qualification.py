@@ -136,7 +136,7 @@ def test_a_pilot_who_does_not_take_over_is_told_so_and_it_comes_home() -> None:
     flown = Qualifying("px4", pilot=lambda vehicle, text: None)
     checks = {each.slug: each for each in flown.fly([BY_PILOT])}
     assert checks["takeover/mode"].outcome == CheckOutcome.FAILED
-    assert checks["takeover/mode"].measured == "it did not show"
+    assert checks["takeover/mode"].measured == "not detected"
     assert flown.observed.sorties[0].ending == "completed"
 
 

@@ -87,7 +87,7 @@ def _time(us: int) -> str:
 
 def _firmware(observed: ObservedQualification) -> QualificationCheck:
     firmware = observed.firmware
-    told = "it does not tell its version" if firmware is None else firmware.text
+    told = "it does not report its version" if firmware is None else firmware.text
     return _check("firmware/told", firmware is not None, "AUTOPILOT_VERSION", told)
 
 
@@ -97,21 +97,21 @@ def _fence(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     if flown is None or flown.fence is None:
         why = "nothing was flown" if flown is None else "its fence was left as it is"
         yield _unchecked(slug, expected, why)
-        yield _unchecked("fence/on", "switched on in the air", why)
+        yield _unchecked("fence/on", "enabled in flight", why)
         return
     yield _check(slug, flown.fence_read, expected, flown.fence)
     off = [
-        f"`{name}` is {'not told' if value is None else f'{value:g}'}"
+        f"`{name}` is {'not reported' if value is None else f'{value:g}'}"
         for name, (bits, value) in flown.switches.items()
         if value is None or int(value) & bits != bits
     ]
     idle = [each for each in observed.settings if each.slug in _FENCE_ACTIONS and each.verdict is not MissionVerdict.OK]
     found = [*off, *[each.found for each in idle]]
     advice = (
-        idle[0].advice if idle else "look at what else sets it: a switch of the remote control, a script, a mission"
+        idle[0].advice if idle else "something else changes it: a switch of the remote control, a script, a mission"
     )
-    expected = "switched on in the air, and does something"
-    yield _check("fence/on", not found, expected, "; ".join(found) or "so it is", advice=advice)
+    expected = "enabled in flight, with an action"
+    yield _check("fence/on", not found, expected, "; ".join(found) or "enabled", advice=advice)
 
 
 _FENCE_ACTIONS: Final = ("settings/gf_action", "settings/fence_action")
@@ -129,9 +129,9 @@ def _settings(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         outcome = FAILED if each.verdict is MissionVerdict.STOP else TOLD
         yield QualificationCheck(each.slug, int(outcome), each.needed, each.found, advice=each.advice)
     if well:
-        yield _check("settings/others", True, "nothing that interferes", f"{well} more parameters, of which none does")
+        yield _check("settings/others", True, "nothing that interferes", f"{well} other parameters are fine")
     elif not observed.settings:
-        yield _unchecked("settings/others", "nothing that interferes", "none of its parameters was told")
+        yield _unchecked("settings/others", "nothing that interferes", "no parameter was read")
 
 
 # ---------------------------------------------------------------- how a sortie went
@@ -159,7 +159,7 @@ def ends_after(flown: ObservedSortie) -> str | None:
     check = _sortie(flown)
     if check.outcome == HELD:
         return None
-    return f"not flown, for sortie `{flown.name}` did not go as planned: {check.measured}"
+    return f"not flown: sortie `{flown.name}` did not go as planned ({check.measured})"
 
 
 # ---------------------------------------------------------------- speeds
@@ -180,7 +180,7 @@ def _speeds(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[Quali
         mean = min(_mean_climb(samples) for _, samples in climbs)
         slow = mean < least
         measured = f"{_speed(mean)} on average, {_speed(peak)} at the most"
-        advice = "declare the `climb` that it has, or raise the autopilot's (`rtshcua doctor` names the parameter)"
+        advice = "declare the climb rate that it has, or change the autopilot's (`rtshcua doctor` names the parameter)"
         limit, found = (least, mean) if slow else (most, peak)
         yield _check("climb/speed", not slow and peak <= most, expected, measured, limit, found, _MM_S, advice)
     else:
@@ -193,7 +193,7 @@ def _speeds(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[Quali
     peak = max(sample.speed for _, samples in legs for sample in samples)
     most = min(asked or vehicle.speed, vehicle.speed) * _MORE // 100 + _NOISE
     least = asked * _FLIES // 100
-    advice = "the path of a flight and what it can still stop within are worked out from these speeds"
+    advice = "paths and stopping distances are computed from these speeds: correct the autopilot's speed parameters"
     expected = f"{_speed(least)} to {_speed(most)} (asked for: {_speed(asked)})"
     yield _check("fly/speed", least <= peak <= most, expected, _speed(peak), most, peak, _MM_S, advice)
 
@@ -268,7 +268,7 @@ def _stop(
     advice = "declare `brakes` a little worse than the worst that was measured, in a new version of the policy"
     if stood is None:
         measured = f"it does not stop: {_metres(way)} on, it flies at {_speed(_whole_speed(samples[-1]))}"
-        return _check(slug, False, expected, measured, limit, way, _MM, "nothing may rest on its hold: do not fly it")
+        return _check(slug, False, expected, measured, limit, way, _MM, "its hold cannot be relied on: do not fly it")
     took_us = samples[stood].at_us - told_us
     holds = way <= limit and took_us <= within_us
     return _check(slug, holds, expected, f"{_metres(way)} in {_time(took_us)}", limit, way, _MM, advice)
@@ -338,7 +338,7 @@ def _ended(
     took = _time(samples[-1].at_us - samples[0].at_us)
     down = command.how == "succeeded" and flown.down
     measured = f"{_metres(off)} off, after {took}" if down else f"{command.how or 'not ended'}, {_metres(off)} off"
-    advice = "the last links of every chain rest on it: do not fly it"
+    advice = "every fallback chain ends with it: do not fly it"
     return _check(slug, down and off <= limit, expected, measured, limit, off, _MM, advice)
 
 
@@ -361,14 +361,14 @@ def _highest(observed: ObservedQualification, vehicle: Vehicle) -> Qualification
 def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     answers = [each for sortie in observed.sorties for each in sortie.answers]
     if not answers:
-        yield _unchecked("answers/come", "each command is acknowledged", "nothing was commanded")
+        yield _unchecked("answers/come", "each command is acknowledged", "nothing was sent")
         return
     silent = sorted({each.command for each in answers if each.answered_us is None})
     expected, words = "each command is acknowledged", f"{len(answers)} of {len(answers)}"
     lost = sum(each.answered_us is None for each in answers)
     if silent:
         words = f"{len(answers) - lost} of {len(answers)}; none for MAV_CMD {', '.join(map(str, silent))}"
-    advice = "commands are sent again, and their failure is told later: look at the link first"
+    advice = "check the link first: unanswered commands are repeated, and fail late"
     yield _check("answers/come", not silent, expected, words, 0, lost, "", advice)
     times = [each.answered_us - each.sent_us for each in answers if each.answered_us is not None]
     if times:
@@ -400,9 +400,9 @@ def _heartbeat(observed: ObservedQualification) -> QualificationCheck:
     ]
     expected = f"every {_time(limit)} while it flies, asked for"
     if not gaps:
-        return _unchecked(slug, expected, "none came in the air")
+        return _unchecked(slug, expected, "none received in flight")
     most = sorted(gaps)[-(-len(gaps) * _MOST_GAPS // 100) - 1]
-    advice = "no frame that begins a motion leaves before the mode was told: it flies on, and each step begins late"
+    advice = "a motion starts only after the mode is known, so each step would start late"
     return _check(slug, most <= limit, expected, f"{_MOST_GAPS} % within {_time(most)}", limit, most, _US, advice)
 
 
@@ -421,7 +421,7 @@ def _takeovers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         slug, flown = f"takeover/{kind}", observed.sortie(kind)
         takeover = None if flown is None else flown.takeover
         if flown is None or takeover is None:
-            yield _unchecked(slug, "it shows, and nothing more is sent", _why(observed, kind))
+            yield _unchecked(slug, "it is detected, and nothing more is sent", _why(observed, kind))
         else:
             yield _takeover(slug, flown, takeover, observed)
 
@@ -431,27 +431,27 @@ def _takeover(
 ) -> QualificationCheck:
     sent, shown = takeover.sent_us, takeover.shown_us
     if sent is None:  # by a pilot: nobody knows when
-        found = "it did not show" if shown is None else f"it showed, as {takeover.how}; how late is not known"
-        return _check(slug, shown is not None and flown.ending == Ending.STOOD_DOWN, "it shows", found)
+        found = "not detected" if shown is None else f"detected by `{takeover.how}`; how late is not known"
+        return _check(slug, shown is not None and flown.ending == Ending.STOOD_DOWN, "it is detected", found)
     limit = _within_us(observed)
     stalls = takeover.kind is TakeoverKind.PAUSE and takeover.how == "stopped-short"
     if stalls:  # ArduCopter's pause changes neither mode nor target: it is no progress (docs/adr/0034)
         limit = _STALLS_US + 2 * _SECOND + observed.mode_within_us
-    expected = f"it shows within {_time(limit)}, and nothing that moves it is sent after"
-    advice = "a pilot would be flown over: do not fly it"
+    expected = f"detected within {_time(limit)}, and no motion frame is sent after that"
+    advice = "the program would fly against the pilot: do not fly it"
     if shown is None:
-        return _check(slug, False, expected, "it did not show", limit, None, _US, advice)
+        return _check(slug, False, expected, "not detected", limit, None, _US, advice)
     # W counts from when it took effect, which is not long after it was sent
     sent = max(sent, min(takeover.obeyed_us or sent, sent + (observed.round_trip_us or 0) + _OBEYS_US, shown))
     late = shown - sent
     if takeover.kind is TakeoverKind.MODE:
         late = max(late, (takeover.mode_us or shown + limit) - sent)
     moved = takeover.moved_us is not None and takeover.moved_us - sent > limit and not stalls
-    measured = f"after {_time(late)}, as {takeover.how}"
+    measured = f"after {_time(late)}, by `{takeover.how}`"
     if takeover.kind is TakeoverKind.MODE and takeover.mode_us is None:
-        measured = f"as {takeover.how} alone: no heartbeat told the mode"
+        measured = f"by `{takeover.how}` only: no heartbeat reported the mode"
     if moved:
-        measured += f"; something that moves it was sent {_time((takeover.moved_us or 0) - sent)} after"
+        measured += f"; a motion frame was sent {_time((takeover.moved_us or 0) - sent)} after"
     return _check(slug, late <= limit and not moved, expected, measured, limit, late, _US, advice)
 
 
@@ -468,14 +468,14 @@ def _silences(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     fresh_us = Limits().fresh_us
     for for_us in SILENCES_US:
         slug = f"silence/{for_us // _SECOND}s"
-        expected = f"it goes on holding, and all is fresh within {_time(fresh_us)}"
+        expected = f"it keeps holding, and all state is fresh within {_time(fresh_us)}"
         silence = found.get(for_us)
         if silence is None:
             yield _unchecked(slug, expected, _why(observed, "leg"))
             continue
         ended = silence.ended_us
         if ended is None or silence.fresh_us is None:
-            yield _check(slug, False, expected, "not all that came before came again")
+            yield _check(slug, False, expected, "not every stream came back")
             continue
         late = silence.fresh_us - ended
         told = for_us <= _SILENT_US + _LOOKS_US or (
@@ -483,7 +483,7 @@ def _silences(observed: ObservedQualification) -> Iterator[QualificationCheck]:
             and silence.lost_us - silence.began_us <= _SILENT_US + _LOOKS_US
             and silence.back_us is not None
         )
-        words = ["" if silence.kept else "it does not hold any more", "" if told else "it was not told"]
+        words = ["" if silence.kept else "it stopped holding", "" if told else "the silence was not detected"]
         measured = "; ".join([f"fresh after {_time(late)}", *filter(None, words)])
         yield _check(slug, silence.kept and told and late <= fresh_us, expected, measured, fresh_us, late, _US)
 

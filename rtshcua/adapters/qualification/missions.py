@@ -22,8 +22,8 @@ _SHIPPED: Final = {
     MotionKind.LAND: "emergency_land",
 }  # fmt: skip
 _HEIGHTS_MM: Final = (10_000, 6_000)
-_LEGS_MM: Final = (50_000, 40_000, 30_000, 25_000)
-_SPEEDS_MM_S: Final = (5_000, 4_000, 3_000, 2_000)
+_LEGS_MM: Final = (50_000, 30_000)
+_SPEEDS_MM_S: Final = (5_000, 3_000, 2_000)
 _BEARINGS_DEG: Final = (0, 180, 90, 270, 45, 135, 225, 315)
 _HOLD_US: Final = 5_000_000
 #: s of link time that each silence takes, and what is between and around them

@@ -189,7 +189,7 @@ def test_settings_that_a_doctor_warns_of_are_told_and_fail_nothing() -> None:
     found = checks(BRAKED, leg(7_000, 4 * S), settings=(warned, stopped, well))
     assert found["settings/nav_dll_act"].outcome == TOLD
     assert found["settings/x"].outcome == FAILED
-    assert found["settings/others"].measured.startswith("1 more")
+    assert found["settings/others"].measured.startswith("1 other")
 
 
 def test_a_fence_that_its_parameters_leave_off_is_no_fence() -> None:
@@ -198,7 +198,7 @@ def test_a_fence_that_its_parameters_leave_off_is_no_fence() -> None:
     assert found["fence/read-back"].outcome == HELD
     assert found["fence/on"].measured == "`FENCE_TYPE` is 3"
     flown.switches = {"FENCE_ENABLE": (1, None)}
-    assert checks(BRAKED, flown)["fence/on"].measured == "`FENCE_ENABLE` is not told"
+    assert checks(BRAKED, flown)["fence/on"].measured == "`FENCE_ENABLE` is not reported"
     assert checks(BRAKED, leg(7_000, 4 * S))["fence/on"].outcome == UNCHECKED
 
 

@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -33,6 +33,7 @@ from rtshcua.cli.flight import EXIT_CODES
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.cli.opening import AIR_S
+from rtshcua.cli.showing.qualification import described, told
 from rtshcua.cli.sources import compile_sources, read_text
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
@@ -49,7 +50,6 @@ from rtshcua.onboard.ports import Ending, Event
 from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.qualification import (
-    CheckOutcome,
     Firmware,
     Qualification,
     QualificationCheck,
@@ -331,7 +331,8 @@ class Qualifying:
         else:
             code = ExitCode.OK if record.qualifies else ExitCode.TESTS
         if as_json:
-            out_json(msgspec.json.encode(_described(record, path, code)).decode())
+            about = {"record": None if path is None else str(path), "exit_code": int(code)}
+            out_json(msgspec.json.encode({"event": "qualification"} | described(record) | about).decode())
         else:
             out(*told(record, ended if broken else None))
             if path is not None:
@@ -409,48 +410,3 @@ def _announce(sortie: Sortie, *, as_json: bool) -> None:
         out_json(msgspec.json.encode(said).decode(), flush=True)
     else:
         out(f"sortie {sortie.name}: {sortie.about}", flush=True)
-
-
-_MARKS: Final[Mapping[int, str]] = {
-    CheckOutcome.HELD: "ok",
-    CheckOutcome.FAILED: "FAIL",
-    CheckOutcome.TOLD: "note",
-    CheckOutcome.UNCHECKED: "-",
-}
-
-
-def told(record: Qualification, broken: Ending | None) -> Iterator[str]:
-    """The table: a line a check; what does not hold, with what was expected and what to do about it."""
-    width = max(len(each.slug) for each in record.checks)
-    yield f"{record.vehicle}: {record.firmware.text}, parameters {record.digest.hex()[:16]}"
-    for each in record.checks:
-        yield f"{_MARKS[each.outcome]:<5} {each.slug:<{width}}  {each.measured}"
-        wanted = each.outcome in (CheckOutcome.FAILED, CheckOutcome.TOLD)
-        for label, text in (("expected", each.expected), ("help", each.advice)):
-            if wanted and text:
-                yield f"{'':<5} {'':<{width}}  {label}: {text}"
-    counts = {mark: sum(each.outcome == outcome for each in record.checks) for outcome, mark in _MARKS.items()}
-    flown = f"{record.flown_us // 1_000_000} s of flight"
-    if broken is not None:
-        yield f"broken off ({broken}) after {flown}: no record is made"
-        return
-    end = "qualified" if record.qualifies else "NOT qualified"
-    yield f"{end}: {counts['ok']} hold, {counts['FAIL']} do not, {counts['-']} not checked, in {flown}"
-
-
-def _described(record: Qualification, path: Path | None, code: ExitCode) -> dict[str, Any]:
-    return {
-        "event": "qualification",
-        "vehicle": record.vehicle,
-        "firmware": record.firmware.text,
-        "parameters": record.digest.hex(),
-        "pilot": record.pilot,
-        "flown_us": record.flown_us,
-        "qualified": record.qualifies,
-        "record": None if path is None else str(path),
-        "checks": [
-            msgspec.structs.asdict(each) | {"outcome": CheckOutcome(each.outcome).name.lower()}
-            for each in record.checks
-        ],
-        "exit_code": int(code),
-    }

@@ -17,6 +17,7 @@ from rtshcua.cli.showing.document import kind_of_document, show_document
 from rtshcua.cli.showing.keys import KEY_FILE, show_key, show_root
 from rtshcua.cli.showing.log import show_log
 from rtshcua.cli.showing.page import Page, for_terminal
+from rtshcua.cli.showing.qualification import is_qualification, show_qualification
 from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import cbor, cose, names
@@ -34,7 +35,8 @@ _ENVELOPE = b"\xd2"  # COSE_Sign1
 @app.command()
 def show(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="a bundle, document, key, trust root or log, or a run's folder")
+        Path,
+        typer.Argument(metavar="FILE", help="a bundle, document, key, trust root, record or log, or a run's folder"),
     ],
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
@@ -72,4 +74,6 @@ def _show(page: Page, path: Path) -> dict[str, object] | None:
         return show_key(page, data)
     if head.startswith(_ENVELOPE) and cose.unverified(data, limit=MAX_BUNDLE).content_type == names.ROOT.content_type:
         return show_root(page, data, now_us)
+    if head.startswith(_ENVELOPE) and is_qualification(data):
+        return show_qualification(page, data)
     return show_document(page, data) if kind_of_document(data) is not None else None

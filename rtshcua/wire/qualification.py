@@ -123,21 +123,24 @@ def open_qualification(document: bytes, *, root: TrustRoot, vehicle: str) -> Qua
     if len(document) > MAX_QUALIFICATION:
         raise QualificationError("too-large", f"a record of {len(document)} bytes is not read")
     opened = open_envelope(document, root, Duty.LOG, names.QUALIFICATION, MAX_QUALIFICATION)
-    record = parse(names.QUALIFICATION, opened.payload, Qualification)
+    record = read_qualification(opened.payload)
     if record.vehicle != vehicle:
         raise QualificationError("wrong-vehicle", f"it is about `{record.vehicle[:80]}`, this vehicle is `{vehicle}`")
     refusal = key_refusal(opened.key, vehicle=vehicle, now_us=record.issued_at_us)
     if refusal is not None:
         raise QualificationError(refusal, f"key {opened.key.kid.hex()} could not speak for `{vehicle}` then")
-    if not _makes_sense(record):
-        raise QualificationError("malformed", "it contradicts itself")
     return record
 
 
-def _makes_sense(record: Qualification) -> bool:
+def read_qualification(payload: bytes) -> Qualification:
+    """The record in a payload, whoever signed it. Raises `QualificationError`, `BundleError` and `ArtefactError`."""
+    record = parse(names.QUALIFICATION, payload, Qualification)
     outcomes = {int(each) for each in CheckOutcome}
-    return (
+    makes_sense = (
         record.digest == parameters_digest(record.parameters)
         and 0 <= record.firmware.version < 1 << 32
         and all(each.outcome in outcomes for each in record.checks)
     )
+    if not makes_sense:
+        raise QualificationError("malformed", "it contradicts itself")
+    return record

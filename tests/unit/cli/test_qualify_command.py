@@ -1,5 +1,6 @@
 """`rtshcua qualify`, up to where something would fly: who consents, to what, and under which policy."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -7,14 +8,18 @@ import pytest
 
 from rtshcua import library
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES
-from rtshcua.cli.qualify import _planned, told
+from rtshcua.cli.qualify import _planned
+from rtshcua.cli.showing.qualification import told
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.qualification import (
     CheckOutcome,
     Firmware,
     Qualification,
     QualificationCheck,
     parameters_digest,
+    sign_qualification,
 )
+from virtual import case
 from virtual.forked import Forked
 
 SHORT = str(library.root() / "missions/short.rts")
@@ -98,3 +103,19 @@ def test_the_table_says_what_failed_and_why() -> None:
         "NOT qualified: 1 hold, 1 do not, 1 not checked, in 61 s of flight",
     ]
     assert list(told(record(held), None))[-1].startswith("qualified: 1 hold")
+
+
+def test_a_record_is_shown_unverified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from rtshcua.cli.show import show
+
+    failed = QualificationCheck("stop/fly", CheckOutcome.FAILED, "within 9.7 m", "14.3 m", advice="declare `brakes`")
+    path = tmp_path / "vehicle-quad-07.cbor"
+    path.write_bytes(sign_qualification(record(failed), case.KEYS[Duty.LOG]))
+    assert show(path, as_json=False) == 0
+    page = capsys.readouterr().out
+    assert page.startswith("Qualification record of ")
+    assert "FAIL  stop/fly  14.3 m" in page
+    assert "pilot ada" in page
+    assert show(path, as_json=True) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["kind"], said["verified"], said["checks"][0]["outcome"]) == ("qualification", False, "failed")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import hypot
-from typing import Final
+from typing import Any, Final
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
@@ -38,9 +38,7 @@ from rtshcua.adapters.vehicle.supervision import Brakes
 from rtshcua.codec.frames import Received
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
-from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.frames import OURS, Gate
@@ -151,14 +149,10 @@ class QualifyingDriver(Driver):
 
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, sortie: Sortie, sends: bool, fence: bool = True,
-        verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
-        system: int | None = None, steps: Sequence[Invocation] = (), ask: Callable[[str], None] = lambda _: None,
+        manoeuvres: Mapping[str, Stages] | None = None, ask: Callable[[str], None] = lambda _: None, **more: Any,
     ) -> None:  # fmt: skip
         ways = {each.name: shortened(each.stages, sortie.shortened) for each in (PX4, ARDUPILOT)}
-        super().__init__(
-            policy, frames, slack, fence=fence, verifier=verifier, manoeuvres={**(manoeuvres or {}), **ways},
-            system=system, steps=steps,
-        )  # fmt: skip
+        super().__init__(policy, frames, slack, fence=fence, manoeuvres={**(manoeuvres or {}), **ways}, **more)
         self.sortie = sortie
         self.found = ObservedSortie(sortie.name)
         self.questions: IdentityQuestions | None = None

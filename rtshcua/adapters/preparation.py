@@ -44,12 +44,14 @@ class _Stopped(Exception):
 class Preparations:
     """What is set, and owed, in one run. Each method waits by `turn`, which lets time pass, and says whether to go on.
 
-    `record` puts an effect into the log and comes back when it is on the disk; it and `keep_owed` raise OSError.
+    `record` puts an effect into the log and comes back when it is on the disk; it and `keep_owed` raise OSError. With
+    `trouble`, which says why nobody knows what is owed, nothing is set.
     """
 
     def __init__(
         self, loaded: Loaded, driver: Driver, clock: Clock, owed: Mapping[str, Owed],
-        record: Callable[[str, str], None], keep_owed: Callable[[Mapping[str, Owed]], None], slack: int = 1,
+        record: Callable[[str, str], None], keep_owed: Callable[[Mapping[str, Owed]], None],
+        slack: int = 1, trouble: str | None = None,
     ) -> None:  # fmt: skip
         #: what is to be put back
         self.owed = dict(owed)
@@ -60,6 +62,7 @@ class Preparations:
         self._record = record
         self._keep_owed = keep_owed
         self._slack = slack
+        self._trouble = trouble
         driver.prepares = bool(self._settings or self.owed)
 
     def begin(self, turn: Callable[[], bool]) -> str | None:
@@ -98,6 +101,8 @@ class Preparations:
             flies = self._driver.seen.airborne or (self._driver.resumes and self._driver.seen.armed)
             # what flies is brought down as it is
             return None if flies or not self._settings else "it is not known to stand on the ground: nothing is set"
+        if self._trouble is not None:
+            return self._trouble
         if not self._settings:
             self._restore(turn, BEFORE_US)
             return None  # what is not put back is recorded, and the mission judged by what is there
@@ -174,7 +179,6 @@ class Preparations:
             why = f" ({opened.slug})"
         else:
             settings = self._driver.settings
-            settings.refused = None
             for name, value in wanted.items():
                 settings.write(name, value_of(value))
             self._await(lambda: all(map(settings.is_settled, wanted)), turn, ANSWERS_US)

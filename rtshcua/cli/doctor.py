@@ -28,6 +28,7 @@ from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.cli.configured import MeantSettings, settings_of
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.qualified import record_of
@@ -69,6 +70,7 @@ def doctor(
     agent_user: Annotated[
         str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
     ] = None,
+    set_: MeantSettings = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
 ) -> ExitCode:  # fmt: skip
     """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
@@ -99,7 +101,8 @@ def doctor(
         stack.callback(signing.close)
         try:
             steps = () if mission is None else mission.invocations
-            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system, steps)
+            meant = settings_of(set_)
+            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system, steps, meant)
         except UnknownSource as error:
             return fail(ExitCode.REFUSED, str(error))
         try:

@@ -13,10 +13,12 @@ from rtshcua.adapters.files.logs import disclosure_of
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
+from rtshcua.adapters.preparation import Preparations
 from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.closing import close_log, keep_summary
+from rtshcua.cli.debts import Debts
 from rtshcua.cli.interrupts import Interrupts, Wish
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
@@ -31,7 +33,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Ending, Event, Interrupted
+from rtshcua.onboard.ports import Append, Ending, Event, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -55,6 +57,7 @@ EXIT_CODES = {
 _BACKLOG_S = 1.0
 _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
+_WAIT_S = 0.02
 
 _LANDING = "interrupted: it falls back and lands first, and the log is closed then"
 _SILENT = (
@@ -83,7 +86,7 @@ class Flight:
         tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, witnesses: Witnessing, utc: UtcWatch,
-        trusted: Callable[[], None], agents: Agents | None = None,
+        trusted: Callable[[], None], debts: Debts, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
@@ -124,6 +127,11 @@ class Flight:
         self._sink.settle()
         witnesses.begin(log.path, lambda: self._sink.synced)
         self._incidents = incidents
+        self._preparations = Preparations(
+            loaded, vehicle.driver, clock, debts.left, self._record, debts.keep, max(1, round(speed / 5)), debts.trouble
+        )
+        if debts.trouble is not None:
+            self._feed.post(Note(debts.trouble))
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
         vehicle.driver.resumes = resumed
         self._feed.post(self._plan())
@@ -136,6 +144,8 @@ class Flight:
         """Fly to the end, whatever it is, and close the log."""
         try:
             ending = self._follow()
+            if ending is not Ending.CRASHED:
+                self._put_back()
         except BaseException:
             self._close(None)
             self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=False)
@@ -154,6 +164,11 @@ class Flight:
             code = ExitCode.FULL
         summary = keep_summary(self._run, self._summary(ending, code, missing))
         return (code if summary.whole or code is not ExitCode.OK else ExitCode.FULL), summary
+
+    def settle(self) -> None:
+        """Put back what an earlier run left, and close the log of a flight that is not to be."""
+        self._put_back()
+        self._close(Ending.REFUSED)
 
     def refuse(self) -> None:
         """Close the log of a flight that is not to be."""
@@ -184,6 +199,10 @@ class Flight:
         watch: Watch = self._watch
         if self._incidents is not None:
             watch = self._incidents.around(watch, self._start_us)
+        problem = self._preparations.begin(self._pass)
+        if problem is not None:
+            self._feed.post(Note(problem))
+            return Ending.REFUSED
         loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
         while True:
@@ -210,6 +229,38 @@ class Flight:
             if ending is not None:
                 return ending
             also = []
+
+    def _pass(self) -> bool:
+        """Let time pass before the loop, which is told then what happened; False once somebody asked to stop."""
+        self._early += self._poll()
+        if self._interrupts.wish() is None:
+            return True
+        self._feed.post(Note(_ON_GROUND))
+        self._early.append(Interrupted(self._clock.now().monotonic_us))
+        return False
+
+    def _put_back(self) -> None:
+        problem = self._preparations.end(self._linger)
+        if problem is not None:
+            self._feed.post(Note(problem))
+
+    def _linger(self) -> bool:
+        """Let time pass after the loop; False once somebody would not wait."""
+        self._poll()
+        return self._interrupts.wish() is not Wish.LEAVE
+
+    def _poll(self) -> Sequence[Event]:
+        return self._vehicle.poll(self._clock.now().monotonic_us, self._clock.us_in(_WAIT_S))
+
+    def _record(self, event: str, detail: str) -> None:
+        """Put an effect of before or after the loop into the log; it is on the disk then. Raises OSError."""
+        now = self._clock.now()
+        if self._recorder.overdue(now):
+            self._sink.append(self._recorder.seal(now), SYNCED_FIRST)
+        line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
+        self._sink.append(line, SYNCED_FIRST)
+        self._sink.settle()
+        self._watch(now, (), (Append(line, SYNCED_FIRST),))
 
     def _look_at_utc(self) -> list[Event]:
         """The vehicle may tell the time of day after the log began: from then on it is known. By it something may have

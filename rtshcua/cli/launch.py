@@ -2,9 +2,9 @@
 
 import gc
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -24,6 +24,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.debts import Debts
 from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
@@ -91,6 +92,7 @@ class Launch:
     `roots`: the trust root, and before it those that lead to it from the one that the vehicle accepted last; none for
     the key store's. `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
     `utc_error_us`: what the operator says that UTC is off by at most. `sortie`: it is one of a qualification.
+    `settings`: parameters that are set before the flight, by name, and put back after it.
     """
 
     bundle: Path
@@ -118,6 +120,7 @@ class Launch:
     incidents: "Incidents | None" = None
     utc_error_us: int | None = None
     sortie: Sortied | None = None
+    settings: Mapping[str, int] = field(default_factory=dict)
 
 
 def launch(order: Launch) -> ExitCode:
@@ -127,6 +130,7 @@ def launch(order: Launch) -> ExitCode:
     utc = _utc(order, clock)
     trust, log_key, loaded = _trusting(order, bundle, clock)
     root, signed_root = trust.root, trust.signed
+    debts = Debts(order.state, loaded.vehicle)
     witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
@@ -136,7 +140,9 @@ def launch(order: Launch) -> ExitCode:
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
-            driver, transport = _driver(order, loaded, slack, signing), _open(order.link)
+            driver = _driver(order, loaded, slack, signing)
+            driver.prepares = not order.dry_run and bool(order.settings or debts.left)
+            transport = _open(order.link)
             vehicle = ConnectedVehicle(transport, driver, clock, tape.keep)
             stack.callback(vehicle.close)
             if driver.shortfall is not None:
@@ -166,7 +172,7 @@ def launch(order: Launch) -> ExitCode:
                     refusal=flown_before(order.state, loaded), unheard=signing.unheard,
                 )  # fmt: skip
             assert past is not None
-            resumed = broke_off(order.state, loaded, vehicle, clock, events)
+            resumed, refusal = _opened(order, loaded, vehicle, clock, events, owes=bool(debts.left))
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
             told = trust.settle(resumed=resumed)
@@ -176,11 +182,14 @@ def launch(order: Launch) -> ExitCode:
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
-                past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc,
+                past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
                 trusted=lambda: _hold_trust(bundle, signed_root, loaded, clock),
                 simulated=simulation.told(order.speed, own=order.link is None),
             )  # fmt: skip
             del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
+            if refusal is not None:
+                flight.settle()
+                raise refusal
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
             unsure = [UTC_NOTE] if utc.waits else []
@@ -200,6 +209,20 @@ def launch(order: Launch) -> ExitCode:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _opened(
+    order: Launch, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event], *, owes: bool
+) -> tuple[bool, Refused | None]:
+    """Whether an earlier run of the bundle broke off in the air; and why it does not open, where something is owed to
+    the vehicle: then nothing flies, but that is put back first. Raises `Refused` where nothing is.
+    """
+    try:
+        return broke_off(order.state, loaded, vehicle, clock, events), None
+    except Refused as refused:
+        if not owes:
+            raise
+        return False, refused
 
 
 def _agents(order: Launch, loaded: Loaded) -> Agents | None:
@@ -320,7 +343,7 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     loaded = load(
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=secrets.token_bytes(FLIGHT_BYTES),
-        peer_is_own_simulator=order.link is None,
+        peer_is_own_simulator=order.link is None, settings=order.settings, owed=Debts(order.state, identity).left,
     )  # fmt: skip
     if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)
@@ -398,6 +421,7 @@ def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driv
             verifier=signing.verifier,
             system=order.system,
             steps=loaded.bundle.mission.invocations,
+            meant=order.settings if order.dry_run else None,
         )
     except UnknownSource as error:
         raise Refused(ExitCode.REFUSED, "unknown-source", str(error)) from None

@@ -17,6 +17,7 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.clock_error import duration_us, utc_error_text
+from rtshcua.cli.configured import Settings, settings_of
 from rtshcua.cli.faults import fail, misaddressed, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.cli.stdout import out_json
@@ -73,6 +74,7 @@ def run(
     no_fence: Annotated[
         bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
     ] = False,
+    set_: Settings = None,
     utc_error: Annotated[
         str | None,
         typer.Option(
@@ -169,6 +171,7 @@ def run(
             witnesses=witnesses,
             incidents=incidents,
             utc_error_us=duration_us(utc_error),
+            settings=settings_of(set_),
         )
         try:
             return launch(order)

@@ -55,6 +55,9 @@ def sim(
     stock: Annotated[
         bool, typer.Option("--stock", help="GPS, barometer and battery alone: no radio, range finder, wind or voltage")
     ] = False,
+    parameter: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="a parameter as its owner has set it; repeatable")
+    ] = None,
     usb: Annotated[
         bool, typer.Option("--usb", help="it takes this link for USB: ArduCopter obeys anyone there, key or not")
     ] = False,
@@ -95,6 +98,7 @@ def sim(
         except OSError as error:
             return fail(ExitCode.INPUT, str(error))
         words.append(f"--signing-key={signing_key}")
+    words += [f"--parameter={each}" for each in parameter or ()]
     words += ["--usb"] if usb else []
     words += ["--stock"] if stock else []
     words += [f"--release={release}"] if release is not None else []

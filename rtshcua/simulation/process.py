@@ -55,6 +55,7 @@ def parser() -> argparse.ArgumentParser:
     add("--stock", action="store_true", help="GPS, barometer and battery alone: nothing else is fitted")
     add("--extra", choices=list(Extra), action="append", help="what is fitted instead of the usual; may be repeated")
     add("--signing-key", type=_key, metavar="FILE", help="the link's key: 32 octets, or as many in hexadecimal")
+    add("--parameter", type=_parameter, action="append", default=[], metavar="NAME=VALUE", help="as its owner set it")
     add("--usb", action="store_true", help="the vehicle takes the link for USB")
     add("--release", type=_release, metavar="MAJOR.MINOR", help="what it says it is, and takes keys as")
     add("--fault", type=_fault, action="append", default=[], metavar="KIND,at=TIME,...", help="may be repeated")
@@ -83,6 +84,7 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         answers=Answers(options.answers),
         boot=Boot(options.boot),
         extras=STOCK if options.stock else EQUIPPED if options.extra is None else frozenset(map(Extra, options.extra)),
+        parameters=tuple(options.parameter),
         faults=tuple(options.fault),
         signing_key=options.signing_key,
         usb=options.usb,
@@ -140,6 +142,14 @@ def _key(text: str) -> bytes:
     return data
 
 
+def _parameter(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"`{text}` is not NAME=VALUE, with a number") from None
+
+
 def _fault(text: str) -> object:
     try:
         return parse_fault(text)
@@ -164,6 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
         config = config_of(options, time.time_ns() // 1000)
+        simulation = Simulation(config)
     except ValueError as error:
         sys.stderr.write(f"error: {error}\n")
         return EXIT_USAGE
@@ -183,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "speed": options.speed,
             "pid": os.getpid(),
         }
-        loop = _Loop(Simulation(config), link, ("127.0.0.1", options.port), options.speed)
+        loop = _Loop(simulation, link, ("127.0.0.1", options.port), options.speed)
         with selectors.DefaultSelector() as selector:
             loop.listen(selector)
             sys.stdout.write(json.dumps(ready) + "\n")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -400,24 +401,44 @@ def _settings(
     if flown is not None and seen.located:
         here = project(policy.projection, seen.latitude, seen.longitude)
         reach = reach_of(flown.invocations, policy, here)
-    yield from settings_told(flavour, vehicle.parameters.values, policy, reach)
+    yield from settings_told(flavour, vehicle.parameters.values, policy, reach, vehicle.meant)
 
 
-def settings_told(flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach) -> Iterator[VehicleFinding]:
-    """A finding for each of the parameters that were read, which a mission of that reach is to fly with."""
+def settings_told(
+    flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach,
+    meant: Mapping[str, float] = MappingProxyType({}),
+) -> Iterator[VehicleFinding]:  # fmt: skip
+    """A finding for each of the parameters that were read, which a mission of that reach is to fly with. `meant` is
+    what a run would set some of them to.
+    """
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
     for setting in told:
-        yield _setting(setting, values[setting.parameter], setting.needs(policy, reach))
+        name = setting.parameter
+        yield _setting(setting, values[name], setting.needs(policy, reach), meant.get(name))
+    for name in meant:
+        if name not in values:
+            found = f"it does not tell `{name}`, which `--set` names: a run would be refused"
+            yield VehicleFinding(f"settings/{name.lower()}", STOP, found, "a parameter that it has", "leave it out")
     if not told:
         absent = "none of the parameters that were asked for was answered"
         yield VehicleFinding("settings/unread", UNKNOWN, absent, "what the autopilot does by itself")
 
 
-def _setting(setting: Setting, value: float, need: Need | None) -> VehicleFinding:
-    """What it is, what is needed, and how to change it. What a mission cannot fly with is said as `mission/unready`."""
+def _words(setting: Setting, value: float) -> str:
+    return f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
+
+
+def _setting(setting: Setting, value: float, need: Need | None, meant: float | None) -> VehicleFinding:
+    """What it is, what is needed, and how to change it. What a mission cannot fly with is said as `mission/unready`.
+
+    `meant` is what a run with the same `--set` would set it to; then that is judged.
+    """
     slug, name = f"settings/{setting.parameter.lower()}", setting.parameter
-    words = f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
-    found = f"{setting.about}: {words} ({name} = {value:g})"
+    found = f"{setting.about}: {_words(setting, value)} ({name} = {value:g})"
+    if meant is not None:
+        found += f"; for a flight `--set` makes it {_words(setting, meant)} ({meant:g})"
+        found += ", which it is" if meant == value else f", and {value:g} again after it"
+        value = meant
     why = setting.warns.get(value, "")
     if why:
         better = setting.better

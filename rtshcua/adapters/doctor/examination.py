@@ -4,7 +4,7 @@ It sends what any driver sends before a flight, the fence apart, and questions: 
 frame session like all else. Nothing is armed, moved, set or uploaded.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -73,9 +73,9 @@ class ExaminingDriver(Driver):
 
     def __init__(
         self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None,
-        system: int | None = None, steps: Sequence[Invocation] = (),
+        system: int | None = None, steps: Sequence[Invocation] = (), meant: Mapping[str, int] | None = None,
     ) -> None:  # fmt: skip
-        super().__init__(policy, frames, fence=False, verifier=verifier, system=system, steps=steps)
+        super().__init__(policy, frames, fence=False, verifier=verifier, system=system, steps=steps, meant=meant)
         self.talkers: dict[tuple[int, int], Talker] = {}
         self.streams: dict[str, Stream] = {}
         self.texts: list[str] = []  # what it said, the first few texts once each
@@ -111,8 +111,8 @@ class ExaminingDriver(Driver):
             return events, frames
         if self.parameters is None:
             self.parameters = VehicleParameters(bytewise=flavour.bytewise)
-            for setting in SETTINGS[flavour.name]:
-                self.parameters.read(setting.parameter)
+            for name in dict.fromkeys((*(setting.parameter for setting in SETTINGS[flavour.name]), *self.meant)):
+                self.parameters.read(name)
         send: list[Any] = self.parameters.due(self.system, now_us)
         if self._asked_us is None or now_us - self._asked_us >= _ASK_US:
             self._asked_us = now_us

@@ -22,6 +22,7 @@ from rtshcua.codec.frames import Received
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MULTIROTORS
+from rtshcua.mavlink.parameters import value_of
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -57,7 +58,8 @@ class Driver:
     left as it is. Whatever is sent goes out through `frames`; with a `verifier` only what it accepts comes in.
     `manoeuvres` are ways to fly by flavour (`px4`) and by flavour and skill (`px4.spray_area`): see `adapters.packs`.
     With a `system` only the autopilot of this MAVLink system id is chosen; without, it is not ready beside another one.
-    `steps` are the mission's: how soon each has to be decided says how often reports are needed.
+    `steps` are the mission's: how soon each has to be decided says how often reports are needed. `meant` are parameters
+    that a flight would set: the vehicle is judged as if they were, though nothing is.
     """
 
     #: what a flight would be kept from is told, though nothing is set: for an examination
@@ -66,12 +68,14 @@ class Driver:
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
         verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
-        system: int | None = None, steps: Sequence[Invocation] = (),
+        system: int | None = None, steps: Sequence[Invocation] = (), meant: Mapping[str, int] | None = None,
     ) -> None:  # fmt: skip
         self._policy = policy
         self._signed = verifier is not None
         self._capacity: int | None = None
         self._steps = steps
+        #: what parameters are judged to be, though they are not set
+        self.meant = {name: value_of(bits) for name, bits in (meant or {}).items()}
         self._fence = fence
         self._manoeuvres = manoeuvres or {}
         self._telemetry = Telemetry(policy, [each.contract for each in steps])
@@ -270,7 +274,14 @@ class Driver:
             self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
             self.settings = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
             self.preflight = Preflight(
-                self._policy, flavour, self.seen, self._steps, fence=self._fence, slack=slack, judges=self.judges
+                self._policy,
+                flavour,
+                self.seen,
+                self._steps,
+                fence=self._fence,
+                slack=slack,
+                judges=self.judges,
+                meant=self.meant,
             )
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
 

@@ -55,6 +55,7 @@ class VehicleParameters:
     def drop(self, name: str) -> None:
         """Ask for it, or set it, no more; what was heard of it stays."""
         self._wanted.pop(name, None)
+        self.refused = None
 
     def write(self, name: str, value: float) -> None:
         """Set one that was read before."""

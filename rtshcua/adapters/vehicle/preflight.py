@@ -4,7 +4,8 @@ fence.
 A vehicle that flies already is left alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final
 
 from rtshcua.adapters.vehicle import bounds, messages
@@ -32,12 +33,13 @@ class Preflight:
 
     `notes` collects what an operator should know. `fence` False leaves the vehicle's fence as it is; what it would be
     is judged all the same where `judges` says so. `steps` are the mission's: the autopilot's own bounds must leave room
-    for them. `slack` stretches waits, as in `Driver`.
+    for them. `meant` are values that count in place of those that parameters have. `slack` stretches waits, as in
+    `Driver`.
     """
 
     def __init__(
         self, policy: Policy, flavour: AutopilotFlavour, seen: ObservedVehicle, steps: Sequence[Invocation] = (),
-        *, fence: bool, slack: int = 1, judges: bool = False,
+        *, fence: bool, slack: int = 1, judges: bool = False, meant: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self._flavour = flavour
         self._seen = seen
@@ -47,6 +49,7 @@ class Preflight:
         self._fencing = Fencing(policy, flavour, self._parameters, wanted=fence, slack=slack)
         self._policy, self._steps = policy, steps
         self._arms = (fence or judges) and bool(flavour.fence.switches and fence_of(policy, flavour.fence).items)
+        self._meant = meant
         self._told = False
         self._checked_us: int | None = None
         self.notes: list[str] = []
@@ -83,7 +86,7 @@ class Preflight:
         if not self._steps:
             return []
         found = bounds.narrower(
-            self._flavour.own_fence, self._parameters.values, bounds.airspace_reach(self._policy), 0, armed=self._arms
+            self._flavour.own_fence, self._values, bounds.airspace_reach(self._policy), 0, armed=self._arms
         )
         return [
             f"its own fence is narrower than the airspace: `{each.parameter}` is {each.value:g}, and the airspace goes "
@@ -130,7 +133,7 @@ class Preflight:
             return None
         if not all(name in parameters.values or parameters.is_absent(name) for name in own.names):
             return "the bounds of its own fence were not read yet"
-        missing = bounds.unknown(own, parameters.values, armed=self._arms)
+        missing = bounds.unknown(own, self._values, armed=self._arms)
         if missing is None or missing == own.types:
             return None
         return f"it does not tell a bound of its own fence (`{missing}`)"
@@ -139,7 +142,7 @@ class Preflight:
         """That its own fence keeps it from where the mission goes."""
         if not self._steps or not self._seen.located or self._bounds_unread() is not None:
             return None
-        own, values = self._flavour.own_fence, self._parameters.values
+        own, values = self._flavour.own_fence, self._values
         home = project(self._projection, self._seen.latitude, self._seen.longitude)
         reach, room = bounds.reach_of(self._steps, self._policy, home), self._policy.vehicle.position_error
         found = next(bounds.narrower(own, values, reach, room, armed=self._arms), None)
@@ -162,6 +165,12 @@ class Preflight:
         return f"it stands {away // 1_000} m from the policy's home, more than {self._home_within // 1_000} m"
 
     @property
+    def _values(self) -> Mapping[str, float]:
+        """What its parameters are, or would be in a flight."""
+        values, meant = self._parameters.values, self._meant
+        return {name: meant.get(name, value) for name, value in values.items()} if meant else values
+
+    @property
     def _found(self) -> ReturnAltitude | None:
         values = self._parameters.values
         return next((each for each in self._flavour.returns if each.parameter in values), None)
@@ -169,7 +178,7 @@ class Preflight:
     def _returns_at(self, found: ReturnAltitude) -> str | None:
         if not self._wanted_mm:
             return None
-        height = quantise(self._parameters.values[found.parameter], found.mm, 1)
+        height = quantise(self._values[found.parameter], found.mm, 1)
         if height is not None and abs(height - self._wanted_mm) <= SAME_MM:
             return None
         has = "no number" if height is None else f"{height / 1_000:g} m"

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.parameters import bits_of
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.faults import GpsLoss, LinkLoss, MessageSilence
 from rtshcua.model.flat.policy import Policy
@@ -34,12 +35,13 @@ def examine(
     prepare: Prepare = lambda _: None,
     seconds: int = 14,
     utc_error_us: int | None = 1_000,
+    meant: dict[str, int] | None = None,
 ) -> dict[str, VehicleFinding]:
     """The findings after so many seconds, by slug; of several with one slug, the worst."""
     policy = policy or case.policy()
     clock = VirtualClock()
     vehicle = VirtualVehicle(policy, config, clock, fence=False)
-    vehicle.driver = ExaminingDriver(policy, clock, vehicle.frames, steps=MISSION.invocations)
+    vehicle.driver = ExaminingDriver(policy, clock, vehicle.frames, steps=MISSION.invocations, meant=meant)
     prepare(vehicle)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
@@ -330,3 +332,31 @@ def test_an_agent_that_runs_as_the_operator_is_not_told_apart(user: int, own: in
     assert found.verdict is (MissionVerdict.OK if apart else MissionVerdict.WARN)
     assert "`openclaw`" in found.found
     assert bool(found.advice) != apart
+
+
+@pytest.mark.parametrize(("flavour", "name", "has", "meant"), [
+    ("ardupilot", "FENCE_RADIUS", 30.0, 300.0), ("px4", "GF_MAX_HOR_DIST", 2.0, 300.0),
+])  # fmt: skip
+def test_what_a_flight_would_set_is_told_and_judged(flavour: str, name: str, has: float, meant: float) -> None:
+    config = case.simulated(flavour, parameters=((name, has),))
+    slug, sent = f"settings/{name.lower()}", [0]
+
+    def watch(vehicle: VirtualVehicle) -> None:
+        def count(frame: bytes) -> bool:
+            sent[0] += sum(each.name == "PARAM_SET" for each in Codec(0, 0).parse(frame))
+            return False
+
+        vehicle.lose = count
+
+    plain = examine(config, prepare=watch)
+    assert plain[slug].verdict is MissionVerdict.WARN
+    assert "mission/unready" in stops(plain)
+    bits = bits_of(meant)
+    assert bits is not None
+    found = examine(config, prepare=watch, meant={name: bits})
+    assert found[slug].verdict is MissionVerdict.OK
+    assert f"`--set` makes it {meant:g} m ({meant:g}), and {has:g} again after it" in found[slug].found
+    assert stops(found) == set()
+    other = "GF_ACTION" if flavour == "ardupilot" else "FENCE_TYPE"
+    assert f"settings/{other.lower()}" in stops(examine(config, meant={name: bits, other: bits}))
+    assert sent == [0], "nothing is set"

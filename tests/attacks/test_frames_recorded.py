@@ -107,10 +107,15 @@ COMMANDS = {
     "go there now": ours(
         mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, 473_990_000, 85_460_000, 30, 1)
     ),
-    "a parameter": ours(mavlink.MAVLink_param_set_message(1, 1, b"WPNAV_SPEED", 2_000, 9)),
-    "no fence in flight": ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_ENABLE", 0, 9)),
     "a fence in flight": ours(mavlink.MAVLink_mission_clear_all_message(1, 1, 1)),
 }
+SETTINGS = {
+    "a parameter": ours(mavlink.MAVLink_param_set_message(1, 1, b"WPNAV_SPEED", 2_000, 9)),
+    "no fence": ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_ENABLE", 0, 9)),
+    "fewer kinds of fence": ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_TYPE", 4, 9)),
+    "no kind of fence": ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_TYPE", NAN, 9)),
+}
+FENCE_ON = ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_ENABLE", 1, 9))
 BEFORE = [name for name in COMMANDS if "in flight" not in name]
 
 
@@ -189,7 +194,6 @@ def test_what_others_send_and_what_moves_nothing_does_not_count(frame: bytes) ->
 
 def test_a_fence_may_be_handed_over_before_the_flight_begins() -> None:
     assert beside("ardupilot", COMMANDS["a fence in flight"], before_takeoff) is None
-    assert beside("ardupilot", COMMANDS["no fence in flight"], before_takeoff) is None
 
 
 def test_before_any_vehicle_was_heard_every_system_counts_as_ours() -> None:
@@ -218,3 +222,17 @@ def test_the_heartbeat_of_another_system_makes_nobody_blind(kind: str, late: boo
     elsewhere = (on_the_way(lines), ours(mavlink.MAVLink_command_long_message(77, 1, 400, 0, *[0] * 7), system=77))
     found = judged(lines, sorted([*honest, elsewhere], key=lambda entry: entry[0]))
     assert found is not None, "the system that was heard first may be the one that we flew"
+
+
+@rows("kind", ["px4", "ardupilot"])
+@rows("name", SETTINGS)
+def test_a_parameter_that_no_record_lists(kind: str, name: str) -> None:
+    for when in (before_takeoff, on_the_way, at_the_end):
+        unheard = "kinds" in name and kind == "px4" and when is before_takeoff  # it has no such parameter to lose from
+        assert beside(kind, SETTINGS[name], when) == (None if unheard else "frames/unlisted-parameter")
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_a_fence_is_switched_on_before_the_flight_alone(kind: str) -> None:
+    assert beside(kind, FENCE_ON, before_takeoff) is None
+    assert beside(kind, FENCE_ON, on_the_way) == "frames/unlisted-parameter"

@@ -4,6 +4,7 @@ A frame of ours is one that the companion's component sent in a system of which 
 heard, in every system. For whoever reaches the link can send the heartbeat of another system, nothing follows from one:
 frames of a companion like ours in another vehicle's system, heard over the same link, count as ours too. Each that is
 not harmless (`sent`) must be part (`obeyed`) of a command whose `dispatched` record is earlier and whose end is not.
+One that sets a parameter must be listed by a record before it, with its value, and the vehicle stand on the ground.
 Frames of others, which came over the same link, are theirs to answer for.
 
 Frames carry UTC, records UTC too, both of one clock that never goes back: their order is exact, but for frames and
@@ -13,23 +14,29 @@ What is kept does not grow with the flight: for each system (there are 255) its 
 """
 
 from collections.abc import Iterator
+from math import isfinite
 from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.cover import DISPATCHED
 from rtshcua.ground.auditor.obeyed import Home, Target, obeyed, of_link, of_step
-from rtshcua.ground.auditor.sent import Frame, Nature, name, nature, read
+from rtshcua.ground.auditor.preparations import Listed
+from rtshcua.ground.auditor.sent import Frame, Nature, name, nature, read, switches_fence_on
+from rtshcua.ground.auditor.sent import parameter as setting
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.mavlink import enums
-from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS
+from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
 from rtshcua.mavlink.modes import KNOWN
+from rtshcua.mavlink.parameters import bits_of
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
 
 #: who we are
 OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
 
 _autopilot: Final = LAYOUTS[HEARTBEAT].getter("autopilot")
+_base_mode: Final = LAYOUTS[HEARTBEAT].getter("base_mode")
+_landed: Final = LAYOUTS[EXTENDED_SYS_STATE].getter("landed_state")
 _heights: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("alt relative_alt")
 
 
@@ -71,6 +78,10 @@ class Frames:
         self._basis: Basis | None = None
         self._autopilots: dict[int, int] = {}  # of each system that has one
         self._homes: dict[int, Home] = {}
+        self._flying: dict[int, bool] = {}  # armed, as its last heartbeat said,
+        self._aloft: dict[int, bool] = {}  # or not on the ground
+        self._types: dict[int, float] = {}  # FENCE_TYPE
+        self._listed: tuple[Listed, ...] = ()  # the parameters that may be written
         self._running: _Running | None = None
         self._ended: tuple[_Running, int] | None = None  # what ended last, and when
         self.begun = False
@@ -82,11 +93,14 @@ class Frames:
         """The log was found to rest on this."""
         self._basis = basis
 
-    def happened(self, record: Effect) -> None:
-        """Takes note of an effect, in the order of the log, once it is known to be sound."""
+    def happened(self, record: Effect, listed: tuple[Listed, ...] = ()) -> None:
+        """Takes note of an effect, in the order of the log, once it is known to be sound. `listed` are the parameters
+        that may be written from it on.
+        """
         if self._finding is not None:
             return
         self._until(record.utc_us)
+        self._listed = listed
         running = self._running
         if record.event == DISPATCHED:
             self._dispatched(record)
@@ -157,6 +171,9 @@ class Frames:
         what = nature(frame)
         if what is Nature.HARMLESS or (what is Nature.FENCE and not self.begun):
             return
+        if what is Nature.SETTING:
+            self._set(frame, entry)
+            return
         self.count += 1
         if self._suspect is not None or self._finding is not None:
             return
@@ -169,11 +186,37 @@ class Frames:
         elif entry.at_us < running.since_us:  # frames do not stand in the order of their times
             self._finding = _early(suspect, running.since_us, running.record)
 
+    def _set(self, frame: Frame, entry: _Entry) -> None:
+        """Judges a write of a parameter: it is listed, and the vehicle stands; or it switches a fence on, before."""
+        parameter, value = setting(frame, self._autopilots.get(frame.system, 0))
+        is_listed = any((each.name, bits_of(each.value)) == (parameter, bits_of(value)) for each in self._listed)
+        if not is_listed and not self.begun and switches_fence_on(parameter, value, self._types.get(frame.system)):
+            return
+        self.count += 1
+        if self._suspect is not None or self._finding is not None:
+            return
+        found = f"{parameter} {value:g} at {entry.at_us} us, frame {entry.number}"
+        if not is_listed:
+            text = "a parameter was set that no record lists, or not with this value"
+            self._finding = Flaw("frames/unlisted-parameter", text, found).at(self._record)
+        elif self._flying.get(frame.system) or self._aloft.get(frame.system):
+            text = "a parameter was set of a vehicle that was armed, or not on the ground"
+            self._finding = Flaw("frames/parameter-in-flight", text, found).at(self._record)
+
     def _heard(self, frame: Frame) -> None:
-        """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies."""
+        """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies, other
+        messages whether it flies, and what its fence is.
+        """
         fields, system = frame.fields, frame.system
         if frame.message == HEARTBEAT and fields and _autopilot(fields) in KNOWN:
             self._autopilots.setdefault(system, _autopilot(fields))
+            self._flying[system] = bool(_base_mode(fields) & enums.MAV_MODE_FLAG_SAFETY_ARMED)
+        elif frame.message == EXTENDED_SYS_STATE and fields:
+            self._aloft[system] = _landed(fields) != enums.MAV_LANDED_STATE_ON_GROUND
+        elif frame.message == PARAM_VALUE and fields:
+            name, value = setting(frame, self._autopilots.get(system, 0))
+            if name == "FENCE_TYPE":
+                self._types[system] = value if isfinite(value) else 0.0
         elif frame.message == GLOBAL_POSITION_INT and system in self._autopilots and fields:
             above_sea, above_home = _heights(fields)
             height = above_sea - above_home  # mm

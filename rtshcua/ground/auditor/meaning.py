@@ -7,6 +7,7 @@ from rtshcua.ground.auditor.cover import Cover
 from rtshcua.ground.auditor.derive import Deriver
 from rtshcua.ground.auditor.documents import Documents
 from rtshcua.ground.auditor.frames import Frames
+from rtshcua.ground.auditor.preparations import Preparations
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.ground.auditor.turns import Turns
 
@@ -26,6 +27,7 @@ class Meaning:
         self._deriver = Deriver(basis, session)
         self._documents = Documents(session)
         self._cover = Cover()
+        self.preparations = Preparations()
         self._turns = Turns(basis)
 
     @property
@@ -57,10 +59,10 @@ class Meaning:
         return flaw
 
     def _happened(self, record: Effect) -> Flaw | None:
-        flaw = self._documents.check(record)
+        flaw = self._documents.check(record) or self.preparations.check(record)
         if flaw is None and self.mode != UNENFORCED:
             self._cover.recalled = self._documents.counts["recall"] > 0
             flaw = self._cover.check(record) or self._turns.check(record)
         if flaw is None and self._frames is not None:
-            self._frames.happened(record)
+            self._frames.happened(record, self.preparations.listed)
         return flaw

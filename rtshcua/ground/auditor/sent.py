@@ -5,11 +5,13 @@ known to be harmless, so that a message nobody thought of is not overlooked.
 """
 
 from enum import Enum, auto
+from math import isfinite
 from typing import Any, Final, NamedTuple
 
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.framing import HEAD, HEADER, MARKER
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, MISSION_ITEM_INT, PARAM_SET
+from rtshcua.mavlink.parameters import decode, is_bytewise
 
 _QUESTIONS: Final = frozenset((
     layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
@@ -19,11 +21,13 @@ _QUESTIONS: Final = frozenset((
 _ASKS: Final = frozenset(
     {enums.MAV_CMD_RUN_PREARM_CHECKS, enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE}
 )
-_FENCE_PARAMETERS: Final = frozenset({b"FENCE_ENABLE", b"FENCE_TYPE"})
+_AREAS: Final = 4  # a bit of FENCE_TYPE
 
 _head, _layout = HEAD.unpack_from, LAYOUTS.get  # bound once: every frame that was kept comes by here
 _number: Final = LAYOUTS[COMMAND_LONG].getter("command")
-_parameter: Final = LAYOUTS[PARAM_SET].getter("param_id")
+_parameters: Final = {
+    message: LAYOUTS[message].getter("param_id param_value param_type") for message in (PARAM_SET, layouts.PARAM_VALUE)
+}
 _current: Final = LAYOUTS[MISSION_ITEM_INT].getter("current")
 _mission_types: Final = {
     message: LAYOUTS[message].getter("mission_type")
@@ -36,6 +40,7 @@ class Nature(Enum):
 
     HARMLESS = auto()
     FENCE = auto()  # harmless before the first command
+    SETTING = auto()  # a parameter, which a record has to list
     COMMAND = auto()
 
 
@@ -71,13 +76,28 @@ def nature(frame: Frame) -> Nature:
     if frame.message == COMMAND_LONG:
         return Nature.HARMLESS if _number(fields) in _ASKS else Nature.COMMAND
     if frame.message == PARAM_SET:
-        return Nature.FENCE if _parameter(fields).rstrip(b"\0") in _FENCE_PARAMETERS else Nature.COMMAND
+        return Nature.SETTING
     kind = _mission_types.get(frame.message)
     if kind is None or kind(fields) != enums.MAV_MISSION_TYPE_FENCE:
         return Nature.COMMAND
     if frame.message == MISSION_ITEM_INT and _current(fields) != 0:
         return Nature.COMMAND  # 2 and 3 are ArduPilot's "go there now"
     return Nature.FENCE
+
+
+def parameter(frame: Frame, autopilot: int) -> tuple[str, float]:
+    """Name and value in a PARAM_SET or PARAM_VALUE, as this autopilot has them."""
+    name, raw, kind = _parameters[frame.message](frame.fields)
+    return name.rstrip(b"\0").decode("latin-1"), decode(raw, kind, bytewise=is_bytewise(autopilot))
+
+
+def switches_fence_on(name: str, value: float, types: float | None) -> bool:
+    """Whether this setting switches ArduPilot's fence on, and takes nothing from what its owner has in it: `types` is
+    the FENCE_TYPE that was told last, None before.
+    """
+    if name == "FENCE_TYPE":
+        return isfinite(value) and value == (int(value) if types is None else int(types)) | _AREAS
+    return (name, value) == ("FENCE_ENABLE", 1)
 
 
 def name(frame: Frame) -> str:

@@ -33,6 +33,9 @@ def of_meaning(basis: Basis, meaning: Meaning) -> Claims:
     if documents:
         text = f"{', '.join(documents)}, each signed by a key that the root trusts for it, and good when it came"
         proven.append(Claim("documents", text))
+    if meaning.preparations.count:
+        text = f"{_many(meaning.preparations.count, 'parameter')} listed to be set or put back, none while it flew"
+        proven.append(Claim("preparations", text))
     unproven = [Claim("state", "that the recorded state is what the vehicle's sensors saw")]
     if basis.policy.monitors:
         text = "what the temporal monitors said between the records: only that no recorded state rules it out"

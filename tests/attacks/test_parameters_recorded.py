@@ -1,0 +1,136 @@
+"""Parameters that were set, against the log: none without its record, none with another value, none in flight."""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from reference.forgery import edit, read, signed
+from reference.kept_frames import Entries, kept
+from rtshcua.codec.frames import Codec
+from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.ground.auditor.frames import OURS, Frames
+from rtshcua.mavlink.parameters import bits_of
+from rtshcua.wire.keys import Duty
+from virtual import case
+from virtual.flight import Flight
+from virtual.rows import rows
+from virtual.shipped import shipped, simulated
+
+
+@cache
+def flown() -> tuple[tuple[bytes, ...], Entries]:
+    """A flight for which a parameter was set, and put back."""
+    bits = bits_of(80.0)
+    assert bits is not None
+    config = simulated("ardupilot", parameters=(("FENCE_ALT_MAX", 15.0),))
+    flight = Flight(shipped("short"), config, settings={"FENCE_ALT_MAX": bits})
+    entries = kept(flight)
+    return tuple(flight.fly().lines), entries
+
+
+def found(lines: Sequence[bytes], entries: Sequence[tuple[int, bytes]]) -> str | None:
+    """The slug of what an audit finds."""
+    frames = Frames(iter(entries))
+    auditor = Auditor(case.KEYS[Duty.ROOT].kid, frames=frames)
+    for line in lines:
+        auditor.take(line)
+    failure = auditor.audit().report.failure
+    failure = failure or frames.over()
+    return None if failure is None else failure.slug
+
+
+def writes() -> list[tuple[int, bytes]]:
+    """When, and with what, parameters were set that are no switch of the fence."""
+    return [(at, octets) for at, octets in flown()[1] if octets[7] == 23 and b"FENCE_ALT_MAX" in octets]
+
+
+def setting(value: float, name: bytes = b"FENCE_ALT_MAX") -> bytes:
+    return Codec(1, OURS).pack(m.MAVLink_param_set_message(1, 1, name, value, 9))
+
+
+def beside(octets: bytes, at_us: int) -> str | None:
+    lines, entries = flown()
+    return found(lines, sorted([*entries, (at_us, octets)], key=lambda entry: entry[0]))
+
+
+def moment(event: str, number: int = 0) -> int:
+    """When the record of an effect was made."""
+    times = [int(each["utc_us"]) for each in map(read, flown()[0]) if each.get("event") == event]
+    return times[number]
+
+
+def test_what_was_set_was_recorded_and_put_back() -> None:
+    lines, entries = flown()
+    assert len(writes()) >= 2
+    assert found(lines, entries) is None
+
+
+def test_a_write_before_its_record() -> None:
+    assert beside(setting(80.0), moment("preparation") - 1) == "frames/unlisted-parameter"
+
+
+def test_a_write_that_is_sent_again_when_it_is_done() -> None:
+    (_, first), *_ = writes()
+    for at_us in (moment("prepared") + 1, moment("dispatched") + 1_000_000, moment("preparation", 1) + 1):
+        assert beside(first, at_us) == "frames/unlisted-parameter"
+
+
+@rows(("octets"), [setting(81.0), setting(80.0, b"FENCE_RADIUS"), setting(15.0), setting(0.0, b"ARMING_CHECK")])
+def test_a_write_of_something_else_than_the_record_lists(octets: bytes) -> None:
+    assert beside(octets, moment("preparation") + 1) == "frames/unlisted-parameter"
+
+
+@pytest.mark.parametrize("message", [
+    m.MAVLink_heartbeat_message(2, 3, 128, 0, 4, 3), m.MAVLink_extended_sys_state_message(0, 2),
+], ids=["armed", "in the air"])  # fmt: skip
+def test_a_write_to_a_vehicle_that_flies(message: Any) -> None:
+    lines, entries = flown()
+    first = entries.index(writes()[0])
+    flies = (entries[first][0], Codec(1, 1).pack(message))
+    assert found(lines, [*entries[:first], flies, *entries[first:]]) == "frames/parameter-in-flight"
+
+
+def test_a_log_that_lost_the_record_of_its_writes() -> None:
+    lines, entries = flown()
+    without = [line for line in lines if read(line).get("event") != "preparation"]
+    assert found(signed(without), entries) == "frames/unlisted-parameter"
+
+
+def changed(number: int, detail: str) -> str | None:
+    """What is found where a record of a preparation says something else."""
+    lines = list(flown()[0])
+    listed = [at for at, line in enumerate(lines) if read(line).get("event") == "preparation"]
+    lines[listed[number]] = edit(lines[listed[number]], detail=detail)
+    return found(signed(lines), ())
+
+
+@rows(("number", "detail", "slug"), [
+    (0, "set FENCE_ALT_MAX from 15 to 80", None),
+    (0, "set ARMING_CHECK from 1 to 0", "preparation/parameter"),
+    (0, "set FENCE_ENABLE from 1 to 0", "preparation/value"),
+    (0, "set FENCE_TYPE from 7 to 3", "preparation/value"),
+    (0, "set GF_ACTION from 2 to 4", "preparation/value"),
+    (0, "restore FENCE_RADIUS from 300 to 50", None),
+    (0, "set FENCE_RADIUS", "preparation/malformed"),
+    (0, "set FENCE_RADIUS from a to b", "preparation/malformed"),
+    (0, "set FENCE_RADIUS from nan to 1", "preparation/malformed"),
+    (0, "set ", "preparation/malformed"),
+    (0, "", "preparation/malformed"),
+    (1, "restore FENCE_ALT_MAX from 80 to 16", "preparation/other-value"),
+    (1, "restore FENCE_ALT_MAX from 80 to 15, FENCE_TYPE from 7 to 7", None),
+])  # fmt: skip
+def test_what_a_record_lists_makes_sense(number: int, detail: str, slug: str | None) -> None:
+    assert changed(number, detail) == slug
+
+
+def test_nothing_is_listed_while_a_command_is_under_way() -> None:
+    lines = list(flown()[0])
+    first = next(at for at, line in enumerate(lines) if read(line).get("event") == "preparation")
+    sent = next(at for at, line in enumerate(lines) if read(line).get("event") == "dispatched")
+    moved = lines.pop(first)
+    fits = {name: read(lines[sent - 1])[name] for name in ("at_us", "utc_us", "utc_error_us")}
+    lines.insert(sent, edit(moved, **fits))
+    assert found(signed(lines), ()) == "preparation/in-flight"

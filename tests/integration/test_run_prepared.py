@@ -1,0 +1,78 @@
+"""`rtshcua run --set`, over UDP: set, flown, put back; and after a run that was killed put back by the next one."""
+
+import json
+import signal
+from pathlib import Path
+from typing import Any
+
+#: so slow that a busy machine's hold-ups stay below what a permit lasts
+SPEED = 3
+OWNERS = ("--flavour", "ardupilot", "--parameter", "FENCE_ALT_MAX=12")
+SET = ("--set", "FENCE_ALT_MAX=90")
+
+
+def effects(folder: Path, event: str) -> list[str]:
+    """The details of these effects, in the order of the log."""
+    found = map(json.loads, (folder / "log.jsonl").read_text().splitlines())
+    return [each["detail"] for each in found if each.get("event") == event]
+
+
+def owed(ground: Any) -> dict[str, list[str]]:
+    (kept,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("parameters/vehicle-quad-07")
+    found: dict[str, list[str]] = json.loads(kept.read_text())
+    return found
+
+
+def test_a_killed_run_leaves_what_the_next_puts_back(ground: Any, port: int) -> None:
+    def runs() -> set[Path]:
+        return set((ground.folder / "runs").iterdir())
+
+    ground.vehicle(port, SPEED, *OWNERS)
+    bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
+    first = ground.run(bundle, *words, *SET, speed=SPEED)
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGKILL)
+    first.process.wait()
+    (killed,) = runs()
+    assert effects(killed, "preparation") == ["set FENCE_ALT_MAX from 12 to 90"]
+    assert effects(killed, "prepared") == ["FENCE_ALT_MAX is 90"]
+    assert owed(ground) == {"FENCE_ALT_MAX": ["12", "90"]}
+
+    second = ground.run(bundle, *words, speed=SPEED).end()
+    assert second.code == 6, second.stderr
+    (other,) = runs() - {killed}
+    (waits,) = effects(other, "not-restored")
+    assert "FENCE_ALT_MAX to 12" in waits
+    assert effects(other, "preparation") == ["restore FENCE_ALT_MAX from 90 to 12"]
+    assert effects(other, "prepared") == ["FENCE_ALT_MAX is 12"]
+    assert owed(ground) == {}
+    verified = ground.start("verify-log", "--audit", str(other), "--json").end()
+    assert verified.code == 0, verified.events
+
+
+def test_what_a_run_that_died_on_the_ground_left_is_put_back_though_the_next_is_refused(ground: Any, port: int) -> None:
+    ground.vehicle(port, SPEED, *OWNERS)
+    bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
+    first = ground.run(bundle, *words, *SET, speed=SPEED)
+    first.until("prepared")
+    first.signal(signal.SIGKILL)
+    first.process.wait()
+    killed = first.folder
+    second = ground.run(bundle, *words, speed=SPEED).end()
+    assert second.code == 5, "a bundle flies once"
+    (other,) = set((ground.folder / "runs").iterdir()) - {killed}
+    assert effects(other, "preparation") == ["restore FENCE_ALT_MAX from 90 to 12"]
+    assert effects(other, "dispatched") == []
+    assert owed(ground) == {}
+
+
+def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> None:
+    ground.vehicle(port, SPEED, *OWNERS)
+    words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
+    run = ground.run(ground.bundle(), *words, *SET, speed=SPEED)
+    run.until("prepared")
+    run.signal(signal.SIGINT)
+    assert run.end().code in (130, 6), run.stderr
+    assert effects(run.folder, "preparation")[-1] == "restore FENCE_ALT_MAX from 90 to 12"
+    assert effects(run.folder, "prepared")[-1] == "FENCE_ALT_MAX is 12"
+    assert owed(ground) == {}

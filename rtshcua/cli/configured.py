@@ -1,11 +1,11 @@
 """Parameters of the autopilot as an operator configures them on a command line: `--set FENCE_RADIUS=300`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import typer
 
-from rtshcua.mavlink.parameters import bits_of
+from rtshcua.mavlink.parameters import bits_of, shown
 from rtshcua.onboard.enforcement.preparation import unsettable
 
 
@@ -48,6 +48,12 @@ def settings_of(texts: Sequence[str] | None) -> dict[str, int]:
     """The values by name, as the 32 bits of a float; they were checked before."""
     found = dict(map(_read, texts or ()))
     return {name: bits for name, bits in found.items() if bits is not None}
+
+
+def would_set(settings: Mapping[str, int]) -> list[str]:
+    """What a rehearsal tells of what a flight would set."""
+    listed = ", ".join(f"{name} to {shown(bits)}" for name, bits in settings.items())
+    return [f"a flight would set {listed}, and is judged so; nothing is set here"] if listed else []
 
 
 def _read(text: str) -> tuple[str, int | None]:

@@ -29,6 +29,7 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.configured import MeantSettings, settings_of
+from rtshcua.cli.debts import Debts
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.qualified import record_of
@@ -36,6 +37,7 @@ from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.mavlink.parameters import shown
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -121,12 +123,26 @@ def doctor(
                 qualified=None if root is None else partial(standing, record_of(policy.vehicle.identity, root)),
             )
         )  # fmt: skip
+    if mission is not None:
+        findings += _owed(Debts(state_folder(), policy.vehicle.identity))
     code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
     if as_json:
         out_json(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
     else:
         _print(findings)
     return code
+
+
+def _owed(debts: Debts) -> list[VehicleFinding]:
+    """What a run that broke off has left in the vehicle's parameters."""
+    slug = "settings/owed"
+    if debts.trouble is not None:
+        return [
+            VehicleFinding(slug, MissionVerdict.WARN, debts.trouble, "", "look at the file; without it nothing is owed")
+        ]
+    listed = ", ".join(f"{name} from {shown(each.value)} to {shown(each.before)}" for name, each in debts.left.items())
+    found = f"a run that broke off set parameters, and the next one puts them back: {listed}"
+    return [VehicleFinding(slug, MissionVerdict.WARN, found)] if listed else []
 
 
 def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, TrustRoot | None]:

@@ -24,6 +24,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.configured import would_set
 from rtshcua.cli.debts import Debts
 from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
@@ -168,7 +169,8 @@ def launch(order: Launch) -> ExitCode:
                 from rtshcua.cli.dry_run import dry_run  # shows what would pass as `why` does, which is of the ground
 
                 return dry_run(
-                    loaded, vehicle, clock, interrupts, events, as_json=order.style == "json", notes=signing.notes,
+                    loaded, vehicle, clock, interrupts, events, as_json=order.style == "json",
+                    notes=(*signing.notes, *would_set(order.settings)),
                     refusal=flown_before(order.state, loaded), unheard=signing.unheard,
                 )  # fmt: skip
             assert past is not None

@@ -1,0 +1,162 @@
+"""Setting parameters and putting them back: what happens where the vehicle, its owner or the disk do otherwise."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.parameters import bits_of
+from rtshcua.onboard.enforcement.preparation import Owed
+from rtshcua.onboard.ports import Ending, Event
+from virtual.flight import Flight
+from virtual.shipped import shipped, simulated
+
+HAD = {"FENCE_ALT_MAX": 15.0}
+
+
+def bits(value: float) -> int:
+    found = bits_of(value)
+    assert found is not None
+    return found
+
+
+def flight(settings: dict[str, float], owed: dict[str, Owed] | None = None, flavour: str = "ardupilot") -> Flight:
+    had = tuple(HAD.items()) if flavour == "ardupilot" else ()
+    configured = {name: bits(value) for name, value in settings.items()}
+    return Flight(shipped("short"), simulated(flavour, parameters=had), settings=configured, owed=owed)
+
+
+def has(of: Flight, name: str = "FENCE_ALT_MAX") -> float:
+    value: float = of.vehicle.simulation._autopilot.parameters.value(name)
+    return value
+
+
+def writes(of: Flight) -> list[Any]:
+    """What is set of the vehicle from now on, the switches of its fence apart."""
+    found: list[Any] = []
+
+    def watch(frame: bytes) -> bool:
+        messages = [each.message for each in Codec(0, 0).parse(frame) if each.name == "PARAM_SET"]
+        found.extend(each for each in messages if each.param_id not in ("FENCE_ENABLE", "FENCE_TYPE"))
+        return False
+
+    of.vehicle.lose = watch
+    return found
+
+
+def test_nothing_is_read_or_written_where_nothing_is_configured() -> None:
+    one = flight({}, flavour="px4")
+    sent = writes(one)
+    assert one.prepare() is None
+    assert one.clock.elapsed_us == 0
+    assert sent == []
+
+
+def test_what_is_so_already_is_not_written_and_not_owed() -> None:
+    owed: dict[str, Owed] = {}
+    one = flight(HAD, owed)
+    sent = writes(one)
+    assert one.prepare() is None
+    assert (sent, owed) == ([], {})
+
+
+def test_a_parameter_that_it_does_not_have_refuses_the_mission() -> None:
+    one = flight({"GF_ACTION": 3.0, "FENCE_ALT_MAX": 80.0})
+    sent = writes(one)
+    flown = one.fly()
+    assert flown.ending is Ending.REFUSED
+    assert sent == []
+
+
+def test_a_vehicle_that_keeps_its_own_value_refuses_the_mission(monkeypatch: pytest.MonkeyPatch) -> None:
+    owed: dict[str, Owed] = {}
+    one = flight({"FENCE_ALT_MAX": 80.0}, owed)
+    parameters = one.vehicle.simulation._autopilot.parameters
+    monkeypatch.setattr(parameters, "write", lambda name, raw, kind: parameters.read(name, -1))
+    flown = one.fly()
+    assert flown.ending is Ending.REFUSED
+    (said,) = flown.effects("not-prepared")
+    assert said["detail"] == "not set as it was to be: FENCE_ALT_MAX is 15"
+    assert owed == {}, "it is what it was"
+
+
+def test_what_its_owner_changed_meanwhile_is_left_so() -> None:
+    owed: dict[str, Owed] = {}
+    one = flight({"FENCE_ALT_MAX": 80.0}, owed)
+
+    def each(of: Flight) -> Sequence[Event]:
+        if of.vehicle.simulation.truth().up_mm > 5_000:
+            of.vehicle.simulation._autopilot.parameters.own("FENCE_ALT_MAX", 60.0)
+        return ()
+
+    flown = one.fly(each)
+    assert flown.ending is Ending.COMPLETED
+    (said,) = flown.effects("not-restored")
+    assert "which was set to 80, and is 60 now" in said["detail"]
+    assert has(one) == 60.0
+    assert owed == {}
+
+
+@pytest.mark.parametrize(("found", "says"), [(15.0, []), (30.0, ["somebody else"])], ids=["as before", "by others"])
+def test_what_an_earlier_run_owes_is_dropped_where_it_is_not_what_that_set(found: float, says: list[str]) -> None:
+    owed = {"FENCE_ALT_MAX": Owed(bits(15.0), bits(80.0))}
+    one = flight({}, owed)
+    one.vehicle.simulation._autopilot.parameters.own("FENCE_ALT_MAX", found)
+    sent = writes(one)
+    assert one.prepare() is None
+    assert (sent, owed, has(one)) == ([], {}, found)
+    told = [line for line in one.sink.lines if b'"not-restored"' in line]
+    assert [each in str(line) for each, line in zip(says, told, strict=True)] == [True] * len(says)
+
+
+def test_what_an_earlier_run_owes_is_put_back_to_what_it_was_at_first() -> None:
+    owed = {"FENCE_ALT_MAX": Owed(bits(15.0), bits(60.0))}
+    one = flight({"FENCE_ALT_MAX": 80.0}, owed)
+    one.vehicle.simulation._autopilot.parameters.own("FENCE_ALT_MAX", 60.0)
+    assert one.prepare() is None
+    assert (has(one), owed) == (80.0, {"FENCE_ALT_MAX": Owed(bits(15.0), bits(80.0))})
+    one.close(Ending.INTERRUPTED)
+    assert one.preparations.end(lambda: one._pass(lambda _: ())) is None
+    assert (has(one), owed) == (15.0, {})
+
+
+def test_what_is_owed_beside_what_is_configured_is_put_back_first() -> None:
+    owed = {"FENCE_RADIUS": Owed(bits(300.0), bits(400.0))}
+    one = flight({"FENCE_ALT_MAX": 80.0}, owed)
+    one.vehicle.simulation._autopilot.parameters.own("FENCE_RADIUS", 400.0)
+    assert one.prepare() is None
+    assert has(one, "FENCE_RADIUS") == 300.0
+    assert owed == {"FENCE_ALT_MAX": Owed(bits(15.0), bits(80.0))}
+
+
+@pytest.mark.parametrize("what", ["the log", "what is owed"])
+def test_what_cannot_be_recorded_is_not_set(what: str) -> None:
+    one = flight({"FENCE_ALT_MAX": 80.0})
+    sent = writes(one)
+
+    def fails(*_: object) -> None:
+        raise OSError(28, "no space left on device")
+
+    setattr(one.preparations, "_record" if what == "the log" else "_keep_owed", fails)
+    assert one.prepare() is Ending.REFUSED
+    assert sent == []
+    assert has(one) == 15.0
+
+
+def test_where_nobody_knows_what_is_owed_nothing_is_set() -> None:
+    one = flight({"FENCE_ALT_MAX": 80.0})
+    sent = writes(one)
+    one.preparations._trouble = "it is damaged"
+    assert one.preparations.begin(lambda: one._pass(lambda _: ())) == "it is damaged"
+    assert sent == []
+
+
+def test_a_vehicle_that_never_says_that_it_stands_is_not_written_to() -> None:
+    one = flight({"FENCE_ALT_MAX": 80.0})
+    sent = writes(one)
+    one.vehicle.hurt = lambda datagram: [
+        datagram for each in Codec(0, 0).parse(datagram) if each.name != "EXTENDED_SYS_STATE"
+    ]
+    assert one.prepare() is Ending.REFUSED
+    assert sent == []

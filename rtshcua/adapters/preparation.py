@@ -1,4 +1,4 @@
-"""Parameters of the autopilot, set before a flight as configured, and put back after it (docs/adr/0043).
+"""Parameters of the autopilot, set before a flight as configured, and put back after it (docs/adr/0063).
 
 What is to be written is on the disk first, for the next run (`keep_owed`) and in the log (`record`). Then a permit is
 asked for, which opens the gate for just that; then it is written; and what is read back counts, nothing else. All of it
@@ -170,6 +170,7 @@ class Preparations:
         self._keep_owed(self.owed)
         listed = tuple(ParameterWrite(name, values[name], value) for name, value in wanted.items())
         self._record(PREPARATION, told_of(listed, restoring=restoring))
+        self._stands(turn, ANSWERS_US)  # the disk took its time: what is known of where it is may be old by now
         now_us = self._clock.now().monotonic_us
         sealed = self._issuer.permit(encode(Preparation(0, restoring, 0, listed)), now_us)
         opened = sealed if isinstance(sealed, Refusal) else self._executor.prepare(sealed, now_us)

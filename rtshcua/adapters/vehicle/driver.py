@@ -154,7 +154,7 @@ class Driver:
         if self._flies:
             return self.link.crowd or mute or self.seen.unready
         if self.prepares:
-            return self.other_kind or self.link.crowd or "its parameters are being set as configured"
+            return self.other_kind or self.link.crowd or "its parameters are being set"
         waits = self.other_kind or self.link.crowd or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
 

@@ -7,7 +7,7 @@ from rtshcua.ground.auditor.cover import Cover
 from rtshcua.ground.auditor.derive import Deriver
 from rtshcua.ground.auditor.documents import Documents
 from rtshcua.ground.auditor.frames import Frames
-from rtshcua.ground.auditor.preparations import Preparations
+from rtshcua.ground.auditor.preparations import ListedParameters
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.ground.auditor.turns import Turns
 
@@ -27,7 +27,7 @@ class Meaning:
         self._deriver = Deriver(basis, session)
         self._documents = Documents(session)
         self._cover = Cover()
-        self.preparations = Preparations()
+        self.preparations = ListedParameters()
         self._turns = Turns(basis)
 
     @property

@@ -37,7 +37,7 @@ class Listed(NamedTuple):
     value: float
 
 
-class Preparations:
+class ListedParameters:
     """Follows one log; what it keeps is bounded by the parameters that may be set. `listed` may be written now."""
 
     def __init__(self) -> None:

@@ -37,6 +37,7 @@ def test_no_octet_of_a_permit_can_be_another() -> None:
 
 def test_what_is_no_body() -> None:
     body = encode(ONE)
+    assert decode(body) == ONE
     name = body.index(b"FENCE")
     for bad in (
         b"", body[:-1], body + b"\0", b"\2" + body[1:], body[:name] + b"\xff" + body[name + 1 :],

@@ -37,7 +37,8 @@ HEAD = "".join(f'import "lib:{path}"\n' for path in ("policies/site.rts", *(f"sk
 def source(count: int, crews: int = 50) -> str:
     """A policy of about that many rules, for at most so many crews of ten rules."""
     crews = min(max(count // 10, 1), crews)
-    parts = [HEAD, "policy large version 1 {", "  permit hover, return_home, emergency_land by any"]
+    declared = f"role {', '.join(f'crew_{number}' for number in range(crews))}"
+    parts = [HEAD, declared, "policy large version 1 {", "  permit hover, return_home, emergency_land by any"]
     for number in range(count - 1):
         crew, turn = f"crew_{number % crews}", number // crews
         low, high = 5 + 5 * (turn % 8), 12 + 5 * (turn % 8)

@@ -69,7 +69,8 @@ def source(lines: int) -> str:
     Whatever its length, ten rules are about each skill of the missions' role; all others are about other roles.
     """
     rules = lines // 10
-    parts = [HEAD, "policy large version 1 {", "  permit hover, return_home, emergency_land by any"]
+    crews = ", ".join(f"crew_{number}" for number in range(50))
+    parts = [HEAD, f"role {crews}", "policy large version 1 {", "  permit hover, return_home, emergency_land by any"]
     for number in range(rules):
         role = "operator" if number < 10 else f"crew_{number % 50}"
         parts += [

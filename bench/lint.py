@@ -63,6 +63,8 @@ import "lib:skills/inspect_area.rts"
 import "lib:skills/return_home.rts"
 import "lib:skills/emergency_land.rts"
 
+role supervisor
+
 policy works_{n} version {version} {{
   permit  takeoff by role operator through agent, operator  when altitude <= {high} m
   permit  goto by role operator through agent, operator  when target inside city and altitude <= {high} m

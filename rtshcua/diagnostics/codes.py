@@ -67,6 +67,7 @@ WRONG_KIND = _code("E0204", "wrong-kind", "a name stands for another kind of thi
 NO_ENTRY = _code("E0205", "no-entry", "the entry of a zone is used that declares none")
 NO_MISSION = _code("E0206", "no-mission", "there is not exactly one mission to compile, and none was named")
 NOT_IN_POLICY = _code("E0207", "not-in-policy", "a name is not declared in what the policy's own file imports")
+UNKNOWN_ROLE = _code("E0208", "unknown-role", "a rule names a role that nothing declares")
 
 # E03: types, units and datum
 UNKNOWN_UNIT = _code("E0301", "unknown-unit", "a number has a unit that the language does not know")

@@ -18,7 +18,7 @@ import "lib:skills/emergency_land.rts"
 import "lib:policies/site.rts"
 """
 TAIL = "permit return_home, emergency_land by any contingency return_home, emergency_land"
-POLICY = f"policy p version 1 {{ {TAIL} }}"
+POLICY = f"role a policy p version 1 {{ {TAIL} }}"
 RISE = """
 skill rise(top: altitude in 5 m .. 50 m, tag: one of a, b = a) {
   motion climb to top class tactical deadline 5 s valid for 40 min lasts at most 1 min

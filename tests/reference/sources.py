@@ -62,6 +62,10 @@ def mission(*steps: str, under: str = "rules@1") -> str:
     return f"{header}  phase departure {{\n{body}  }}\n}}\n"
 
 
+#: besides `operator`
+ROLES = "role supervisor, rescuer, pilot, trainee, chief"
+
+
 def program(*parts: str, imports: Iterable[str] = (IMPORTS,)) -> str:
-    """Parts of one source, with their imports."""
-    return "".join((*imports, *parts))
+    """Parts of one source, with their imports, and the roles that they may name."""
+    return "".join((*imports, *parts, f"{ROLES}\n"))

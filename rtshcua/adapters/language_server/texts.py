@@ -35,6 +35,7 @@ _UNNECESSARY = frozenset({"E1301", "E1305", "E0720", "E0721", "E0722"})
 SYMBOLS = {
     "enum": lsp.SymbolKind.Enum, "signal": lsp.SymbolKind.Variable, "zone": lsp.SymbolKind.Object,
     "vehicle": lsp.SymbolKind.Struct, "skill": lsp.SymbolKind.Function, "template": lsp.SymbolKind.Interface,
+    "role": lsp.SymbolKind.Key,
     "policy": lsp.SymbolKind.Class, "mission": lsp.SymbolKind.Module, "nominal": lsp.SymbolKind.Constant,
     "test": lsp.SymbolKind.Method, "member": lsp.SymbolKind.EnumMember, "phase": lsp.SymbolKind.Namespace,
     "scenario": lsp.SymbolKind.Method, "parameter": lsp.SymbolKind.Field,

@@ -7,6 +7,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.report import Report
 from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Unit
@@ -38,7 +39,8 @@ WORDS: Mapping[type, str] = {
 
 @dataclass(slots=True)
 class Symbols:
-    """The declarations of a program by name, all kinds in one name space, and once more by kind.
+    """The declarations of a program by name, all kinds in one name space, and once more by kind. Roles have a
+    name space of their own, and may be declared by several files.
 
     `tests` and `scenarios` are those of the file that was asked for, which has them run; they are called by texts, not
     by names.
@@ -56,6 +58,8 @@ class Symbols:
     policies: dict[str, PolicyDecl] = field(default_factory=dict)
     missions: dict[str, MissionDecl] = field(default_factory=dict)
     nominals: dict[str, NominalDecl] = field(default_factory=dict)
+    roles: dict[str, Name] = field(default_factory=dict)
+    roles_again: list[tuple[Name, Name]] = field(default_factory=list)
     tests: tuple[TestDecl, ...] = ()
     scenarios: tuple[ScenarioDecl, ...] = ()
     broken: frozenset[str] = frozenset()
@@ -96,6 +100,10 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
             (unit.nominals, symbols.nominals),
         ):
             symbols._declare(declarations, table)  # type: ignore[arg-type]
+        for role in (name for declaration in unit.roles for name in declaration.names):
+            first = symbols.roles.setdefault(role.text, role)
+            if first is not role and first.span.file == role.span.file:
+                symbols.roles_again.append((first, role))
     return symbols
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.ground.checker.checks.contracts import CLASSES, RECORDS
 from rtshcua.ground.checker.checks.policies import SOURCES
+from rtshcua.ground.checker.checks.roles import OPERATOR
 from rtshcua.ground.checker.checks.scenarios import ENDS
 from rtshcua.ground.checker.faults import NAMED as NAMED_FAULTS
 from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, parameter_type, signal_type
@@ -112,7 +113,7 @@ class _Proposals:
             Wanted.SKILL: symbols.skills, Wanted.ZONE: symbols.zones, Wanted.POLICY: symbols.policies,
             Wanted.VEHICLE: symbols.vehicles, Wanted.TEMPLATE: symbols.templates, Wanted.SIGNAL: symbols.signals,
             Wanted.CLASS: CLASSES, Wanted.RECORD: RECORDS, Wanted.SOURCE: SOURCES, Wanted.REASON: REASONS,
-            Wanted.ROLE: self._all(Sort.ROLE), Wanted.PHASE: self._all(Sort.PHASE), Wanted.MESSAGE:
+            Wanted.ROLE: (OPERATOR, *symbols.roles), Wanted.PHASE: self._all(Sort.PHASE), Wanted.MESSAGE:
             self.dialect.messages, Wanted.DIALECT_ENUM: self.dialect.enums, Wanted.TYPE: (*TYPES, *symbols.enums),
             Wanted.MISSION: symbols.missions, Wanted.AUTOPILOT: FLAVOURS, Wanted.ENDING: ENDS,
             Wanted.NOMINAL: [each.name.text for unit in self.view.units.values() for each in unit.nominals],
@@ -196,7 +197,7 @@ class _Proposals:
             entries = (name for name, zone in self.symbols.zones.items() if zone.entry is not None)
             yield from (Item(f"{name}.entry", "zone", "position") for name in entries)
         if kind == "role":
-            yield from (Item(name, "role") for name in self._all(Sort.ROLE))
+            yield from (Item(name, "role") for name in (OPERATOR, *self.symbols.roles))
         yield from (Item(each.name, "parameter", each.kind) for each in self._own())
 
     def _units(self, call: Call | None) -> Iterator[Item]:

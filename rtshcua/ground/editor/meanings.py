@@ -52,7 +52,8 @@ KEYWORDS: Mapping[str, str] = {
     "template": "Rules with parameters, which policies `use`.",
     "use": "Puts the rules of a template into the policy, with these arguments.",
     "any": "Every skill, or after `by` every role.",
-    "role": "On whose behalf something is asked for; keys are given to roles, so their names belong to the trust root.",
+    "role": "On whose behalf something is asked for; declared at the top of a source, but for `operator`. Keys are "
+    "given to roles, so their names belong to the trust root.",
     "mission": "Steps in phases, proposed by someone under one version of a policy, for one vehicle.",
     "under": "The policy, and after `@` its version.",
     "proposed": "Who proposes the mission, by which source, and for which role.",

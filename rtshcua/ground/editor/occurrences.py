@@ -11,7 +11,7 @@ from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.model.ir.missions import Item, MissionDecl, Step
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule, TemplateDecl, Use
+from rtshcua.model.ir.policies import Delegation, PolicyDecl, RoleDecl, Rule, TemplateDecl, Use
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
@@ -26,11 +26,11 @@ def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda each: (each.span.start, each.span.end)))
 
 
-def declarations(unit: Unit) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl, ...]:
+def declarations(unit: Unit) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl | RoleDecl, ...]:
     """All declarations of a file, in the order of the text."""
     every: tuple[Any, ...] = (
         *unit.imports, *unit.enums, *unit.signals, *unit.zones, *unit.vehicles, *unit.skills, *unit.templates,
-        *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios,
+        *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios, *unit.roles,
     )  # fmt: skip
     return tuple(sorted(every, key=lambda each: each.span.start))
 
@@ -62,6 +62,8 @@ class _Walk(Conditions):
                     yield from self._rule(rule, scope)
             case PolicyDecl():
                 yield from self._policy(node)
+            case RoleDecl():
+                yield from (Occurrence(each.span, Target(Sort.ROLE, each.text), True) for each in node.names)
             case MissionDecl():
                 yield from self._mission(node)
             case NominalDecl() | TestDecl():

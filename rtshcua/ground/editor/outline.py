@@ -10,6 +10,7 @@ from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.syntax import tokens
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.policies import RoleDecl
 from rtshcua.model.ir.program import Import
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl
@@ -39,7 +40,17 @@ class Fold(NamedTuple):
 
 def outline(cut: Cut) -> tuple[Symbol, ...]:
     """The declarations of a file, in the order of the text."""
-    return tuple(_symbol(cut, each) for each in declarations(cut.parsed.unit) if not isinstance(each, Import))
+    return tuple(symbol for each in declarations(cut.parsed.unit) for symbol in _symbols(cut, each))
+
+
+def _symbols(cut: Cut, node: Declaration | Import | TestDecl | ScenarioDecl | RoleDecl) -> Iterator[Symbol]:
+    match node:
+        case Import():
+            return
+        case RoleDecl():
+            yield from (Symbol(name.text, "role", name.span, name.span) for name in node.names)
+        case _:
+            yield _symbol(cut, node)
 
 
 def _symbol(cut: Cut, node: Declaration | TestDecl | ScenarioDecl) -> Symbol:

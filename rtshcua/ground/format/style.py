@@ -53,6 +53,7 @@ ITEMS = {
     "zone": _style("feature", "hole", cuts=("=", "from")),
     "vehicle": _PART,
     "skill": _PART,
+    "role": _PART,
     "template": _PART,
     "policy": _PART,
     "mission": _PART,

@@ -17,7 +17,7 @@ from rtshcua.ground.language.table import table
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
+from rtshcua.model.ir.policies import PolicyDecl, RoleDecl, TemplateDecl
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
@@ -124,4 +124,5 @@ def _unit(source: Source, declarations: list[Node]) -> Unit:
         nominals=of(NominalDecl),
         tests=of(TestDecl),
         scenarios=of(ScenarioDecl),
+        roles=of(RoleDecl),
     )

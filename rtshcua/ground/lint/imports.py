@@ -48,6 +48,8 @@ class _Needs:
             self.declared[declaration.span.file].add(name)
         for enum in symbols.enums.values():
             self.declared[enum.span.file] |= {member.name.text for member in enum.members}
+        for file, unit in self._units.items():
+            self.declared[file] |= {name.text for declaration in unit.roles for name in declaration.names}
         imported = {self._imports.target(file, each) for file, unit in self._units.items() for each in unit.imports}
         self._roots = {unit.file for unit in subject.asked} | (self._units.keys() - imported)
         self._any = subject.permits_any()

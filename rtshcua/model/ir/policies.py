@@ -7,6 +7,12 @@ from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
 
 
+class RoleDecl(Node):
+    """`role supervisor, trainee`: roles that rules may name. `operator` is one without being declared."""
+
+    names: tuple[Name, ...]
+
+
 class Rule(Node):
     """`permit`, `forbid`, `confirm` or `degrade`.
 

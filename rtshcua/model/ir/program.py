@@ -3,7 +3,7 @@
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
+from rtshcua.model.ir.policies import PolicyDecl, RoleDecl, TemplateDecl
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SkillDecl
@@ -32,3 +32,4 @@ class Unit(Node):
     nominals: tuple[NominalDecl, ...] = ()
     tests: tuple[TestDecl, ...] = ()
     scenarios: tuple[ScenarioDecl, ...] = ()
+    roles: tuple[RoleDecl, ...] = ()

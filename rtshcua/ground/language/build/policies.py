@@ -8,7 +8,7 @@ from rtshcua.ground.language.build.base import Part
 from rtshcua.ground.language.build.skills import Skills
 from rtshcua.model.ir.expression import Condition, Quantity
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, Rule, Silence, TemplateDecl, Use
+from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, RoleDecl, Rule, Silence, TemplateDecl, Use
 from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
 
 Names = tuple[Name, ...]
@@ -83,6 +83,10 @@ class Policies(Skills):
     ) -> Delegation:
         """`delegate goto by role operator to role trainee through agent when altitude <= 10 m`."""
         return Delegation(span=span, skills=skills, grantor=grantor, grantee=grantee, through=through or (), when=when)
+
+    def role(self, span: Span, names: Names) -> None:
+        """`role supervisor, trainee`."""
+        self.declare(RoleDecl(span=span, names=names))
 
     def template(self, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *rules: Rule) -> None:
         """`template low_flight(area: zone, top: altitude) { permit ... }`."""

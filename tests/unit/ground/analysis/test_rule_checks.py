@@ -23,6 +23,7 @@ HEAD = "".join(
 POLICY = """
 zone east_part = circle(47.39779 N, 8.54599 E, 90 m)
 zone by_day = circle(47.39779 N, 8.54559 E, 30 m) active 08:00 .. 18:00
+role trainee, pilot
 policy rules version 1 {{
   permit  hover, return_home, emergency_land by any
   {}

@@ -20,6 +20,7 @@ vehicle glider {
   position error 3 m  energy 100 % = 18 min hover  reserve 15 %  elevation 400 m above sea WITHIN
 }
 zone layer = circle(47.3977 N, 8.5456 E, 200 m) floor FLOOR ceiling 440 m above sea
+role watcher
 policy p version 1 {
   permit hover by role watcher through agent when CONDITION
   permit hover, return_home, emergency_land by any

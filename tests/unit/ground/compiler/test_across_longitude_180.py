@@ -67,6 +67,7 @@ zone cove  = circle(47.39774 N, {3500}, 20 m) entry 47.39774 N, {3600}
 zone way   = corridor(47.39774 N, {0}, 47.3986 N, {-4000}, 47.3986 N, {4000}, width 40 m)
 zone water = union(cove, way, difference(bay, circle(47.3988 N, {-2000}, 8 m)))
 zone reef  from "reef.geojson"
+role pilot
 policy p version 1 {
   permit takeoff, goto by role pilot through operator when altitude <= 30 m
   permit inspect_area by role pilot through operator when area inside grow(bay, 1 m)

@@ -31,6 +31,7 @@ skill watch() {{
   require battery > 40 %  {clause}
   fallback hover for 10 s, return_home, emergency_land  energy at most 4 %
 }}
+role trainee, pilot, chief
 policy rules version 1 {{
   permit takeoff, goto, watch by role operator
   permit hover, return_home, emergency_land by any

@@ -120,6 +120,7 @@ def test_a_permit_without_through_is_for_the_operator_and_a_forbid_for_every_sou
         "contingency hover",
         "permit goto by role pilot when altitude <= 5 m\n  forbid goto by role trainee\n  contingency hover",
     )
+    text += "role pilot, trainee\n"
     found = compiled("missions/standard.rts", {"lib:policies/bridge_inspection.rts": text})
     assert found.policy is not None, found.diagnostics
     rules = {rule.text.split(" when")[0]: rule for rule in found.policy.rules}
@@ -285,7 +286,8 @@ TOO_LARGE = [
     ("lib:policies/bridge_inspection.rts", long_policy("permit hover by role operator\n" * 17_000), "E1001"),
     (
         "lib:policies/bridge_inspection.rts",
-        long_policy("".join(f"permit hover by role r{n}\n" for n in range(70))),
+        long_policy("".join(f"permit hover by role r{n}\n" for n in range(70)))
+        + f"role {', '.join(f'r{n}' for n in range(70))}\n",
         "E1001",
     ),
     ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("12 m/s", "2000 m/s"), "E1003"),

@@ -28,7 +28,8 @@ CONTRACT = """class tactical deadline 5 s valid for 10 min lasts at most 1 min g
 OWN = f"""skill up(high: altitude in 5 m .. 60 m, how: one of fast, slow = fast) {{
   motion climb to high {CONTRACT}skill fly(target: position, high: altitude in 5 m .. 60 m) {{
   motion fly to target at high {CONTRACT}"""
-POLICY = """policy p version 1 {
+POLICY = """role chief
+policy p version 1 {
   permit up by role operator when high <= 20 m
   permit fly by role operator when high <= 30 m
   use low(top = 25 m)

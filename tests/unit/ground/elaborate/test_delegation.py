@@ -1,5 +1,6 @@
 """Delegation: who may what afterwards, against a naive reading of the policy; and what is refused."""
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -171,7 +172,10 @@ REST = """
 
 
 def policy(*lines: str) -> str:
-    return "policy p version 1 {\n" + "\n".join(lines) + REST
+    """A policy with these lines, and a declaration of every role that they name."""
+    named = [names.split(", ") for line in lines for names in re.findall(r"\brole (\w+(?:, \w+)*)", line)]
+    roles = dict.fromkeys(name for names in named for name in names)
+    return "policy p version 1 {\n" + "\n".join(lines) + REST + f"role {', '.join(roles)}\n"
 
 
 def test_a_delegated_rule_is_quoted_with_all_that_made_it(compile_text: Compile, site: str) -> None:

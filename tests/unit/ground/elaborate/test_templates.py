@@ -32,7 +32,7 @@ mission m under p@1 on quad {
 
 
 def policy(*parts: str) -> str:
-    return "policy p version 1 {\n" + "\n".join(parts) + REST + "}\n"
+    return "role pilot, zeppelin, trainee policy p version 1 {\n" + "\n".join(parts) + REST + "}\n"
 
 
 def meaning(rule: Rule) -> tuple[object, ...]:

@@ -44,7 +44,7 @@ def book(**files: str) -> Handbook:
 
 
 def chapter(rules: str) -> Chapter:
-    (found,) = book(p=f"{BEFORE}policy p version 1 {{\n{rules}{AFTER}").chapters
+    (found,) = book(p=f"{BEFORE}role chief policy p version 1 {{\n{rules}{AFTER}").chapters
     return found
 
 
@@ -79,7 +79,8 @@ def test_a_right_in_short_is_what_the_rules_come_to(rules: str, answer: str) -> 
 def test_a_rule_that_is_signed_as_several_is_told_of_each_skill_once() -> None:
     """`altitude` stands in different cells of the arguments of the two skills."""
     found = book(
-        p='import "lib:skills/takeoff.rts"\n' + BEFORE + "policy p version 1 {\npermit goto, takeoff by role operator\n"
+        p='import "lib:skills/takeoff.rts"\n' + BEFORE + "role chief policy p version 1 {\n"
+        "permit goto, takeoff by role operator\n"
         "confirm goto, takeoff when altitude < 10 m by role chief within 30 s" + AFTER
     ).chapters[0]
     told = [rule.told for rule in found.rules if rule.kind == "confirm"]
@@ -120,7 +121,7 @@ def test_of_a_place_that_is_asked_for_the_height_is_said_not_to_count() -> None:
     rules = (
         "permit goto by role operator when target inside tall\npermit hover by role operator when position inside tall"
     )
-    first, second, *_ = book(p=f"{BEFORE}{zone}policy p version 1 {{\n{rules}{AFTER}").chapters[0].rules
+    first, second, *_ = book(p=f"{BEFORE}{zone}role chief policy p version 1 {{\n{rules}{AFTER}").chapters[0].rules
     assert first.told.endswith("the `target` asked for is inside `tall` (on the ground, at whatever height).")
     assert second.told.endswith("`position` is inside `tall`.")
 

@@ -8,7 +8,7 @@ SAFE = "permit hover, return_home, emergency_land by any contingency return_home
 
 
 def codes(rules: str, declarations: str = "") -> list[str]:
-    found = decided(f"{SKILLS}{declarations}\npolicy p version 1 {{ {rules} {SAFE} }}")
+    found = decided(f"{SKILLS}{declarations}\nrole supervisor, trainee policy p version 1 {{ {rules} {SAFE} }}")
     return sorted(code for code, _ in found if code not in ("E1301", "E1305"))
 
 

@@ -91,3 +91,10 @@ def test_without_its_unused_imports_a_source_means_the_same(name: str, monkeypat
     after = load([path], lambda file: kept.get(file) or Path(file).read_bytes(), library)
     assert check_program(after, dialect.load()) == ()
     assert "E1305" not in {each.code.id for each in lint(after)}
+
+
+def test_an_import_is_used_for_a_role() -> None:
+    policy = POLICY.replace("permit ret", "forbid return_home by role ranger through agent permit ret")
+    people = 'import "people.rts"\n' + HEAD + policy
+    assert found(people, people="role ranger, mate") == []
+    assert found(people + "role ranger", people="role mate") == [("E1305", 'import "people.rts"')]

@@ -25,6 +25,7 @@ import "lib:policies/site.rts"
 template low(top: altitude in 5 m .. 60 m) {
   permit hover by role operator through agent when height <= top
 }
+role trainee
 policy own version 2 {
   use low(20 m)
   delegate hover by role operator to role trainee through agent when wind.speed < 5 m/s

@@ -35,6 +35,7 @@ skill rise(top: altitude in 5 m .. 50 m) {
 template calm(most: speed in 1 m/s .. 20 m/s, who: role) {
   permit rise by role who through agent, operator when top <= 30 m and wind.speed <= most
 }
+role trainee, supervisor
 policy small version 3 {
   use      calm(6 m/s, who = operator)
   delegate rise by role operator to role trainee through operator when top <= 12 m

@@ -25,6 +25,7 @@ vehicle equipped {
 ARMS = """
 zone yard = difference(circle(47.3981 N, 8.5456 E, 70 m), circle(47.3982 N, 8.5462 E, 11 m)) active 21:15 .. 05:45
 zone block = circle(47.3981 N, 8.5470 E, 40 m) floor 17 m ceiling 33 m above home
+role pilot
 policy arms version 3 {
   permit goto by role operator, pilot through operator
          when target inside yard or (target inside grow(bridge_a, 7 m) and wind.speed <= 6 m/s)
@@ -87,7 +88,8 @@ def test_what_no_situation_reaches_is_named_where_the_tests_are_read() -> None:
     far = "zone far = circle(47.3981 N, 8.5456 E, 70 m) floor 5 m above home\n"
     text = (
         f"{HEAD}{far}"
-        + """policy arms version 3 {
+        + """role pilot
+policy arms version 3 {
   permit goto by role operator through operator when target inside far or wind.speed <= 200000 m/s and height < 80 m
   permit return_home, emergency_land, hover by any
   forbid goto by any when battery < 20 % and battery > 30 %
@@ -114,7 +116,8 @@ def test_hours_and_dates_of_an_airspace_are_reached() -> None:
     shut = "zone shut = circle(47.3990 N, 8.5470 E, 30 m) active 12:30 .. 14:30\n"
     text = (
         f"{HEAD}{shut}"
-        + """policy arms version 3 {
+        + """role pilot
+policy arms version 3 {
   permit goto, return_home, emergency_land, hover by any
   airspace inside city outside school, shut
   contingency return_home, emergency_land

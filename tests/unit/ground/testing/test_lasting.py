@@ -11,6 +11,7 @@ import "lib:skills/hover.rts"
 import "lib:skills/return_home.rts"
 import "lib:skills/emergency_land.rts"
 
+role supervisor
 policy stacked version 1 {
   permit any by any
   forbid hover by any when ((wind.speed > 6 m/s for the last 8 min) within the last 9 min) for the last 10 min

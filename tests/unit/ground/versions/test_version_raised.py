@@ -59,7 +59,7 @@ policy yard version 3 {
   contingency home, down
 }
 """
-TEXT = 'import "lib:skills/signals.rts"\n' + SKILLS + SITE + POLICY
+TEXT = 'import "lib:skills/signals.rts"\nrole trainee, chief, boss\n' + SKILLS + SITE + POLICY
 
 
 def load_text(text: str) -> Program:

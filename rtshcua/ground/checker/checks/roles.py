@@ -1,0 +1,76 @@
+"""E0202, E0208: a role that rules name is declared, for a misspelt one would be a rule without effect.
+
+That of a mission, of a test's asker and of a fault is one of the policy's, which is looked at where these are lowered.
+"""
+
+from collections.abc import Iterator
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.checks.parameters import ROLE
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.symbols import correction, suggestion
+from rtshcua.model.ir.expression import Reference
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.policies import Rule, Use
+
+#: the role that every vehicle has
+OPERATOR = "operator"
+
+
+def check(context: Context) -> None:
+    """Report every role that is declared twice in a file, and every one that a rule names and nothing declares."""
+    for first, again in context.symbols.roles_again:
+        text = f"the role `{again.text}` is declared twice"
+        context.report.add(codes.DUPLICATE_NAME, again.span, text, labels=[(first.span, "first declared here")])
+    for policy in context.symbols.policies.values():
+        for rule in policy.rules:
+            if not rule.origin:  # what a template or a delegation brought about names what these were given
+                _rule(context, rule, frozenset())
+        for delegation in policy.delegations:
+            for name in (delegation.grantor, delegation.grantee):
+                _role(context, name)
+        for use in policy.uses:
+            for name in _given(context, use):
+                _role(context, name)
+    for template in context.symbols.templates.values():
+        own = frozenset(each.name.text for each in template.parameters if each.type.text == ROLE)
+        for rule in template.rules:
+            _rule(context, rule, own)
+
+
+def _rule(context: Context, rule: Rule, own: frozenset[str]) -> None:
+    """The roles of a rule, but for the `own` parameters of the template that it stands in."""
+    for name in (*rule.roles, rule.approver, rule.another):
+        if name is not None and name.text not in own:
+            _role(context, name)
+
+
+def _given(context: Context, use: Use) -> Iterator[Name]:
+    """The roles that a template is given."""
+    template = context.symbols.templates.get(use.template.text)
+    if template is None:
+        return
+    parameters = {each.name.text: each for each in template.parameters}
+    for place, argument in enumerate(use.arguments):
+        if argument.name is not None:
+            parameter = parameters.get(argument.name.text)
+        else:
+            parameter = template.parameters[place] if place < len(template.parameters) else None
+        value = argument.value
+        if parameter is None or parameter.type.text != ROLE or not isinstance(value, Reference):
+            continue
+        if value.name not in context.symbols.declared:  # else it is something else than a role, which is told elsewhere
+            yield Name(span=value.span, text=value.name)
+
+
+def _role(context: Context, name: Name) -> None:
+    known = {OPERATOR, *context.symbols.roles}
+    if name.text in known:
+        return
+    context.report.add(
+        codes.UNKNOWN_ROLE,
+        name.span,
+        f"there is no role `{name.text}`",
+        help=suggestion(name.text, known) or f"`role {name.text}` declares it, in this file or one that it imports",
+        fix=correction(context.report, name.span, name.text, known),
+    )

@@ -1,0 +1,50 @@
+"""Roles are declared: once in a file, by as many files as like, and under a name that something else may have too."""
+
+import pytest
+
+from reference.sources import IMPORTS, found, policy
+
+TEMPLATE = "template asked(low: altitude, who: role) { confirm hover by role who within 30 s }\n"
+
+
+def told(*parts: str) -> list[tuple[str, str]]:
+    """What is said of roles: the code, and the name."""
+    said = found(IMPORTS + "".join(parts))
+    return [(code, text.split("`")[1]) for code, text in said if code in ("E0208", "E0202", "E0203")]
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "permit hover by role operator, ranger",
+        "forbid hover by role ranger through agent",
+        "confirm hover by role ranger within 30 s",
+        "confirm hover by role operator and another of role ranger within 30 s",
+        "delegate hover by role operator to role ranger",
+        "delegate hover by role ranger to role operator",
+    ],
+)
+def test_a_role_that_a_rule_names_is_declared(rule: str) -> None:
+    assert told(policy(rule)) == [("E0208", "ranger")]
+    assert told("role ranger\n", policy(rule)) == []
+    assert told(policy(rule), "role mate, ranger\n") == [], "wherever it stands"
+    assert told("role Ranger\n", policy(rule)) == [("E0208", "ranger")]
+
+
+def test_a_template_names_its_own_roles_and_is_given_others() -> None:
+    assert told(TEMPLATE, policy("use asked(9 m, ranger)")) == [("E0208", "ranger")]
+    assert told(TEMPLATE, policy("use asked(who = ranger, low = 9 m)")) == [("E0208", "ranger")]
+    assert told("role ranger\n", TEMPLATE, policy("use asked(9 m, ranger)", "use asked(9 m, operator)")) == []
+    assert told(TEMPLATE, policy("use asked(9 m, operator, ranger)", "use nothing(ranger)")) == []
+    assert told(TEMPLATE.replace("by role who", "by role ranger"), policy()) == [("E0208", "ranger")]
+    assert told(TEMPLATE.replace("who: role", "who: altitude"), policy()) == [("E0208", "who")]
+
+
+def test_a_role_is_declared_once_in_a_file() -> None:
+    assert told("role ranger, mate\nrole mate\n", policy()) == [("E0202", "mate")]
+    assert told("role mate, mate\n", policy()) == [("E0202", "mate")]
+    assert told("role operator\n", policy()) == [], "it may be said"
+
+
+def test_a_role_may_be_called_like_something_else() -> None:
+    assert told("role hover, rules, who, role\n", TEMPLATE, policy("forbid hover by role hover, role")) == []

@@ -27,6 +27,7 @@ from rtshcua.cli.documents import (
 from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
 from rtshcua.cli.unlock import terminal, unlock_person
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -94,7 +95,8 @@ def approve(
         )
         told = words.step(flying.policy, steps[step])
         say(f"step {step} of `{flying.mission.name}` on `{said.vehicle}`: `{told}`")
-        if not yes and terminal() and not typer.confirm(f"sign that {_answer(refused)} as {role}?", err=True):
+        question = visible(f"sign that {_answer(refused)} as {role}?")
+        if not yes and terminal() and not typer.confirm(question, err=True):
             return fail(ExitCode.REFUSED, "nothing was signed", slug="not-signed")
         store = KeyStore(data_folder())
         key = unlock_person(store, person, role, path=approval_key, passphrase_file=passphrase_file)

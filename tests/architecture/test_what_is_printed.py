@@ -13,6 +13,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 ALLOWED = {
     "adapters/language_server/prover.py": "logs, of a process whose standard error an editor reads",
     "adapters/language_server/server.py": "speaks the protocol, and logs",
+    "cli/approve.py": "asks; the question passes `visible`",
     "cli/app.py": "the version and the overview: our own words",
     "cli/archiving/checking.py": "a count",
     "cli/archiving/told.py": "a CSV writer; each text passed `visible`",
@@ -23,15 +24,28 @@ ALLOWED = {
     "cli/explain.py": "a page that ships, in colour",
     "cli/faults.py": "errors; each line passes `visible`",
     "cli/fmt.py": "gives the standard input back, laid out, octet for octet",
+    "cli/keys.py": "asks for a passphrase in our own words",
     "cli/live/__main__.py": "lines of `live/lines.py`, each of which passes `visible` or `escaped`",
     "cli/live/screen.py": "in colour; each text passes `visible`",
     "cli/progress.py": "passes `visible`",
     "cli/stdout.py": "the door",
     "cli/testing/flying.py": "passes `visible`",
+    "cli/unlock.py": "asks for a passphrase, by the duty of its key",
     "cli/verify_log.py": "a bar",
     "simulation/process.py": "a process of its own: its ready line is JSON in ASCII, its options are ours",
 }
-PRINTING = {"print", "echo", "secho", "Console", "StreamHandler", "basicConfig"}
+PRINTING = {
+    "print",
+    "echo",
+    "secho",
+    "Console",
+    "StreamHandler",
+    "basicConfig",
+    "confirm",
+    "prompt",
+    "getpass",
+    "input",
+}
 STREAMS = ("sys.stdout", "sys.stderr", "sys.__stdout__", "sys.__stderr__")
 #: what reads a stream's properties only
 HARMLESS = {"isatty", "flush", "fileno", "reconfigure"}

@@ -48,10 +48,14 @@ KINDS: Mapping[str, Callable[[int], str]] = {
 }
 
 
+#: those that the rules name, besides `operator`
+ROLES = f"role supervisor, {', '.join(f'r{number}' for number in range(60))}\n"
+
+
 def policy(kind: str, rules: int) -> str:
     """A source with a policy of so many rules of a kind."""
     lines = "".join(f"  {KINDS[kind](number)}\n" for number in range(rules))
     return (
-        f"{IMPORTS}policy many version 1 {{\n  permit hover, return_home, emergency_land by any\n{lines}"
+        f"{IMPORTS}{ROLES}policy many version 1 {{\n  permit hover, return_home, emergency_land by any\n{lines}"
         "  contingency hover for 10 s, return_home, emergency_land\n}\n"
     )

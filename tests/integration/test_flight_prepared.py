@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from rtshcua.mavlink.parameters import bits_of
-from rtshcua.model.faults import LinkLoss, MessageSilence
+from rtshcua.mavlink.parameters import bits_of, value_of
+from rtshcua.model.faults import Kill, LinkLoss, MessageSilence, PilotMode
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import Ending, Event, Interrupted
@@ -140,4 +140,23 @@ def test_what_a_run_that_died_left_is_put_back_by_the_next(flavour: str) -> None
     assert put_back["seq"] > flown.effects("resumed")[0]["seq"]
     assert has(second, tuple(had)) == had
     assert owed == {}
+    assert flown.audit().report.failure is None
+
+
+@pytest.mark.parametrize(("flavour", "fault", "ending", "says"), [
+    ("px4", PilotMode(at_us=20 * S), Ending.STOOD_DOWN, 1),
+    ("ardupilot", Kill(at_us=20 * S), Ending.CRASHED, 0),
+], ids=["taken over", "crashed"])  # fmt: skip
+def test_what_is_not_known_to_stand_is_left_as_it_is_and_stays_owed(
+    flavour: str, fault: Any, ending: Ending, says: int
+) -> None:
+    had, settings = NARROW[flavour]
+    owed: dict[str, Owed] = {}
+    flight = prepared(flavour, owed, faults=(fault,))
+    flown = flight.fly()
+    assert flown.ending is ending
+    assert len(flown.effects("preparation")) == 1
+    assert len(flown.effects("not-restored")) == says
+    assert has(flight, tuple(had)) == settings
+    assert {name: value_of(each.before) for name, each in owed.items()} == had
     assert flown.audit().report.failure is None

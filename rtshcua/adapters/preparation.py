@@ -102,7 +102,7 @@ class Preparations:
             # what flies is brought down as it is
             return None if flies or not self._settings else "it is not known to stand on the ground: nothing is set"
         if self._trouble is not None:
-            return self._trouble
+            return self._refuse(self._trouble)
         if not self._settings:
             self._restore(turn, BEFORE_US)
             return None  # what is not put back is recorded, and the mission judged by what is there
@@ -110,7 +110,7 @@ class Preparations:
         missing = [name for name in self._settings if name not in values]
         if missing:
             self._restore(turn, BEFORE_US)
-            return f"it does not tell `{'`, `'.join(missing)}`, which is to be set"
+            return self._refuse(f"it does not tell `{'`, `'.join(missing)}`, which is to be set")
         self._forgive(values)
         left = {name for name in self.owed if name not in self._settings and name in values}
         if left:
@@ -125,6 +125,10 @@ class Preparations:
         if problem is not None:
             self._restore(turn, AFTER_US)
         return problem
+
+    def _refuse(self, why: str) -> str:
+        self._record(NOT_PREPARED, why)
+        return why
 
     def _restore(self, turn: Callable[[], bool], within_us: int) -> str | None:
         """Put back all that is owed, as far as it can be."""

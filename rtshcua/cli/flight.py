@@ -130,6 +130,7 @@ class Flight:
         self._preparations = Preparations(
             loaded, vehicle.driver, clock, debts.left, self._record, debts.keep, max(1, round(speed / 5)), debts.trouble
         )
+        self._unprepared, self._told = False, ""
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
@@ -151,7 +152,7 @@ class Flight:
             self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=False)
             raise
         self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
-        if ending is Ending.REFUSED and self._vehicle.driver.unready is not None:
+        if ending is Ending.REFUSED and self._vehicle.driver.unready is not None and not self._unprepared:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
         if ending is Ending.CRASHED:
             self._feed.post(Note(_CRASHED))
@@ -201,7 +202,8 @@ class Flight:
             watch = self._incidents.around(watch, self._start_us)
         problem = self._preparations.begin(self._pass)
         if problem is not None:
-            self._feed.post(Note(problem))
+            self._unprepared = True
+            self._tell_once(problem)
             return Ending.REFUSED
         loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
@@ -242,7 +244,12 @@ class Flight:
     def _put_back(self) -> None:
         problem = self._preparations.end(self._linger)
         if problem is not None:
-            self._feed.post(Note(problem))
+            self._tell_once(problem)
+
+    def _tell_once(self, text: str) -> None:
+        """Tell a person, who is told of each record besides."""
+        if text != self._told:
+            self._feed.post(Note(text))
 
     def _linger(self) -> bool:
         """Let time pass after the loop; False once somebody would not wait."""
@@ -260,6 +267,7 @@ class Flight:
         line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
         self._sink.append(line, SYNCED_FIRST)
         self._sink.settle()
+        self._told = detail
         self._watch(now, (), (Append(line, SYNCED_FIRST),))
 
     def _look_at_utc(self) -> list[Event]:

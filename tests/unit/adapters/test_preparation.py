@@ -67,6 +67,8 @@ def test_a_parameter_that_it_does_not_have_refuses_the_mission() -> None:
     flown = one.fly()
     assert flown.ending is Ending.REFUSED
     assert sent == []
+    (said,) = flown.effects("not-prepared")
+    assert said["detail"] == "it does not tell `GF_ACTION`, which is to be set"
 
 
 def test_a_vehicle_that_keeps_its_own_value_refuses_the_mission(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,8 @@ class Standing(NamedTuple):
 
 def standing(record: Qualification | str | None, firmware: Firmware | None, known: Mapping[str, bytes]) -> Standing:
     """How a vehicle stands that tells this firmware and these parameters. A text in place of the record says why it is
-    not to be trusted; None: there is none.
+    not to be trusted; None: there is none. What was flown in a simulation alone qualifies no
+    vehicle: nobody here can tell whether it is one, for both may have the same identity and address.
     """
     if record is None:
         return Standing(False, "this vehicle is not qualified: there is no record of a flight test of its autopilot")
@@ -30,6 +31,8 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
     changes = record.changes(firmware, known)
     if changes:
         return Standing(False, f"this vehicle was qualified on {day}, and is another now: {'; '.join(changes)}")
+    if not record.pilot:
+        return Standing(False, f"this vehicle was qualified in simulation only, on {day}")
     held = sum(each.outcome == CheckOutcome.HELD for each in record.checks)
     left = sum(each.outcome == CheckOutcome.UNCHECKED for each in record.checks)
     unsaid = [] if firmware is not None else ["it does not tell its version now"]

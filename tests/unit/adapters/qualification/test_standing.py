@@ -19,7 +19,7 @@ HELD = QualificationCheck("stop/fly", CheckOutcome.HELD, "", "")
 LEFT = QualificationCheck("takeover/mode", CheckOutcome.UNCHECKED, "", "")
 FAILED = QualificationCheck("fence/on", CheckOutcome.FAILED, "", "")
 RECORD = Qualification(
-    "quad-07", VERSION, PARAMETERS, parameters_digest(PARAMETERS), bytes(32), "", "0.1",
+    "quad-07", VERSION, PARAMETERS, parameters_digest(PARAMETERS), bytes(32), "ada", "0.1",
     1_767_225_600_000_000, 0, (), (HELD, LEFT),
 )  # fmt: skip
 
@@ -27,6 +27,12 @@ RECORD = Qualification(
 def test_one_that_is_as_it_was_is_qualified() -> None:
     stands = standing(RECORD, VERSION, dict(PARAMETERS))
     assert stands == (True, "qualified on 2026-01-01 for px4 1.16.0: 1 checks hold, 1 were not made")
+
+
+def test_a_simulation_qualifies_no_vehicle() -> None:
+    """Whoever calls both by one identity would fly the real one with a record of the other."""
+    stands = standing(replace(RECORD, pilot=""), VERSION, dict(PARAMETERS))
+    assert stands == (False, "this vehicle was qualified in simulation only, on 2026-01-01")
 
 
 @pytest.mark.parametrize(

@@ -445,11 +445,12 @@ def _takeover(
     sent = max(sent, min(takeover.obeyed_us or sent, sent + (observed.round_trip_us or 0) + _OBEYS_US, shown))
     late = shown - sent
     if takeover.kind is TakeoverKind.MODE:
-        late = max(late, (takeover.mode_us or shown + limit) - sent)
+        if takeover.mode_us is None:
+            only = f"by `{takeover.how}` only: no heartbeat reported the mode"
+            return _check(slug, False, expected, only, limit, None, _US, advice)
+        late = max(late, takeover.mode_us - sent - takeover.unwatched_us)
     moved = takeover.moved_us is not None and takeover.moved_us - sent > limit and not stalls
     measured = f"after {_time(late)}, by `{takeover.how}`"
-    if takeover.kind is TakeoverKind.MODE and takeover.mode_us is None:
-        measured = f"by `{takeover.how}` only: no heartbeat reported the mode"
     if moved:
         measured += f"; a motion frame was sent {_time((takeover.moved_us or 0) - sent)} after"
     return _check(slug, late <= limit and not moved, expected, measured, limit, late, _US, advice)

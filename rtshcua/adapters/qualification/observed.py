@@ -61,7 +61,7 @@ class ObservedAnswer:
 class ObservedTakeover:
     """Somebody else took over. `sent_us` None: a pilot did, nobody knows when. `obeyed_us`: that was acknowledged to
     whoever sent it; `mode_us`: another mode showed in a heartbeat; `shown_us`: the driver told of it, as `how`;
-    `moved_us`: the last frame of ours that moves it left.
+    `moved_us`: the last frame of ours to move it left. `unwatched_us`: how long nobody looked before the mode showed.
     """
 
     kind: TakeoverKind
@@ -71,6 +71,7 @@ class ObservedTakeover:
     shown_us: int | None = None
     how: str = ""
     moved_us: int | None = None
+    unwatched_us: int = 0
 
 
 @dataclass(slots=True)

@@ -136,6 +136,8 @@ _SHOWS_US: Final = 15_000_000
 _AGAIN_US: Final = 2_000_000
 #: mm flown before somebody takes over
 _FAR: Final = 4_000
+#: us without a look at the link that are our own: a run that stood down closes its log before it watches the landing
+_HELD_UP_US: Final = 100_000
 _IN_PROGRESS: Final = 5
 #: what is asked, and not what is commanded
 _QUESTIONS: Final = frozenset({messages.SET_INTERVAL, messages.RUN_PREARM_CHECKS, enums.MAV_CMD_REQUEST_MESSAGE})
@@ -176,6 +178,7 @@ class QualifyingDriver(Driver):
         self._up_us: int | None = None
         self._air_asked = False
         self._mode_asked_us: int | None = None
+        self._ticked_us = 0
 
     # -------------------------------------------------------- what comes in and goes out
 
@@ -192,6 +195,9 @@ class QualifyingDriver(Driver):
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """As any driver, and do what the sortie has it do now."""
+        takeover, ticked_us, self._ticked_us = self.found.takeover, self._ticked_us, now_us
+        if takeover is not None and takeover.mode_us is None and now_us - ticked_us > _HELD_UP_US * self._slack:
+            takeover.unwatched_us += now_us - ticked_us
         events, frames = super().tick(now_us)
         if self.flavour is None:
             return events, frames

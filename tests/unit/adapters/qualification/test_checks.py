@@ -130,6 +130,18 @@ def test_a_takeover_shows_within_what_is_declared_and_the_links_delay(
     assert checks(BRAKED, sortie)[f"takeover/{sortie.name}"].outcome == outcome
 
 
+def test_a_mode_that_shows_late_because_nobody_looked_is_not_late() -> None:
+    """Between standing down and watching the landing a run closes its log."""
+    flown = taken(TakeoverKind.MODE, 100_000)
+    assert flown.takeover is not None
+    flown.takeover.mode_us = S + 600_000
+    assert checks(BRAKED, flown)["takeover/mode"].outcome == FAILED
+    flown.takeover.unwatched_us = 300_000
+    assert checks(BRAKED, flown)["takeover/mode"].outcome == HELD
+    flown.takeover.mode_us = None
+    assert checks(BRAKED, flown)["takeover/mode"].outcome == FAILED
+
+
 def silenced(**about: Any) -> ObservedSortie:
     given: dict[str, Any] = {
         "for_us": 3 * S, "began_us": S, "ended_us": 4 * S, "lost_us": 2 * S + 50_000, "back_us": 4 * S,

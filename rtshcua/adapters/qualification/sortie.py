@@ -178,7 +178,7 @@ class QualifyingDriver(Driver):
         self._up_us: int | None = None
         self._air_asked = False
         self._mode_asked_us: int | None = None
-        self._ticked_us = 0
+        self._looked_us = 0
 
     # -------------------------------------------------------- what comes in and goes out
 
@@ -186,6 +186,7 @@ class QualifyingDriver(Driver):
         """As any driver, but that nothing is heard in a silence."""
         if self._is_silent(now_us):
             return Heard([], [], [])
+        self._look_again(now_us)
         heard = super().receive(datagram, now_us)
         for frame in heard.frames:
             if frame.system == self.system and frame.component == AUTOPILOT:
@@ -195,9 +196,7 @@ class QualifyingDriver(Driver):
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """As any driver, and do what the sortie has it do now."""
-        takeover, ticked_us, self._ticked_us = self.found.takeover, self._ticked_us, now_us
-        if takeover is not None and takeover.mode_us is None and now_us - ticked_us > _HELD_UP_US * self._slack:
-            takeover.unwatched_us += now_us - ticked_us
+        self._look_again(now_us)
         events, frames = super().tick(now_us)
         if self.flavour is None:
             return events, frames
@@ -283,6 +282,12 @@ class QualifyingDriver(Driver):
             return []
         self._mode_asked_us = now_us
         return [messages.request(self.system, "HEARTBEAT")] if now_us - takeover.sent_us < _SHOWS_US else []
+
+    def _look_again(self, now_us: int) -> None:
+        """Somebody looks at the link, after how long?"""
+        takeover, looked_us, self._looked_us = self.found.takeover, self._looked_us, now_us
+        if takeover is not None and takeover.mode_us is None and now_us - looked_us > _HELD_UP_US * self._slack:
+            takeover.unwatched_us += now_us - looked_us
 
     # -------------------------------------------------------- what is seen
 

@@ -106,6 +106,7 @@ class Qualifying:
         self._vehicle = vehicle
         flown = Flight(data, self._config, vehicle=vehicle).fly(most_s=300)
         self.flights.append(flown)
+        vehicle.stand_still(300_000)  # a run closes its log before it watches who lands
         ended_us = clock.elapsed_us
         while not driver.seen.down and clock.elapsed_us - ended_us < 60 * SECOND:
             vehicle.poll(clock.monotonic_us, 100_000)

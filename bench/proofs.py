@@ -18,11 +18,10 @@ from time import perf_counter_ns
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from reference.sealed_log import PIN, SECRET, sealed_log
+from reference.sealed_log import PIN, sealed_log
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import StoredTree, verify_consistency, verify_inclusion
 from rtshcua.evidence.proofs.check import Proven, check_proof
-from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.proofs.make import prove_inclusion
 
 SIZE = 65_536
@@ -96,10 +95,6 @@ def whole_files() -> None:
             f"proofs: a file from epoch {epochs}: {len(data)} octets, {made_ms:.1f} ms from the log of "
             f"{len(log.lines)} records, verified in {checked_ms:.1f} ms ({epochs + 2} signatures)"
         )
-    start = perf_counter_ns()
-    disclosure_root(log.lines, SECRET)
-    each_us = (perf_counter_ns() - start) / len(log.lines) / 1_000
-    print(f"proofs: the tree of records shown in part, at the close: {each_us:.1f} us a record")
 
 
 def main() -> int:

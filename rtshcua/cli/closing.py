@@ -18,18 +18,14 @@ from rtshcua.onboard.ports import Ending
 #: the effect that says in the signed log how many frames its telemetry lacks; the close then has no digest of it
 FRAMES_LOST = "frames-lost"
 
-#: of so many records the root from which they are shown in part is worked out in some 15 s: nobody waits for longer
-_MOST_SHOWN = 200_000
-
 
 def close_log(
     recorder: Recorder, sink: EvidenceWriter, frames: TelemetryFile, now: Callable[[], Now], ending: Ending | None,
-    note: Callable[[str], None], heard: Callable[[bytes], None], disclosure: Callable[[], bytes | None] = lambda: None,
+    note: Callable[[str], None], heard: Callable[[bytes], None],
 ) -> tuple[str, ...]:  # fmt: skip
     """Sign and close the log, and give what of the evidence is missing: nothing, if it is whole.
 
-    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the close's line;
-    `disclosure` gives the root from which records are shown in part, once all of them are on the disk.
+    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the close's line.
     """
     missing: list[str] = []
     tlog, lack = _finish(frames)
@@ -42,13 +38,8 @@ def close_log(
                 sink.append(recorder.seal(at), SYNCED_FIRST)
             sink.append(recorder.effect(at, FRAMES_LOST, detail=lack), WRITTEN)
     if ending is not None:
-        shown = None
-        if recorder.count > _MOST_SHOWN:
-            note("no record of this log can be shown in part: there are too many")
-        else:
-            shown = _settled(sink, disclosure)
         with suppress(OSError):
-            line = recorder.close(now(), ending=ending, tlog=tlog, disclosure=shown)
+            line = recorder.close(now(), ending=ending, tlog=tlog)
             sink.append(line, SYNCED_FIRST)
             heard(line)
     trouble: OSError | None = None
@@ -62,14 +53,6 @@ def close_log(
     elif trouble is not None:
         missing.append(f"whatever the disk did not sync: {_reason(trouble)} ({LOG})")
     return tuple(missing)
-
-
-def _settled(sink: EvidenceWriter, disclosure: Callable[[], bytes | None]) -> bytes | None:
-    try:
-        sink.settle()
-    except OSError:
-        return None
-    return disclosure()
 
 
 def _finish(frames: TelemetryFile) -> tuple[bytes | None, str | None]:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from rtshcua.adapters.files.verification import Asked, verify_carefully
 from rtshcua.cli.beside import anchors_beside, bundle_beside
-from rtshcua.cli.disclosed import disclosed
 from rtshcua.cli.faults import fail
 from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin
@@ -28,7 +27,7 @@ def explained(
     told = Told(number)
     asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     audit = verify_carefully(path, asked, derive=derive, each=told.take)
-    report = disclosed(audit.report, path, audited=True)
+    report = audit.report
     if told.record is None:
         if report.failure is None:
             return fail(ExitCode.INPUT, f"`{path}` has no record {number}: it ends after {report.records}")

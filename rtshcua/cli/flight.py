@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rtshcua.adapters.clock import LinkClock, StepWatch
-from rtshcua.adapters.files.logs import disclosure_of
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
@@ -321,7 +320,6 @@ class Flight:
             self._recorder, self._sink, self._frames, self._clock.now, ending,
             lambda text: self._feed.post(Note(text)),
             self._agents.tell if self._agents is not None else lambda line: None,
-            lambda: disclosure_of(self._run.path / LOG, self._recorder.count),
         )  # fmt: skip
 
     def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...]) -> Summary:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.logs import write_secret
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
@@ -44,7 +43,6 @@ from rtshcua.cli.unlock import unlock
 from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.proofs.disclosure import SECRET_BYTES
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
@@ -179,7 +177,6 @@ def launch(order: Launch) -> ExitCode:
             _expect_link_key(signing, root, resumed=resumed)
             told = trust.settle(resumed=resumed)
             run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
-            write_secret(run.path, secrets.token_bytes(SECRET_BYTES))
             feed = view.enter_context(Feed(order.style))
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,

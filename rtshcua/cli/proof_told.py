@@ -41,7 +41,6 @@ def as_object(result: Told, path: Path, pinned: Pin, code: ExitCode) -> dict[str
         "log_key": _key(result),
         "size": result.size if isinstance(result, Received) else result.checkpoint.size,
         "record": _record(result),
-        "withheld": list(result.withheld) if isinstance(result, Proven) else [],
         "proven": [claim._asdict() for claim in claims(result)[0]],
         "not_proven": [claim._asdict() for claim in claims(result)[1]],
     }
@@ -102,13 +101,6 @@ def claims(result: Proven | Received) -> tuple[list[Claim], list[Claim]]:
             more = f"what was added since record {result.number}, and what any record says: `verify-log` proves a log"
             unproven[0] = Claim("rest", more)
             what = Claim("consistency", f"{text}: none of those was changed, added or taken out")
-        case Kind.DISCLOSURE:
-            stated = f"as whoever signed the close of the log of {size} stated them"
-            what = Claim("disclosure", f"the fields above are those of record {result.number}, {stated}")
-            sealed = "that the fields are those of the line as sealed: who held the last epoch's key could have stated"
-            unproven.insert(0, Claim("fields", f"{sealed} others; `verify-log --audit` tells its owner"))
-            withheld = ", ".join(f"`{field}`" for field in result.withheld)
-            unproven.insert(0, Claim("withheld", f"what was withheld: {withheld}"))
         case Kind.RECORD:
             what = Claim("record", f"record {result.number} was signed itself, as it stands here")
     cosigned = result.believed.cosigned
@@ -132,9 +124,7 @@ def _key(result: Proven | Received) -> str:
 
 
 def _record(result: Proven | Received) -> dict[str, object] | None:
-    """The fields that are shown, of the record that is proven."""
-    if isinstance(result, Proven) and result.values is not None:
-        return {key: msgspec.json.decode(value) for key, value in result.values.items()}
+    """The fields of the record that is proven."""
     if result.record is None:
         return None
     fields: dict[str, object] = msgspec.json.decode(encode(result.record))

@@ -9,7 +9,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.logs import SECRET, begins_as_log, lines, read_anchors, read_secret
+from rtshcua.adapters.files.logs import begins_as_log, lines, read_anchors
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
 from rtshcua.adapters.store.writing import replace
@@ -20,7 +20,6 @@ from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.cose_receipt import TAG_18
-from rtshcua.evidence.proofs.disclosure import FIELDS
 from rtshcua.evidence.proofs.file import MAX_PROOF, Kind
 from rtshcua.evidence.proofs.make import (
     Lines,
@@ -28,7 +27,6 @@ from rtshcua.evidence.proofs.make import (
     cosigned_sizes,
     is_anchored,
     prove_consistency,
-    prove_disclosure,
     prove_inclusion,
     receipt_of,
     with_cosignatures,
@@ -38,7 +36,6 @@ from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-_FIELDS = {field for fields in FIELDS.values() for field in fields}
 _BEGINNINGS = tuple(f"{kind}\n".encode() for kind in Kind)
 _IN_RECEIPT = b"rtshcua/record"
 _TRIED = 16  # checkpoints with notes of witnesses, of which the log may be read for each
@@ -46,7 +43,6 @@ _UNANCHORED = "  not anchored: too few witnesses cosigned the checkpoint that vo
 _CODES = {
     "proof/number": ExitCode.INPUT,
     "proof/unsealed": ExitCode.INCOMPLETE,
-    "proof/secret": ExitCode.UNTRUSTED,
     "proof/too-long": ExitCode.INPUT,
     "proof/no-log": ExitCode.INPUT,
     "genesis/format": ExitCode.UNTRUSTED,
@@ -67,9 +63,6 @@ def prove(
         " this signed record")] = None,
     at: Annotated[int | None, typer.Option(metavar="SIGNED", min=0, help="the signed record that vouches for it"
         " [default: the first after RECORD; with --since, the last]")] = None,
-    redact: Annotated[str | None, typer.Option(metavar="FIELD,...", help="withhold these fields of the record")] = None,
-    secret: Annotated[Path | None, typer.Option(help="the log's secret, for --redact [default: beside the log]")]
-    = None,
     cose: Annotated[bool, typer.Option("--cose", help="a COSE receipt (RFC 9942), signed by the log key now")] = False,
     log_key: Annotated[Path | None, typer.Option(help="the log key, for --cose [default: the key store's]")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
@@ -86,8 +79,8 @@ def prove(
         two = f"record {record} and `--since {since}` are two things to prove, in two files"
         text = "say what is to be proven" if record is None else two
         return fail(ExitCode.USAGE, text, "the number of a record, or `--since`")
-    if (redact is not None or cose) and (record is None or (redact is not None and (cose or at is not None))):
-        return fail(ExitCode.USAGE, "these options do not go together", "`--redact` and `--cose` prove a record")
+    if cose and record is None:
+        return fail(ExitCode.USAGE, "these options do not go together", "`--cose` proves a record")
     if output is not None and not _replaceable(output):
         return fail(ExitCode.USAGE, f"`{output}` is no proof, and is not replaced by one", "another name, for `-o`")
     path = log / LOG if log.is_dir() else log
@@ -101,12 +94,6 @@ def prove(
         if record is None:
             assert since is not None
             made, name = prove_consistency(read, since, at), f"since-{since}.consistency-proof"
-        elif redact is not None:
-            withheld = {field.strip() for field in redact.split(",")} - {""}
-            if unknown := sorted(withheld - _FIELDS):
-                return fail(ExitCode.USAGE, f"no record has a field `{unknown[0]}`", f"accepted: {_fields()}")
-            own = read_secret(path.parent / SECRET, path.parent) if secret is None else read_secret(secret)
-            made, name = prove_disclosure(read, record, own, withheld), f"record-{record}.redacted-proof"
         elif cose:
             key = unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
             made, name = _receipt(read, record, at, key), f"record-{record}.cose"
@@ -119,7 +106,7 @@ def prove(
     if not cose:
         notes = (*read_anchors(path), *anchored(read()))
         made = with_cosignatures(made, notes)
-        if at is None and redact is None and not is_anchored(made):
+        if at is None and not is_anchored(made):
             made = _nearest(read, record, since, notes) or made
     target = output or Path(name)
     replace(target, made)
@@ -164,7 +151,3 @@ def _nearest(read: Lines, record: int | None, since: int | None, notes: tuple[st
         if not isinstance(made, Flaw) and is_anchored(found := with_cosignatures(made, notes)):
             return found
     return None
-
-
-def _fields() -> str:
-    return ", ".join(f"`{field}`" for field in sorted(_FIELDS - {"_prev", "seq", "type"}))

@@ -32,7 +32,6 @@ _CODES = {
     State.TAMPERED: ExitCode.EVIDENCE,
     State.FOREIGN: ExitCode.UNTRUSTED,
 }
-_UNHURRIED = 1 << 53
 _KEPT = "nothing was changed: every byte of it is where it was"
 _HELPS = {
     State.TAMPERED: f"{_KEPT}; `rtshcua verify-log` says more",
@@ -61,7 +60,7 @@ def recover_logs(
     signer = None
     if not dry_run:
         key = unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
-        signer = signer_of(key)._replace(most_disclosed=_UNHURRIED)
+        signer = signer_of(key)
     state = state_dir or state_folder()
     return of_each(logs_meant(logs), lambda path, _: _recover(path, signer, state, as_json=as_json))
 

@@ -11,7 +11,6 @@ import typer
 
 from rtshcua.adapters.files.verification import Asked, Progress, verify_carefully, verify_quickly
 from rtshcua.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
-from rtshcua.cli.disclosed import disclosed
 from rtshcua.cli.faults import distrust, fail, of_each
 from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin, pin
@@ -119,7 +118,6 @@ def _verify(
     report = audit.report
     if raw is not None:
         report = raw.unread(report) if wanted.fast else raw.judged(report, followed=wanted.audit and wanted.derive)
-    report = disclosed(report, path, audited=wanted.audit)
     report = with_summary(_required(report) if wanted.anchored else report, path)
     report = unconfirmed.told(with_unread(with_simulated(report, path), path))
     audit = audit._replace(report=report)

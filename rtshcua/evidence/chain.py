@@ -232,12 +232,11 @@ class Recorder:
         )
         return self._certified(recover, key)
 
-    def close(self, now: Now, *, ending: str, tlog: bytes | None, disclosure: bytes | None = None) -> bytes:
-        """The last line. `tlog` is the SHA-256 of the telemetry log, `disclosure` the root of the disclosure tree."""
+    def close(self, now: Now, *, ending: str, tlog: bytes | None) -> bytes:
+        """The last line. `tlog` is the SHA-256 of the telemetry log."""
         last = self._epoch_key()
         close = Close(
             **self._segment(now),
-            disclosure=None if disclosure is None else disclosure.hex(),
             ending=ending,
             tlog=None if tlog is None else tlog.hex(),
             type="close",

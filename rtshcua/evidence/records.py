@@ -227,8 +227,8 @@ class Recover(Record, frozen=True):
 
 
 class Close(Record, frozen=True):
-    """The last record: a seal after which nothing follows. `tlog` is the SHA-256 of the telemetry log, `disclosure` the
-    root of the tree from which records are shown in part (docs/log-format.md, section 6); null where there is none.
+    """The last record: a seal after which nothing follows. `tlog` is the SHA-256 of the telemetry log, null where
+    there is none.
     """
 
     prev: Hash
@@ -236,7 +236,6 @@ class Close(Record, frozen=True):
     bytes: Count
     checkpoint: str | None
     digest: Hash
-    disclosure: Hash | None
     ending: str
     epoch: Count
     records: Count

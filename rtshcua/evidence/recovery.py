@@ -170,14 +170,12 @@ class Examination:
 
 
 def ending(
-    examined: Examined, now: Now, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes],
-    disclose: Callable[[bytes], bytes | None] = lambda line: None,
-) -> bytes:  # fmt: skip
+    examined: Examined, now: Now, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]
+) -> bytes:
     """The two lines that end a log in state `WHOLE` or `TORN` after what is kept of it: `recover` and `close`.
 
-    `certify` signs with the log key `public`, `draw` gives 32 secret random bytes for the key of the close, `disclose`
-    the root of the disclosure tree over what is kept and the `recover`, or None. Where the clock says that it is
-    earlier than the log does, the error of its UTC is stated as great as that makes it.
+    `certify` signs with the log key `public`, `draw` gives 32 secret random bytes for the key of the close. Where the
+    clock says that it is earlier than the log does, the error of its UTC is stated as great as that makes it.
     """
     assert examined.genesis is not None
     assert examined.state in RECOVERABLE
@@ -186,7 +184,7 @@ def ending(
     origin = origin_of(examined.genesis.vehicle, examined.genesis.boot)
     recorder = Recorder.resumed(examined.head, origin, certify, public, draw)
     recover = recorder.recover(now, discarded_bytes=examined.discarded, discarded_digest=examined.discarded_digest)
-    return recover + recorder.close(now, ending=RECOVERED, tlog=None, disclosure=disclose(recover))
+    return recover + recorder.close(now, ending=RECOVERED, tlog=None)
 
 
 def _read(line: bytes) -> AnyRecord | Flaw:

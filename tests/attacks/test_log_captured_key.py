@@ -105,7 +105,7 @@ def test_a_rollback_that_goes_on_from_an_older_seal() -> None:
 
 def test_a_recover_by_the_key_of_the_epoch() -> None:
     """A recovery would let the thief discard what it likes: only the log key signs one."""
-    dropped = ("disclosure", "ending", "tlog")
+    dropped = ("ending", "tlog")
     recover = {name: value for name, value in read(closed_at(TAKEN)).items() if name not in dropped}
     recover |= {"type": "recover", "discarded_bytes": 0, "discarded_digest": "00" * 32}
     recover |= {"next_key": public_of(STRANGER).hex()}
@@ -130,7 +130,7 @@ def test_the_log_key_alone_writes_all_of_it_anew() -> None:
 def test_the_log_key_alone_cuts_the_log_anywhere_and_calls_it_a_crash(number: int) -> None:
     own, secret = public_of(STRANGER).hex(), LOG_KEY.private.private_bytes_raw()
     close = read(closed_at(number - 1))
-    recover = {name: value for name, value in close.items() if name not in ("disclosure", "ending", "tlog")}
+    recover = {name: value for name, value in close.items() if name not in ("ending", "tlog")}
     recover |= {"type": "recover", "discarded_bytes": 0, "discarded_digest": "00" * 32, "next_key": own}
     forged = captured([*LINES[:number], write(recover), closed_at(number - 1)], secret, STRANGER)
     assert forged[:number] == list(LINES[:number])

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from reference.proof_parts import (
     OTHER,
     consistency,
-    disclosure,
     inclusion,
     slug_of_receipt,
 )
@@ -18,7 +17,7 @@ from virtual.rows import rows
 
 
 def test_what_is_put_together_again_is_believed() -> None:
-    for parts in (inclusion(3), inclusion(18), consistency(6), disclosure(3, "detail")):
+    for parts in (inclusion(3), inclusion(18), consistency(6)):
         assert parts.slug() == "believed"
 
 

@@ -9,7 +9,6 @@ from reference.proof_parts import (
     Parts,
     changed_root,
     consistency,
-    disclosure,
     inclusion,
     origin,
     receipt_of_record,
@@ -198,7 +197,7 @@ def test_a_consistency_proof_of_other_sizes() -> None:
 
 
 def test_one_kind_passes_for_another() -> None:
-    kinds = [inclusion(3), consistency(6), disclosure(3, "detail"), inclusion(18)]
+    kinds = [inclusion(3), consistency(6), inclusion(18)]
     for parts in kinds:
         for other in kinds:
             if other.kind != parts.kind:

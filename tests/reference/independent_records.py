@@ -191,7 +191,5 @@ FORMS = {
     "recover": _ALL
     | _SEGMENT
     | {"discarded_bytes": count, "discarded_digest": digits(64), "next_key": digits(64), "type": text},
-    "close": _ALL
-    | _SEGMENT
-    | {"disclosure": or_null(digits(64)), "ending": text, "tlog": or_null(digits(64)), "type": text},
+    "close": _ALL | _SEGMENT | {"ending": text, "tlog": or_null(digits(64)), "type": text},
 }

@@ -5,7 +5,6 @@ Run it as `python tests/reference/independent_verifier.py LOG ROOTKEY_HEX [ANCHO
 """
 
 import hashlib
-import hmac
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -253,16 +252,6 @@ class Walk:
                         seen[public] = max(note.size, seen.get(public, 0))
         sizes = sorted(seen.values(), reverse=True)
         return sizes[enough - 1] if len(sizes) >= enough else 0
-
-
-def disclosed(line: bytes, n: int, secret: bytes) -> bytes:
-    """d_n of section 6."""
-    record = parse(line)
-    fields = []
-    for key in sorted(record):
-        salt = hmac.digest(secret, b"%d\0" % n + key.encode(), "sha256")
-        fields.append(hashlib.sha256(salt + key.encode() + b"\0" + canonical(record[key])).digest())
-    return hashlib.sha256(b"\0" + b"".join(fields)).digest()
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -39,7 +39,7 @@ def whole() -> tuple[bytes, ...]:
             records.append(decision | times(number))
         else:
             records.append(effect(number, detail='"\\\n\u00e9\U0001f681' if number % 5 == 0 else "", token=number))
-    return tuple(log(*records, close(RECORDS, disclosure="ab" * 32)))
+    return tuple(log(*records, close(RECORDS, tlog="ab" * 32)))
 
 
 def flipped(data: bytes, at: int) -> bytes:

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from reference.forgery import LOG_KEY, flight, public_of, read, resealed, seed_of
 from reference.independent_note import read_note
-from reference.independent_verifier import disclosed, leaf, merkle
+from reference.independent_verifier import leaf, merkle
 from reference.resealing import Fields, line_of
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.trust import Thresholds, TrustRoot
@@ -27,7 +27,6 @@ from virtual import case
 
 FOLDER = Path(__file__).parents[1] / "vectors" / "log"
 WITNESSES = {f"rtshcua/witness/{n}": bytes([0xA0 + n]) * 32 for n in (1, 2, 3)}
-SECRET = b"\x5e" * 32
 MONOTONIC_US, UTC_US = 7_000_000, case.flat.ISSUED + 60_000_000
 NULL = "0" * 64
 #: a name that the origin escapes
@@ -93,7 +92,7 @@ def seal(ms: int, number: int, **fields: object) -> Fields:
 
 def close(ms: int, **fields: object) -> Fields:
     """A close."""
-    return sealing("close", ms, disclosure=None, ending="completed", tlog=None) | fields
+    return sealing("close", ms, ending="completed", tlog=None) | fields
 
 
 def log(*records: Fields) -> list[bytes]:
@@ -102,15 +101,13 @@ def log(*records: Fields) -> list[bytes]:
 
 
 def sealed() -> list[bytes]:
-    """Four epochs, one of them empty; texts that JCS is particular about; a disclosure root."""
+    """Four epochs, one of them empty; texts that JCS is particular about."""
     odd = 'quote " backslash \\ tab \t bell \x07 delete \x7f line \u2028 \u00e9 \U0001f681 <&>/'
     records = [
         genesis(), effect(10), effect(20, detail=odd), effect(20, event="landed", durability=2), seal(30, 1),
         seal(40, 2), *(effect(50 + n, token=n) for n in range(5)), seal(9_000, 3), effect(29_000),
     ]  # fmt: skip
-    lines = log(*records)
-    disclosure = merkle([disclosed(line, n, SECRET) for n, line in enumerate(lines)]).hex()
-    return log(*records, close(29_001, disclosure=disclosure, tlog="ab" * 32))
+    return log(*records, close(29_001, tlog="ab" * 32))
 
 
 def recovered() -> tuple[list[bytes], bytes]:
@@ -243,7 +240,6 @@ def made() -> dict[str, bytes]:
         "log": {"seed": LOG_KEY.private.private_bytes_raw().hex(), "public": LOG_KEY.public.hex()},
         "epochs": [{"seed": n.to_bytes(32).hex(), "public": public_of(n.to_bytes(32)).hex()} for n in range(1, 13)],
         "witnesses": {n: {"seed": s.hex(), "public": public_of(s).hex()} for n, s in WITNESSES.items()},
-        "secret": SECRET.hex(),
     }
     for name, value in (("keys", keys), ("expected", of), ("rejected", rejected)):
         files[f"{name}.json"] = json.dumps(value, indent=1, ensure_ascii=False).encode() + b"\n"

@@ -11,14 +11,12 @@ from functools import cache
 from random import Random
 from typing import Any
 
-from reference.sealed_log import LOG_KEY, PIN, SECRET, SealedLog, sealed_log, sign
+from reference.sealed_log import LOG_KEY, PIN, SealedLog, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import Received, check_receipt
-from rtshcua.evidence.proofs.disclosure import FIELDS
 from rtshcua.evidence.proofs.make import (
     prove_consistency,
-    prove_disclosure,
     prove_inclusion,
     receipt_of,
     with_cosignatures,
@@ -46,7 +44,6 @@ def proofs() -> tuple[bytes, ...]:
         last = len(log.lines) - 1
         made += [prove_inclusion(lambda log=log: log.lines, number) for number in (1, 8, last - 1, last)]
         made += [prove_consistency(lambda log=log: log.lines, old) for old in log.signed[:-1]]
-        made += [prove_disclosure(lambda log=log: log.lines, n, SECRET, ["state", "detail"]) for n in (1, 8)]
         made += [receipt_of(lambda log=log: log.lines, n, None, kid=LOG_KEY.kid, signer=sign) for n in (1, 8)]
     made += [with_cosignatures(_sound(made[0]), [cosigned(logs()[0])])]
     return tuple(_sound(proof) for proof in made)
@@ -99,9 +96,6 @@ def _true(result: Proven | Received, log: SealedLog) -> bool:
     notes = {json.loads(log.lines[at])["checkpoint"].rpartition("\n\n")[0] + "\n" for at in log.signed}
     if result.checkpoint.text() not in notes or (result.older and result.older.text() not in notes):
         return False
-    if result.values is not None:
-        shown = {key: json.loads(value) for key, value in result.values.items()}
-        return shown.items() <= true.items() and {*shown, *result.withheld} == set(FIELDS[true["type"]])
     if result.record is None:
         return result.older is not None and result.older.size == result.number
     if result.record is result.signed:
@@ -149,6 +143,17 @@ def _lines(data: bytes, of: Random) -> bytes:
     return b"\n".join(lines)
 
 
+def _path(data: bytes, of: Random) -> bytes:
+    """Another hash in the place of one of the path, or of two, or one more, or one less."""
+    head, blank, note = data.partition(b"\n\n")
+    lines = head.split(b"\n")
+    if data[:1] == b"\xd2" or len(lines) < 4:
+        return data
+    at = of.randrange(3, len(lines))
+    lines[at : at + of.choice((0, 1, 1, 2))] = [b64encode(of.randbytes(32))] * of.choice((0, 1, 1, 1))
+    return b"\n".join(lines) + blank + note
+
+
 def _parts(data: bytes, of: Random) -> bytes:
     """Takes apart what a proof carries, and changes it."""
     other = of.choice(proofs())
@@ -192,4 +197,4 @@ def _changed(value: Any, theirs: Any, of: Random) -> Any:
     return of.choice((None, 0, 1, -1, 7, True, "", b"", (), {}, 1 << 60))
 
 
-_MUTATIONS: tuple[Callable[[bytes, Random], bytes], ...] = (_octets, _lines, *[_parts] * 4)
+_MUTATIONS: tuple[Callable[[bytes, Random], bytes], ...] = (_octets, _lines, _path, *[_parts] * 4)

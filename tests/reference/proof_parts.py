@@ -7,11 +7,11 @@ from typing import Any
 
 import msgspec
 
-from reference.sealed_log import LOG_KEY, PIN, SECRET, SealedLog, sealed_log, sign
+from reference.sealed_log import LOG_KEY, PIN, SealedLog, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.check import check_proof
 from rtshcua.evidence.proofs.cose_receipt import check_receipt
-from rtshcua.evidence.proofs.make import prove_consistency, prove_disclosure, prove_inclusion, receipt_of
+from rtshcua.evidence.proofs.make import prove_consistency, prove_inclusion, receipt_of
 from rtshcua.wire import cbor
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
@@ -42,10 +42,6 @@ class Parts:
 
 def inclusion(number: int, log: SealedLog = LOG, at: int | None = None) -> Parts:
     return Parts(prove_inclusion(lambda: log.lines, number, at))
-
-
-def disclosure(number: int, *withheld: str, log: SealedLog = LOG) -> Parts:
-    return Parts(prove_disclosure(lambda: log.lines, number, SECRET, withheld))
 
 
 def consistency(old: int, at: int | None = None, log: SealedLog = LOG) -> Parts:

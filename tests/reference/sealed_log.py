@@ -7,7 +7,6 @@ from typing import NamedTuple
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.heads import Head
-from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.situation import Context, Now, State
@@ -16,7 +15,6 @@ from rtshcua.wire.keys import Duty
 from rtshcua.wire.request import Ref
 from virtual import case
 
-SECRET = bytes(range(32))
 PIN = case.KEYS[Duty.ROOT].public
 LOG_KEY = case.KEYS[Duty.LOG]
 VEHICLE = "quad 07/é"
@@ -68,8 +66,7 @@ def sealed_log(epochs: int = 3, records: int = 5, *, recovers: bool = False, clo
             lines.append(recorder.seal(now(len(lines))))
     if closed:
         signed.append(len(lines))
-        disclosure = disclosure_root(lines, SECRET)
-        lines.append(recorder.close(now(len(lines)), ending="completed", tlog=bytes(32), disclosure=disclosure))
+        lines.append(recorder.close(now(len(lines)), ending="completed", tlog=bytes(32)))
     return SealedLog(tuple(lines), tuple(signed))
 
 

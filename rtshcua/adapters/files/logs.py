@@ -1,28 +1,21 @@
-"""Reading a log without trusting it, and the files beside it: its anchors, and its secret.
-
-`*.anchors` holds notes one after another, each ended by an empty line. `log.secret` holds 32 random octets, without
-which no record of the log can be shown in part. Its owner alone may read it: with it the fields that were withheld can
-be guessed (docs/log-format.md, section 6).
+"""Reading a log without trusting it, and the anchors beside it: `*.anchors` holds notes one after another, each ended
+by an empty line.
 """
 
 import errno
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from itertools import count
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from rtshcua.adapters.store.reading import exposed, open_regular, read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, append, write_new
-from rtshcua.evidence.proofs.disclosure import SECRET_BYTES, disclosure_root
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.writing import append
 from rtshcua.evidence.reading import LONGEST
 from rtshcua.evidence.witnessing.anchors import notes
-from rtshcua.wire.untrusted import Untrusted
 
 #: what the first line of every log begins with
 START: Final = b'{"_prev":"'
 ANCHORS: Final = ".anchors"
-SECRET: Final = "log.secret"
 #: more of a file of anchors than this, and more files of them than this in a folder, are not looked at
 _LARGEST: Final = 16 << 20
 _MOST: Final = 64
@@ -85,40 +78,3 @@ def read_named(path: Path) -> list[str]:
 def add_anchors(path: Path, found: list[str], root: Path | None = None) -> None:
     """Put notes behind those of a file, and on the disk. Raises OSError, also for a link there, or below `root`."""
     append(path, "".join(f"{note}\n" for note in found).encode(), root)
-
-
-# ---------------------------------------------------------------------------------------- the secret
-
-
-class SecretError(Untrusted):
-    """A secret that does not serve: `exposed`, `malformed`."""
-
-
-def write_secret(folder: Path, secret: bytes) -> None:
-    """Keep the secret of the log that is about to begin in this folder. Raises FileExistsError and OSError."""
-    write_new(folder / SECRET, secret, mode=PRIVATE_FILE)
-
-
-def read_secret(path: Path, root: Path | None = None) -> bytes:
-    """The secret in a file that its owner alone may read. Raises `SecretError` and OSError, as `open_regular`."""
-    with open_regular(path, root) as file:
-        if why := exposed(file):
-            raise SecretError("exposed", f"others may read the secret `{path}`: {why}")
-        data = file.read(SECRET_BYTES + 1)
-    if len(data) != SECRET_BYTES:
-        raise SecretError("malformed", f"`{path}` is no secret of a log: it has not {SECRET_BYTES} bytes")
-    return data
-
-
-def disclosure_of(log: Path, records: int, before: Iterable[bytes] | None = None) -> bytes | None:
-    """The disclosure root for the close of a log that stands on the disk with so many records, unless its lines are
-    given otherwise; None where it does not, or its folder has no usable secret.
-    """
-    numbers = count()
-    try:
-        with open_regular(log) as file:
-            numbered = zip(lines(file) if before is None else before, numbers, strict=False)
-            root = disclosure_root((line for line, _ in numbered), read_secret(log.parent / SECRET, log.parent))
-    except (OSError, ValueError):  # an `Untrusted` is a ValueError too
-        return None
-    return root if next(numbers) == records else None

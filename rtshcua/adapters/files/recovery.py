@@ -14,14 +14,13 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from hashlib import sha256
-from itertools import chain, count, islice
+from itertools import count, islice
 from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.files.evidence import SYSTEM, Disk, LogFile, write_all
-from rtshcua.adapters.files.logs import disclosure_of, lines
+from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.reading import read
@@ -38,17 +37,12 @@ class InUse(Exception):
 
 
 class Signer(NamedTuple):
-    """Who ends logs: signs with the log key `public`, at a moment; `draw` gives 32 secret random bytes.
-
-    So that records of a log with more than `most_disclosed` records can be shown in part, it must be asked for more:
-    working that out takes longer than all the rest.
-    """
+    """Who ends logs: signs with the log key `public`, at a moment; `draw` gives 32 secret random bytes."""
 
     public: bytes
     certify: Callable[[bytes], bytes]
     draw: Callable[[], bytes]
     now: Callable[[], Now]
-    most_disclosed: int = 20_000
 
 
 class Recovered(NamedTuple):
@@ -95,19 +89,10 @@ def recover(path: Path, signer: Signer, *, disk: Disk = SYSTEM) -> Recovered:
         if found.state not in RECOVERABLE:
             return Recovered(found, False, None, found.head.prev)
         discarded = _keep(path, found.kept, disk) if found.discarded else None
-        tail = ending(
-            found, signer.now(), signer.certify, signer.public, signer.draw, partial(_disclosed, path, found, signer)
-        )
+        tail = ending(found, signer.now(), signer.certify, signer.public, signer.draw)
         _write_plan(_plan_of(path), tail, disk)
         _end(path, found.kept, tail, disk)
         return Recovered(found, True, discarded, _last(tail))
-
-
-def _disclosed(path: Path, found: Examined, signer: Signer, recover: bytes) -> bytes | None:
-    if found.records > signer.most_disclosed:
-        return None
-    with open_regular(path) as file:
-        return disclosure_of(path, found.records + 1, chain(islice(lines(file), found.records), [recover]))
 
 
 # ------------------------------------------------------------------------------------------ what was begun

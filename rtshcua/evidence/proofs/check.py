@@ -10,13 +10,10 @@ The steps, as the comments number them:
 
 from typing import NamedTuple
 
-import msgspec
-
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import verify_consistency, verify_inclusion
 from rtshcua.evidence.note import Checkpoint
-from rtshcua.evidence.proofs.disclosure import FIELDS, combined, field_hash
 from rtshcua.evidence.proofs.file import Extra, Kind, ProofFile, read_extra, read_proof
 from rtshcua.evidence.proofs.trust import Believed, believe
 from rtshcua.evidence.reading import read
@@ -34,7 +31,6 @@ from rtshcua.evidence.records import (
 class Proven(NamedTuple):
     """What a proof proves. `checkpoint` is the head of the log that was signed, `signed` the record that carries it;
     `older` the head that the log went on from (consistency), `record` the record that is in it (inclusion, record).
-    Of a record that is shown in part there are `values` (JSON) by field, and the names of those `withheld`.
     """
 
     kind: Kind
@@ -44,8 +40,6 @@ class Proven(NamedTuple):
     signed: Signed
     older: Checkpoint | None = None
     record: AnyRecord | None = None
-    values: dict[str, bytes] | None = None
-    withheld: tuple[str, ...] = ()
 
 
 def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
@@ -57,7 +51,7 @@ def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
     extra = read_extra(file.extra)
     if isinstance(extra, Flaw):
         return extra
-    if bool(extra.record) != (file.kind is Kind.INCLUSION) or bool(extra.fields) != (file.kind is Kind.DISCLOSURE):
+    if bool(extra.record) != (file.kind is Kind.INCLUSION):
         return Flaw("proof/extra", "it carries other parts than its kind has")
     signed = _record(extra.signed)
     record = _record(extra.record) if extra.record else None
@@ -122,49 +116,6 @@ def _consistency(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
     return proven._replace(older=older)
 
 
-def _disclosure(proven: Proven, file: ProofFile, extra: Extra) -> Proven | Flaw:
-    close = proven.signed
-    if not isinstance(close, Close) or close.disclosure is None:
-        return Flaw("proof/disclosure", "the record that carries the checkpoint has no root for records shown in part")
-    hashes, values, withheld = [], {}, []
-    for field in extra.fields:
-        match field:
-            case key, (digest,):
-                withheld.append(key)
-                hashes.append(digest)
-            case key, (salt, value) if len(salt) == len(close.disclosure) // 2:
-                values[key] = value
-                hashes.append(field_hash(salt, key, value))
-            case _:
-                return Flaw("proof/fields", "a field is neither a hash, nor salt and value")
-    if any(len(digest) != len(close.disclosure) // 2 for digest in hashes):
-        return Flaw("proof/fields", "the hash of a field has not the length of one")
-    flaw = _check_fields(tuple(key for key, _ in extra.fields), values, file.number)
-    if flaw is not None:
-        return flaw
-    root = bytes.fromhex(close.disclosure)
-    if not verify_inclusion(combined(hashes), file.number, close.seq, file.path, root):
-        return Flaw("proof/path", f"these are not fields of record {file.number} of the log that was signed")
-    return proven._replace(values=values, withheld=tuple(withheld))
-
-
-def _check_fields(keys: tuple[str, ...], values: dict[str, bytes], number: int) -> Flaw | None:
-    decoded = {}
-    for key, value in values.items():
-        try:
-            decoded[key] = msgspec.json.decode(value)
-        except (ValueError, RecursionError):  # msgspec's own errors, UTF-8, and a thousand brackets
-            return Flaw("proof/fields", "the value of a field is not JSON", value[:80].decode("utf-8", "replace"))
-    kind = decoded.get("type")
-    expected = FIELDS.get(kind) if isinstance(kind, str) else None
-    if expected is None or keys != expected:
-        text = "these are not the fields of a record: its type must be shown, and every field be named in its order"
-        return Flaw("proof/fields", text, ", ".join(keys)[:160], "" if expected is None else ", ".join(expected))
-    if type(decoded.get("seq")) is not int or decoded["seq"] != number:
-        return Flaw("proof/fields", "`seq` must be shown, and be the place that the proof gives", expected=str(number))
-    return None
-
-
 def _own(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
     if file.path or file.number != proven.checkpoint.size:
         return Flaw("proof/record", "it shows another record than the one whose place it gives")
@@ -174,6 +125,5 @@ def _own(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
 _CHECKS = {
     Kind.INCLUSION: _inclusion,
     Kind.CONSISTENCY: _consistency,
-    Kind.DISCLOSURE: _disclosure,
     Kind.RECORD: _own,
 }

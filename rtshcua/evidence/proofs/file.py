@@ -1,4 +1,4 @@
-"""The file of a proof (docs/proofs.md): four kinds in the one layout of c2sp.org/tlog-proof.
+"""The file of a proof (docs/proofs.md): three kinds in the one layout of c2sp.org/tlog-proof.
 
     <kind>
     extra <base64>
@@ -13,7 +13,7 @@ part of it is verified (`check`).
 """
 
 from enum import StrEnum
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -37,7 +37,6 @@ class Kind(StrEnum):
 
     INCLUSION = "c2sp.org/tlog-proof@v1"  # a record is in the log
     CONSISTENCY = "rtshcua/consistency-proof@v1"  # one checkpoint's log begins with another's
-    DISCLOSURE = "rtshcua/disclosure-proof@v1"  # some fields of a record are in the log, others are withheld
     RECORD = "rtshcua/record-proof@v1"  # a signed record is of the log, by its own signature
 
     @property
@@ -86,22 +85,16 @@ def read_proof(data: bytes) -> ProofFile | Flaw:
     return file
 
 
-#: the name of a field, and: `f` of one that is withheld; salt and value of a shown one (docs/log-format.md, section 6)
-Field: TypeAlias = tuple[str, tuple[bytes, ...]]
-
-
 class Extra(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """`root` is the signed trust root. `chain` has the notes from one that the log key signed up to, and without, that
     of the proof: each names the key that signs the next. `signed` is the line of the record that carries the proof's
-    checkpoint, with the checkpoint as null. `record` is the line that is shown; `fields` are those of a line that is
-    shown in part.
+    checkpoint, with the checkpoint as null. `record` is the line that is shown.
     """
 
     chain: tuple[str, ...]
     root: bytes
     signed: bytes
     record: bytes = b""
-    fields: tuple[Field, ...] = ()
 
     def encode(self) -> bytes:
         """The canonical octets. Raises `CborError` when they would be too many for a reader."""

@@ -5,7 +5,7 @@ the checkpoint of a proof that was made, cosignatures of witnesses are put.
 """
 
 from base64 import b64decode
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple
 
@@ -15,8 +15,7 @@ from rtshcua.evidence.merkle_proofs import Range, consistency_ranges, inclusion_
 from rtshcua.evidence.note import parse, split
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import check_receipt, make_receipt
-from rtshcua.evidence.proofs.disclosure import Disclosure
-from rtshcua.evidence.proofs.file import Extra, Field, Kind, ProofFile, read_extra, read_proof
+from rtshcua.evidence.proofs.file import Extra, Kind, ProofFile, read_extra, read_proof
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Decision, Effect, Genesis, Recover, Signed, encode, is_signed, unsigned
 from rtshcua.evidence.witnessing.anchors import ANCHORED
@@ -183,42 +182,11 @@ def prove_consistency(lines: Lines, old: int, at: int | None = None) -> bytes | 
     return path if isinstance(path, Flaw) else _made(Kind.CONSISTENCY, found, old, path)
 
 
-def prove_disclosure(lines: Lines, number: int, secret: bytes, withheld: Collection[str]) -> bytes | Flaw:
-    """The proof of a record of a closed log of which some fields are withheld. `secret` is the log's.
-
-    `_prev` is withheld too: it would let the record before be guessed.
-    """
-    found = find(lines(), number, None, closed=True)
-    if isinstance(found, Flaw):
-        return found
-    if not isinstance(found.signed, Close) or found.signed.disclosure is None:
-        text = "no record of this log can be shown in part: its close does not provide for it"
-        return Flaw("proof/disclosure", text, found.signed.type)
-    if number >= found.signed.seq:
-        return Flaw("proof/number", "the close itself cannot be shown in part", str(number))
-    disclosure = Disclosure(secret)
-    salted = (disclosure.leaf(index, line) for index, line in enumerate(lines()))
-    path = _path(inclusion_ranges(number, found.signed.seq), salted)
-    if isinstance(path, Flaw):
-        return path
-    fields = disclosure.shown(number, found.line, {*withheld, "_prev"})
-    made = _made(Kind.DISCLOSURE, found, number, path, fields=fields)
-    if isinstance(made, Flaw) and made.slug == "proof/path":
-        return Flaw(
-            "proof/secret",
-            "the secret is not that of this log, or the log was changed, or the close states other fields",
-        )
-    return made
-
-
-def _made(
-    kind: Kind, found: Found, number: int, path: list[bytes], record: bytes = b"",
-    fields: tuple[Field, ...] = (),
-) -> bytes | Flaw:  # fmt: skip
+def _made(kind: Kind, found: Found, number: int, path: list[bytes], record: bytes = b"") -> bytes | Flaw:
     signed = encode(unsigned(found.signed))
     *chain, note = found.chain
     try:
-        extra = Extra(tuple(chain), found.root, signed, record, fields).encode()
+        extra = Extra(tuple(chain), found.root, signed, record).encode()
         pinned = cose.unverified(found.root).kid
     except (CborError, Untrusted) as error:
         return Flaw("proof/log", f"no proof can be made of this log: {error}")

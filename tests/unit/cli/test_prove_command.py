@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from reference.proof_mutations import cosigned
-from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log
+from reference.sealed_log import LOG_KEY, PIN, sealed_log
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.store.writing import write_new
@@ -24,7 +24,6 @@ SIGNED = LOG.signed
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of a run, in which the commands are called."""
     (tmp_path / "log.jsonl").write_bytes(b"".join(LOG.lines))
-    write_new(tmp_path / "log.secret", SECRET, mode=0o600)
     write_new(tmp_path / "log.key", dump_signing_key(LOG_KEY, passphrase=None), mode=0o600)
     (tmp_path / "root.trust").write_bytes(case.root()[1])
     monkeypatch.chdir(tmp_path)
@@ -97,18 +96,6 @@ def test_that_nothing_changed_since(capsys: pytest.CaptureFixture[str]) -> None:
     assert (object["kind"], object["size"], object["record"]) == ("consistency", SIGNED[2], None)
 
 
-def test_a_record_in_part(capsys: pytest.CaptureFixture[str]) -> None:
-    assert prove(3, "--redact", "detail,token") == ExitCode.OK
-    assert verify("record-3.redacted-proof") == ExitCode.OK
-    out = capsys.readouterr().out
-    assert "what was withheld: `_prev`, `detail`, `token`" in out
-    assert "goto" not in out
-    assert verify("record-3.redacted-proof", "--json") == ExitCode.OK
-    object = told(capsys)
-    assert object["withheld"] == ["_prev", "detail", "token"]
-    assert {"event": "dispatched"}.items() <= object["record"].items()  # type: ignore[attr-defined]
-
-
 def test_a_receipt(capsys: pytest.CaptureFixture[str]) -> None:
     assert prove(3, "--cose", "--log-key", "log.key") == ExitCode.OK
     assert Path("record-3.cose").read_bytes()[:1] == b"\xd2"
@@ -161,15 +148,10 @@ def test_several_proofs(capsys: pytest.CaptureFixture[str]) -> None:
     [
         ([], ExitCode.USAGE, "say what is to be proven"),
         ([3, "--since", 0], ExitCode.USAGE, "record 3 and `--since 0` are two things to prove"),
-        (["--since", 0, "--redact", "state"], ExitCode.USAGE, "do not go together"),
-        ([3, "--cose", "--redact", "state"], ExitCode.USAGE, "do not go together"),
-        ([3, "--redact", "sate"], ExitCode.USAGE, "no record has a field `sate`"),
+        (["--since", 0, "--cose"], ExitCode.USAGE, "do not go together"),
         ([99], ExitCode.INPUT, "the log has no record 99"),
         ([3, "--at", 4], ExitCode.INPUT, "record 4 is no signed record"),
         ([7, "--at", 6], ExitCode.INPUT, "was signed before record 7"),
-        ([3, "--redact", "state", "--secret", "root.trust"], ExitCode.UNTRUSTED, "others may read the secret"),
-        ([3, "--redact", "state", "--secret", "log.key"], ExitCode.INPUT, "is no secret of a log"),
-        ([3, "--redact", "state", "--secret", "none"], ExitCode.INPUT, "no such file"),
         ([3, "--cose"], ExitCode.UNTRUSTED, "there are no keys"),
     ],
 )
@@ -224,12 +206,12 @@ def test_the_nearest_checkpoint_that_witnesses_saw_vouches_for_it(
 
 
 def test_nothing_but_a_proof_is_written_over(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name in ("log.jsonl", "root.trust", "log.secret", "log.key"):
+    for name in ("log.jsonl", "root.trust", "log.key"):
         before = (folder / name).read_bytes()
         assert prove(3, "-o", name) == ExitCode.USAGE
         assert "is not replaced by one" in capsys.readouterr().err
         assert (folder / name).read_bytes() == before
-    for words in ([3], ["--since", 0], [3, "--cose", "--log-key", "log.key"], [3, "--redact", "detail"], [4]):
+    for words in ([3], ["--since", 0], [3, "--cose", "--log-key", "log.key"], [4]):
         assert prove(*words, "-o", "p") == ExitCode.OK
         assert verify("p") == ExitCode.OK
 
@@ -247,7 +229,6 @@ def test_a_log_that_was_changed(folder: Path, capsys: pytest.CaptureFixture[str]
     log.write_bytes(log.read_bytes().replace(b'"token":3', b'"token":4'))
     assert prove(3) == ExitCode.EVIDENCE
     assert "`rtshcua verify-log` says what is wrong" in capsys.readouterr().err
-    assert prove(3, "--redact", "detail") == ExitCode.UNTRUSTED  # or the secret is another
     log.write_bytes(b"".join(LOG.lines[:5]))
     assert prove(3) == ExitCode.INCOMPLETE
     assert app.main(["prove", "nothing", "1"]) == ExitCode.INPUT

@@ -73,5 +73,5 @@ def log(
         recorder.seal(now(14)),
         recorder.seal(now(15)),
         recorder.effect(now(16), "landed", durability=2),
-        recorder.close(now(20), ending="aborted", tlog=bytes(32), disclosure=bytes(range(32))),
+        recorder.close(now(20), ending="aborted", tlog=bytes(32)),
     ]

@@ -11,7 +11,6 @@ from reference.log_vectors import FOLDER, made
 from reference.verifiers import agree
 from rtshcua.evidence.merkle import Tree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, parse, split
-from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
@@ -114,11 +113,6 @@ def test_the_anchored_part() -> None:
     assert isinstance(found, Anchored)
     assert found.records == EXPECTED["anchored"]["anchored"] + 1  # and the signed record that carries the checkpoint
     assert [each.size for each in found.witnessed] == [4, 2]
-
-
-def test_the_disclosure_root() -> None:
-    *lines, last = lines_of("sealed")
-    assert disclosure_root(lines, bytes.fromhex(KEYS["secret"])).hex() == json.loads(last)["disclosure"]
 
 
 def test_nothing_is_accepted_under_another_pin() -> None:

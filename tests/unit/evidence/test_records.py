@@ -114,7 +114,6 @@ closes = st.builds(
     bytes=counts,
     checkpoint=st.none() | texts,
     digest=hashes,
-    disclosure=st.none() | hashes,
     ending=texts,
     epoch=counts,
     records=counts,

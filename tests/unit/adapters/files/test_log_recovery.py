@@ -12,10 +12,8 @@ import pytest
 from reference.crashed import signer, unverified, writes
 from reference.power import Died, PowerDisk
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.logs import write_secret
 from rtshcua.adapters.files.recovery import InUse, alone, recover
 from rtshcua.adapters.files.writer import Keeper
-from rtshcua.evidence.proofs.disclosure import disclosure_root
 from rtshcua.evidence.records import is_signed
 from rtshcua.evidence.recovery import State
 
@@ -49,16 +47,6 @@ def test_where_nothing_is_discarded_there_is_no_file_for_it(tmp_path: Path) -> N
     assert recover(path, signer(Random(1))).discarded is None
     assert unverified(path, lines, len(lines)) == ""
     assert [entry.name for entry in tmp_path.iterdir()] == ["log.jsonl"]
-
-
-@pytest.mark.parametrize("most", [30, 29])
-def test_a_log_with_a_secret_can_be_shown_in_part_unless_that_takes_too_long(tmp_path: Path, most: int) -> None:
-    path, _ = torn(tmp_path)
-    write_secret(tmp_path, bytes(32))
-    recover(path, signer(Random(1))._replace(most_disclosed=most))
-    log = path.read_bytes().splitlines(keepends=True)
-    shown = disclosure_root(log[:-1], bytes(32)).hex() if most == 30 else None
-    assert json.loads(log[-1])["disclosure"] == shown
 
 
 def test_what_was_tampered_with_is_left_as_it_is(tmp_path: Path) -> None:

@@ -4,18 +4,16 @@ import json
 
 import pytest
 
-from reference.sealed_log import LOG_KEY, PIN, SECRET, VEHICLE, SealedLog, now, resumed, sealed_log, sign
+from reference.sealed_log import LOG_KEY, PIN, VEHICLE, SealedLog, now, resumed, sealed_log, sign
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import Received, check_receipt, make_receipt
-from rtshcua.evidence.proofs.file import Kind, ProofFile, read_proof
+from rtshcua.evidence.proofs.file import Kind
 from rtshcua.evidence.proofs.make import (
     anchored,
     find,
     prove_consistency,
-    prove_disclosure,
     prove_inclusion,
     receipt_of,
     with_cosignatures,
@@ -101,7 +99,7 @@ def test_every_record_is_proven_under_the_first_signed_one_after_it(log: SealedL
         assert shown.signed.seq == shown.checkpoint.size
         assert shown.signed.checkpoint is None
         assert shown.older is None
-        assert shown.values is None
+
         assert data.startswith(b"c2sp.org/tlog-proof@v1\nextra " if not last else b"rtshcua/record-proof@v1\n")
         assert proven(data, case.KEYS[Duty.ROOT].kid) == shown
 
@@ -140,44 +138,6 @@ def test_checkpoints_of_one_log_are_consistent(log: SealedLog) -> None:
     assert slug(prove_consistency(lambda: log.lines, log.signed[1], 3)) == "proof/number"
 
 
-def test_a_record_is_shown_in_part() -> None:
-    log = sealed_log()
-    for number in range(len(log.lines) - 1):
-        shown = proven(proof(prove_disclosure(lambda: log.lines, number, SECRET, ["state", "detail"])))
-        line = json.loads(log.lines[number])
-        assert shown.values is not None
-        assert {key: json.loads(value) for key, value in shown.values.items()} == {
-            key: value for key, value in line.items() if key not in ("_prev", "state", "detail")
-        }
-        assert shown.withheld == tuple(key for key in line if key in ("_prev", "state", "detail"))
-
-
-def test_what_is_withheld_is_not_in_the_file() -> None:
-    log = sealed_log()
-    data = proof(prove_disclosure(lambda: log.lines, 1, SECRET, ["detail"]))
-    file = read_proof(data)
-    assert isinstance(file, ProofFile)
-    assert b"goto 1" not in file.extra
-    assert json.loads(log.lines[1])["_prev"].encode() not in file.extra
-    assert leaf_hash(log.lines[1]) not in file.extra  # from which one could guess
-    assert SECRET not in file.extra
-
-
-def test_a_record_that_cannot_be_shown_in_part() -> None:
-    log, short = sealed_log(), sealed_log(closed=False)
-    assert slug(prove_disclosure(lambda: log.lines, 1, bytes(32), [])) == "proof/secret"
-    assert slug(prove_disclosure(lambda: short.lines, 1, SECRET, [])) == "proof/disclosure"
-    assert slug(prove_disclosure(lambda: log.lines, len(log.lines) - 1, SECRET, [])) == "proof/number"
-    assert slug(prove_disclosure(lambda: log.lines, 99, SECRET, [])) == "proof/number"
-
-
-@pytest.mark.parametrize("length", [0, 31, 33])
-def test_a_secret_of_another_length(length: int) -> None:
-    log = sealed_log()
-    with pytest.raises(ValueError, match="has 32 bytes"):
-        prove_disclosure(lambda: log.lines, 1, bytes(length), [])
-
-
 def test_what_is_not_sealed_yet_is_not_proven() -> None:
     log = sealed_log(closed=False)
     last = len(log.lines) - 1
@@ -195,7 +155,6 @@ def test_a_log_that_is_cut_while_it_is_read() -> None:
     for make in (
         lambda lines: prove_inclusion(lines, 3),
         lambda lines: prove_consistency(lines, 6),
-        lambda lines: prove_disclosure(lines, 3, SECRET, []),
         lambda lines: receipt_of(lines, 3, None, kid=LOG_KEY.kid, signer=sign),
     ):
         times = iter((log.lines, log.lines[:3]))
@@ -220,8 +179,6 @@ def test_no_proof_is_made_of_a_log_that_does_not_hold() -> None:
     assert slug(prove_inclusion(lambda: other, 3)) == "proof/log"
     seal = [*lines[:6], lines[6].replace(b'"epoch":0', b'"epoch":1'), *lines[7:]]
     assert slug(prove_inclusion(lambda: seal, 3)) == "proof/signed"
-    torn = [*lines[:3], b"{\n", *lines[4:]]
-    assert slug(prove_disclosure(lambda: torn, 1, SECRET, [])) == "proof/log"
     broken = [*lines[:6], lines[6].replace(b'"epoch":0', b'"epoch":-1'), *lines[7:]]
     assert slug(prove_inclusion(lambda: broken, 3)) == "proof/log"
 

@@ -5,11 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from reference.proof_mutations import check, cosigned
-from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log, sign
+from reference.sealed_log import LOG_KEY, PIN, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.make import (
     prove_consistency,
-    prove_disclosure,
     prove_inclusion,
     receipt_of,
     with_cosignatures,
@@ -31,7 +30,6 @@ MADE: dict[str, Callable[[], bytes | Flaw]] = {
     "record-3-anchored.tlog-proof": anchored,
     f"record-{LAST}.record-proof": lambda: prove_inclusion(lambda: LOG.lines, LAST),
     "since-6.consistency-proof": lambda: prove_consistency(lambda: LOG.lines, 6),
-    "record-8.disclosure-proof": lambda: prove_disclosure(lambda: LOG.lines, 8, SECRET, ["state", "clause"]),
     "record-3.cose": lambda: receipt_of(lambda: LOG.lines, 3, None, kid=LOG_KEY.kid, signer=sign),
     "log.jsonl": lambda: b"".join(LOG.lines),
     "root.key": lambda: PIN.hex().encode() + b"\n",

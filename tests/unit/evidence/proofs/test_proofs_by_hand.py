@@ -10,9 +10,9 @@ import pytest
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-from reference.sealed_log import LOG_KEY, PIN, SECRET, sealed_log, sign
+from reference.sealed_log import LOG_KEY, PIN, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.proofs.make import prove_consistency, prove_disclosure, prove_inclusion, receipt_of
+from rtshcua.evidence.proofs.make import prove_consistency, prove_inclusion, receipt_of
 
 LOG = sealed_log(epochs=4, records=6)
 
@@ -89,24 +89,6 @@ def test_consistency_is_between_the_roots_that_were_signed() -> None:
     assert heads["7"] == node(four, node(four_six, six))
     eights = node(four, node(four_six, node(six, seven)))
     assert heads[str(LOG.signed[-1])] == node(node(eights, eight), rest)
-
-
-def test_a_record_in_part() -> None:
-    made = prove_disclosure(lambda: LOG.lines, 9, SECRET, ["detail"])
-    assert isinstance(made, bytes)
-    (kind, index, *path), body, note = split(made)
-    assert (kind, index) == ("rtshcua/disclosure-proof@v1", "index 9")
-    open_chain(body, note)
-    close, whole = json.loads(body["signed"]), json.loads(LOG.lines[9])
-    hashes = []
-    for key, shown in body["fields"]:
-        if len(shown) == 2:
-            assert json.loads(shown[1]) == whole[key]
-            shown = [sha256(shown[0] + key.encode() + b"\0" + shown[1]).digest()]
-        hashes += shown
-    assert [key for key, shown in body["fields"] if len(shown) == 1] == ["_prev", "detail"]
-    leaf = sha256(b"\0" + b"".join(hashes)).digest()
-    assert climb(leaf, 9, close["seq"], [b64decode(each) for each in path]).hex() == close["disclosure"]
 
 
 def test_a_receipt_of_rfc_9942() -> None:

@@ -23,6 +23,7 @@ _EXITS = {
     "decision": ExitCode.DECISION,
     "document": ExitCode.DECISION,
     "dispatch": ExitCode.DECISION,
+    "preparation": ExitCode.DECISION,
     "frames": ExitCode.DECISION,
     "anchor": ExitCode.ANCHOR,
 }

@@ -27,6 +27,7 @@ MEANINGS = {
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
     "document": "An approval, a recall or a replacement was forged, or taken in where it should have been refused.",
     "dispatch": "The vehicle was commanded without the permission that the log should show first.",
+    "preparation": "Parameters of the autopilot were set otherwise than their record says, or when they may not be.",
     "frames": "The raw frames show a command that the log does not: it went out without a record before it.",
     "anchor": "A witness outside saw another log: this one was rewritten or cut, by someone who held its keys.",
     "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",

@@ -24,7 +24,7 @@ WORDS = {
 }
 #: findings of things that docs/log-format.md says nothing about: what the records and the bundle mean
 OF_MEANING = (
-    "decision/", "dispatch/", "document/", "frames/", "genesis/other",
+    "decision/", "dispatch/", "document/", "frames/", "preparation/", "genesis/other",
     "trust/bundle-binding-mismatch", "trust/bundle-id-mismatch",
 )  # fmt: skip
 #: the page says what a bundle must be as far as a verifier of logs needs it; the rest of its form is ours

@@ -367,6 +367,7 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
     ("slug", "code"),
     [
         ("trust/log-key", ExitCode.UNTRUSTED),
+        ("preparation/parameter", ExitCode.DECISION),
         ("genesis/format", ExitCode.UNTRUSTED),
         ("genesis/mission", ExitCode.EVIDENCE),
         ("seal/root", ExitCode.EVIDENCE),

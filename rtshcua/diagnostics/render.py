@@ -14,6 +14,8 @@ from rtshcua.diagnostics.span import Source
 PRIMARY, SECONDARY = "^", "-"
 #: so many findings are shown to a person, and of one finding so many places
 MOST_SHOWN, MOST_PLACES = 200, 20
+#: so many characters of a message, for it may quote a source
+MOST_TEXT = 2_000
 
 
 def most_severe(diagnostics: Sequence[Diagnostic], most: int = MOST_SHOWN) -> tuple[Diagnostic, ...]:
@@ -35,7 +37,7 @@ def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> 
 def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
     """One finding, ending in a newline."""
     code = diagnostic.code
-    lines = [f"{diagnostic.severity.value}[{code.id}]: {visible(diagnostic.message)}"]
+    lines = [f"{diagnostic.severity.value}[{code.id}]: {_shown(diagnostic.message)}"]
     places = _places(diagnostic, sources)
     further = sum(len(marks) for _, _, marks in places[MOST_PLACES:])
     places = places[:MOST_PLACES]
@@ -59,9 +61,13 @@ def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
     if diagnostic.span is not None and not places:
         lines.append(f" --> {visible(diagnostic.span.file)}")
     lines += [f"{margin} = and {further} more places"] if further else []
-    lines += [f"{margin} = at: {visible(diagnostic.pointer)}"] if diagnostic.pointer else []
-    lines += [f"{margin} = help: {visible(diagnostic.help)}"] if diagnostic.help is not None else []
+    lines += [f"{margin} = at: {_shown(diagnostic.pointer)}"] if diagnostic.pointer else []
+    lines += [f"{margin} = help: {_shown(diagnostic.help)}"] if diagnostic.help is not None else []
     return "\n".join(lines) + "\n"
+
+
+def _shown(text: str) -> str:
+    return visible(text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]}...")
 
 
 def _places(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> list[tuple[str, int, list[Mark]]]:

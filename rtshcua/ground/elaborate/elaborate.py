@@ -3,12 +3,14 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context, Instance
 from rtshcua.ground.elaborate.delegation import delegated
 from rtshcua.ground.elaborate.parameters import ambiguous, assigned, instances
 from rtshcua.ground.elaborate.repeat import unrolled
 from rtshcua.ground.elaborate.settings import Settings
 from rtshcua.ground.elaborate.templates import sample, used
+from rtshcua.model.flat.limits import MAX_RULES
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.policies import PolicyDecl, Rule
 from rtshcua.model.ir.program import Unit
@@ -59,19 +61,37 @@ def elaborate(
 
 def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
     """A policy with all its rules in source order, then those of its delegations; `seen` gathers used templates."""
+    if len(policy.rules) > MAX_RULES:
+        return policy.copied(rules=_fitting(context, policy, policy.rules), uses=(), delegations=())
     if not policy.uses and not policy.delegations:
         return policy
     parts: list[tuple[int, tuple[Rule, ...]]] = [(rule.span.start, (rule,)) for rule in policy.rules]
-    whole = True
+    whole, many = True, len(policy.rules)
     for use in policy.uses:
         rules = used(context, use)
         whole = whole and rules is not None
         if rules is not None:
             seen.add(use.template.text)
             parts.append((use.span.start, rules))
+            many += len(rules)
+            if many > MAX_RULES:
+                break
     parts.sort(key=lambda part: part[0])
     plain = tuple(rule for _, rules in parts for rule in rules)
+    if many > MAX_RULES:
+        return policy.copied(rules=_fitting(context, policy, plain))
     return policy.copied(rules=delegated(context, policy, plain, whole=whole))
+
+
+def _fitting(context: Context, policy: PolicyDecl, rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
+    """As many rules as are looked at; that there are more is reported."""
+    context.report.add(
+        codes.TOO_MANY,
+        policy.name.span,
+        f"`{policy.name.text}` has more than {MAX_RULES:,} rules, which is what fits on board",
+        help="the rules after those are not looked at; write fewer, with wider conditions",
+    )
+    return rules[:MAX_RULES]
 
 
 class _Missions:

@@ -6,7 +6,9 @@ from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_L
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import LIBRARY, is_direct, pack_of
+from rtshcua.ground.language.size import MAX_FILES as MAX_FILES
 from rtshcua.ground.language.size import MAX_SIZE as MAX_SIZE
+from rtshcua.ground.language.size import MAX_TOKENS
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 
@@ -74,6 +76,18 @@ def too_large(file: str, size: int, by: GeoJson | None = None) -> Diagnostic:
     if by is None:
         return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
     return Diagnostic(TOO_LARGE, message, by.span, "keep only the areas that are needed in it")
+
+
+def too_long(file: str) -> Diagnostic:
+    """A file of more words and marks than are read, which is not looked at."""
+    message = f"`{file}` has more than {MAX_TOKENS:,} words and marks; no more are read"
+    return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
+
+
+def too_many_files(by: Import) -> Diagnostic:
+    """An import that, with those before it, names more files than a program may have."""
+    message = f"the program has more than {MAX_FILES:,} files; this import and what comes after it are not looked at"
+    return Diagnostic(TOO_LARGE, message, by.span, "import only what is used")
 
 
 def not_text(source: Source, data: bytes, start: int) -> Diagnostic:

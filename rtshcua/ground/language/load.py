@@ -15,6 +15,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.circles import Edge, circles
 from rtshcua.ground.language.faults import (
+    MAX_FILES,
     MAX_SIZE,
     Wanted,
     data_not_text,
@@ -23,6 +24,7 @@ from rtshcua.ground.language.faults import (
     not_portable,
     not_text,
     too_large,
+    too_many_files,
     unreadable,
 )
 from rtshcua.ground.language.parse import Parsed, parse
@@ -32,6 +34,9 @@ from rtshcua.model.ir.program import Import, Unit
 
 #: how the names of sources end, and of files that zones are read from: nothing else is read for an import
 _SOURCES, _DATA = (".rts",), (".geojson", ".json")
+
+#: for so many files that are not there it is looked for the one that was meant
+_SUGGESTED = 100
 
 Read = Callable[[str], bytes]
 Listing = Callable[[str], Iterable[str]]
@@ -126,6 +131,7 @@ class _Loader:
     data: dict[str, bytes] = field(default_factory=dict)
     data_names: dict[tuple[str, str], str] = field(default_factory=dict)
     whole: bool = True
+    suggested: int = 0
 
     def want(self, path: str, by: Import | None) -> str:
         """Queues a file, unless it was met before; gives its name."""
@@ -147,6 +153,10 @@ class _Loader:
         self.whole = self.whole and parsed.whole
         self.imports[name] = []
         for each in parsed.unit.imports:
+            if len(self.seen) >= MAX_FILES:
+                self.whole = False
+                self.diagnostics.append(too_many_files(each))
+                break
             path = self._path(each, name)
             if path is not None:
                 self.imports[name].append(Edge(each, self.want(path, each)))
@@ -218,8 +228,9 @@ class _Loader:
 
     def _near(self, name: str) -> str | None:
         """The name in the same folder that was probably meant."""
-        if self.listing is None:
+        if self.listing is None or self.suggested >= _SUGGESTED:
             return None
+        self.suggested += 1
         try:
             return nearest(posixpath.basename(name), self.listing(posixpath.dirname(name) or "."))
         except OSError:

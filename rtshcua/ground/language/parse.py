@@ -1,6 +1,8 @@
 """Parses one text into the IR; never raises for what the text says, and reports every error in it once."""
 
+import re
 from dataclasses import dataclass
+from itertools import islice
 from typing import TypeVar
 
 from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, NOT_TEXT, TOO_MANY_FINDINGS
@@ -11,8 +13,9 @@ from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
 from rtshcua.ground.language.build.missions import Builder
 from rtshcua.ground.language.explain import explain
-from rtshcua.ground.language.faults import MAX_SIZE, too_large
+from rtshcua.ground.language.faults import MAX_SIZE, too_large, too_long
 from rtshcua.ground.language.recovery import file_level, misread, pending, resume
+from rtshcua.ground.language.size import MAX_TOKENS
 from rtshcua.ground.language.table import table
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name, Node
@@ -25,6 +28,10 @@ from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 T = TypeVar("T", bound=Node)
+
+_TOKENS = re.compile(
+    r"""//[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | \s++ | (?P<token>"(?:[^"\\\n]|\\.)*+"? | [A-Za-z0-9_.]++ | .)""", re.VERBOSE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +86,15 @@ def refused(source: Source) -> Diagnostic | None:
         message = f"`{visible(source.text[at])}` hides or reorders what a person reads"
         span = Span(source.file, at, at + 1)
         return Diagnostic(HIDDEN_CHARACTER, message, span, "remove it, from comments and texts too")
+    if len(source.text) > MAX_TOKENS and _exceeds(source.text, MAX_TOKENS):
+        return too_long(source.file)
     return None
+
+
+def _exceeds(text: str, most: int) -> bool:
+    """Whether a text has more words and marks than so many; only those are looked at."""
+    tokens = (match for match in _TOKENS.finditer(text) if match.lastgroup)
+    return next(islice(tokens, most, None), None) is not None
 
 
 def beginning(source: Source) -> int:

@@ -5,20 +5,35 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.model.faults import WindStep
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.config import Kind
 from rtshcua.simulation.faults import OF_VEHICLE, parse_fault
 from rtshcua.virtual.fitting import fitting
 
-_WIND = re.compile(r"\d+(\.\d+)?,\d+(\.\d+)?(,\d+(\.\d+)?)?", re.ASCII)
+_BARE = re.compile(r"\d+(\.\d+)?", re.ASCII)
+_WIND = ("speed", "m/s"), ("from", "deg"), ("gust", "m/s")
 _RELEASE = re.compile(r"\d{1,2}\.\d{1,2}", re.ASCII)
 _HOME = re.compile(r"-?\d+(\.\d+)?,-?\d+(\.\d+)?,-?\d+(\.\d+)?", re.ASCII)
 
 
 def _wind(text: str | None) -> str | None:
-    if text is not None and not _WIND.fullmatch(text):
-        raise typer.BadParameter(f"`{text}` is not SPEED,FROM[,GUST] in m/s and degrees")
-    return text
+    """The wind as the simulated vehicle takes it, without units; a number without one is in m/s or degrees."""
+    if text is None:
+        return None
+    parts = text.split(",")
+    try:
+        if not 2 <= len(parts) <= 3 or any(part.startswith("-") for part in parts):
+            raise ValueError("two or three numbers that are not below zero are needed")
+        words = (
+            f"{name}={part}{unit if _BARE.fullmatch(part) else ''}"
+            for (name, unit), part in zip(_WIND, parts, strict=False)
+        )
+        wind = parse_fault(",".join(("wind,at=0s", *words)))
+    except ValueError as error:
+        raise typer.BadParameter(f"`{text}` is not SPEED,FROM[,GUST], as in 6m/s,270deg,2m/s: {error}") from None
+    assert isinstance(wind, WindStep)
+    return f"{wind.speed_mm_s / 1000:g},{wind.from_deg},{wind.gust_mm_s / 1000:g}"
 
 
 def release(text: str | None) -> str | None:
@@ -47,7 +62,9 @@ Flavour = Annotated[Kind | None, typer.Option(help="which autopilot the simulate
 Battery = Annotated[float | None, typer.Option(min=0, max=100, metavar="PERCENT", help="its charge at the start (100)")]
 Wind = Annotated[
     str | None,
-    typer.Option(metavar="SPEED,FROM[,GUST]", callback=_wind, help="m/s, degrees it blows from, m/s of gusts"),
+    typer.Option(
+        metavar="SPEED,FROM[,GUST]", callback=_wind, help="such as 6m/s,270deg,2m/s: the mean, from where, gusts"
+    ),
 ]
 Faults = Annotated[
     list[str] | None,

@@ -5,8 +5,10 @@ from functools import cache
 
 import pytest
 
-from rtshcua.adapters.qualification.sortie import BY_PILOT, SILENCES_US, SORTIES
+from rtshcua.adapters.qualification.sortie import BY_PILOT, SILENCES_US, SORTIES, QualifyingDriver
 from rtshcua.model.faults import Mode, PilotMode
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Command, Event
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from rtshcua.wire.qualification import CheckOutcome, QualificationCheck
 from virtual import wrong_vehicles as wrong
@@ -149,3 +151,28 @@ def test_a_takeover_that_nobody_asked_for_ends_it() -> None:
     flown = Qualifying("px4", taken)
     flown.fly(SORTIES)
     assert [(each.name, each.ending) for each in flown.observed.sorties] == [("climb", "stood-down")]
+
+
+def test_what_is_commanded_in_a_silence_ends_it() -> None:
+    """A silence is a test; a fallback is not to wait for it."""
+    begun: list[int] = []
+
+    def lands(vehicle: VirtualVehicle) -> None:
+        driver = vehicle.driver
+        assert isinstance(driver, QualifyingDriver)
+        tick = driver.tick
+
+        def interfering(now_us: int) -> tuple[list[Event], list[bytes]]:
+            silences = driver.found.silences
+            if silences and not begun and now_us - silences[0].began_us > SECOND // 2:
+                begun.append(now_us)
+                events, frames = driver.begin(Command(99, "emergency_land", MotionKind.LAND, (), (), 0, 0), now_us)
+                assert silences[0].for_us == now_us - silences[0].began_us
+                return events, frames
+            return tick(now_us)
+
+        driver.tick = interfering  # type: ignore[method-assign]
+
+    flown = Qualifying("px4", lands)
+    flown.fly([NAMED["leg"]])
+    assert begun

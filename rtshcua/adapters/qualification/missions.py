@@ -4,7 +4,7 @@ A step is the policy's own skill of its kind of motion. How far, how fast and wh
 first of `trials` that the policy permits, within its airspace, is flown.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import groupby, product
 from math import cos, radians, sin
 from typing import Final, NamedTuple
@@ -114,8 +114,3 @@ def _place(trial: Trial, policy: Policy) -> str:
 
 def _degrees(value: int, sides: str) -> str:
     return f"{abs(value) // 10_000_000}.{abs(value) % 10_000_000:07d} {sides[value < 0]}"
-
-
-def kinds_of(sorties: Sequence[Sortie]) -> frozenset[MotionKind]:
-    """The kinds of motion that sorties have."""
-    return frozenset(kind for each in sorties for kind in each.steps)

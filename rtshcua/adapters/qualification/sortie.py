@@ -34,7 +34,6 @@ from rtshcua.adapters.vehicle.manoeuvre import AGAIN_US, LATE_US
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
-from rtshcua.adapters.vehicle.supervision import Brakes
 from rtshcua.codec.frames import Received
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
@@ -162,7 +161,6 @@ class QualifyingDriver(Driver):
         self._sends = sends
         self._slack = slack
         self._fenced = fence
-        self._brakes = Brakes.of(policy.vehicle)
         self._station: GroundStation | None = None
         self._home: tuple[int, int] | None = None
         self._tokens: dict[int, ObservedCommand] = {}
@@ -222,9 +220,11 @@ class QualifyingDriver(Driver):
         self._command, self._began = command, (self.seen.latitude, self.seen.longitude)
         if self._home is None and self.seen.located:
             self._home = self.seen.latitude, self.seen.longitude
+        if self._silent is not None and self._is_silent(now_us):
+            self._silent.for_us = now_us - self._silent.began_us  # whatever is commanded now is no test: it must leave
         events, frames = super().begin(command, now_us)
         self._note(events, now_us)
-        return events, [] if self._is_silent(now_us) else frames
+        return events, frames
 
     def finish(self, ending: str) -> ObservedSortie:
         """The sortie is over: what was observed."""

@@ -146,6 +146,7 @@ def test_a_checkpoint_again_in_the_chain_is_refused() -> None:
         (number("old 7"), "proof/chain"),
         (path(lambda all: all[1:]), "proof/consistency"),
         (put("record", LOG.lines[3]), "proof/extra"),
+        (put("record", b""), "proof/extra"),  # what is empty is left out
     ],
 )
 def test_a_changed_proof_of_consistency_is_refused(change: Change, slug: str) -> None:

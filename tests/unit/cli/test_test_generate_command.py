@@ -74,3 +74,16 @@ def test_what_is_not_reached_is_told_in_the_file_on_standard_error_and_as_json(
     found = json.loads(described)["unreached"]
     told = {"skill": "hover", "role": "forbid", "text": words.split(": ")[2], "about": "`battery`", "turned": False}
     assert told in found
+
+
+def test_no_role_is_invented_where_the_policy_names_one(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put(
+        "own.rts",
+        'import "lib:policies/site.rts"\nimport "lib:skills/takeoff.rts"\nimport "lib:skills/return_home.rts"\n'
+        'import "lib:skills/emergency_land.rts"\npolicy own version 1 {\n  permit takeoff by role pilot\n'
+        "  permit return_home, emergency_land by any\n  contingency return_home, emergency_land\n}\n",
+    )
+    code, out, _ = run(capsys, "--generate", "own.rts")
+    assert code == ExitCode.OK
+    assert "role pilot" in out
+    assert "role operator" not in out

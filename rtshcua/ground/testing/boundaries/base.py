@@ -81,11 +81,20 @@ def askers(policy: Policy) -> Iterator[Asker]:
 def _askers(policy: Policy, rule: Rule, skill: int) -> Iterator[Asker]:
     """Everybody who may ask for a skill by a permit, the likeliest first."""
     timing_class = policy.contracts[skill].timing_class
-    usual = policy.roles.index("operator")
-    for role in rule.roles or (usual, *(number for number in range(len(policy.roles)) if number != usual)):
+    for role in rule.roles or _roles(policy):
         for source in rule.sources or tuple(SourceKind):
             if timing_class in CLASSES[source]:
                 yield Asker(skill, role, source, rule)
+
+
+def _roles(policy: Policy) -> tuple[int, ...]:
+    """The roles that a policy names, the likeliest first: `operator`, then those that something is permitted to. Every
+    policy has an operator; where it names other roles and not that one, nobody is asked to sign off on it.
+    """
+    permitted = [role for rule in policy.rules if rule.kind == RuleKind.PERMIT for role in rule.roles]
+    named = dict.fromkeys((*permitted, *(role for rule in policy.rules for role in rule.roles)))
+    usual = policy.roles.index("operator")
+    return tuple(sorted(named, key=lambda role: role != usual)) or (usual,)
 
 
 def _bears(rule: Rule, asker: Asker) -> bool:

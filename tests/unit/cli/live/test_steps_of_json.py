@@ -1,0 +1,23 @@
+"""A step of a mission in JSON is shown as a source would write it, not as the agent's JSON."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.cli.live.telling import plan_of
+from rtshcua.cli.sources import compile_sources
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+
+
+@pytest.mark.parametrize(
+    ("mission", "first"),
+    [("proposal.json", "takeoff(altitude = 25 m)"), ("standard.rts", "takeoff(altitude = 20 m)")],
+)
+def test_steps_are_calls(mission: str, first: str) -> None:
+    compiled, _ = compile_sources([CHECKOUT / "missions" / mission], mission=None, issued_at_us=0)
+    assert compiled.mission is not None
+    assert compiled.policy is not None
+    plan = plan_of(compiled.policy, compiled.mission, mode="software", speed=1.0)
+    assert plan.steps[0].text == first
+    assert not any("{" in step.text for step in plan.steps)

@@ -173,10 +173,14 @@ class LinkSetup:
                 major, minor, patch, _ = message.flight_sw_version.to_bytes(4)
                 self._version = major, minor, patch
                 self._answers += 1
-            case "COMMAND_ACK" if message.command == enums.MAV_CMD_REQUEST_MESSAGE:
+            case "COMMAND_ACK" if message.command == enums.MAV_CMD_REQUEST_MESSAGE and self._is_ours(message):
                 self._answers += 1
             case "STATUSTEXT" if len(self._texts) < _MOST_TEXTS and message.text not in self._texts:
                 self._texts.append(message.text)
+
+    def _is_ours(self, message: Any) -> bool:
+        """Another ground station may ask for messages, too."""
+        return getattr(message, "target_component", 0) in (0, _OURS)
 
     def _meet(self, frame: Received) -> None:
         if self._wanted is not None and frame.system != self._wanted:

@@ -45,10 +45,10 @@ def unqualified(
     questions = IdentityQuestions(flavour, names=[name for name, _ in record.parameters])
     driver.asks = questions
     until_s = time.monotonic() + _TOLD_S
-    while not questions.told and time.monotonic() < until_s and not driver.seen.airborne:
+    while not questions.told and time.monotonic() < until_s and not (driver.seen.airborne or driver.seen.armed):
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     driver.asks = None
-    if driver.seen.airborne:
+    if driver.seen.airborne or driver.seen.armed:
         return None, events
     stands = standing(record, questions.firmware, questions.parameters)
     return (None if stands.qualified else f"{stands.text} ({_HELP})"), events

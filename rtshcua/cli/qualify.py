@@ -22,7 +22,7 @@ from rtshcua.adapters.qualification.observed import ObservedQualification, Obser
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError, Way
+from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
@@ -134,14 +134,11 @@ def qualify(
         link = address.parse(connect)
     except AddressError as error:
         return misaddressed("--connect", error)
-    if sitl and link.way is Way.SERIAL:
-        return fail(
-            ExitCode.USAGE,
-            f"`--sitl` does not go with a serial line (`{link}`): the vehicle at its end may be real",
-            _CONSENT_HELP,
-        )
-    if speed != 1 and not (sitl and link.is_loopback):
-        return fail(ExitCode.USAGE, "`--speed` requires a simulated vehicle: `--sitl`, at a loopback address")
+    if sitl and not link.is_loopback:
+        what = f"`--sitl` requires a loopback address: the vehicle at `{link}` may be real"
+        return fail(ExitCode.USAGE, what, "forward the simulation's port to this machine, or use `--pilot NAME`")
+    if speed != 1 and not sitl:
+        return fail(ExitCode.USAGE, "`--speed` requires a simulated vehicle: `--sitl`")
     planned, missing = _planned(sitl=sitl, takeover=takeover, keyed=signing_key is not None)
     named = {each.name: each for each in planned}
     unknown = sorted(set(only or ()) - named.keys())

@@ -344,11 +344,11 @@ class Autopilot:
         self._mode_in_breach = vehicle.mode if self._acts_late() else mode
 
     def _acts_late(self) -> bool:
+        if self.vehicle.mode is not Mode.LOITER or not self.vehicle.in_air:
+            self.delayed = None
         if self.delayed is None or self.now_us < self.delayed[0]:
             return False
         (_, mode), self.delayed = self.delayed, None
-        if self.vehicle.mode is not Mode.LOITER or not self.vehicle.in_air:
-            return False
         self._fail_over(mode)
         return True
 

@@ -54,7 +54,7 @@ _FILE: Final = re.compile(
 
 
 class KeyFileError(Untrusted):
-    """A key file that does not serve: `malformed`, `unencrypted`, `passphrase-needed`, `wrong-passphrase`."""
+    """A key file that does not serve: `malformed`, `unencrypted`, `passphrase-needed`, `wrong-passphrase`, `memory`."""
 
 
 def dump_signing_key(key: SigningKey, *, passphrase: bytes | None) -> bytes:
@@ -73,7 +73,11 @@ def dump_signing_key(key: SigningKey, *, passphrase: bytes | None) -> bytes:
 
 
 def _cipher(passphrase: bytes, salt: bytes, cost: int) -> ChaCha20Poly1305:
-    made = Scrypt(salt=salt, length=32, n=1 << cost, r=_BLOCK, p=_LANES).derive(passphrase)
+    try:
+        made = Scrypt(salt=salt, length=32, n=1 << cost, r=_BLOCK, p=_LANES).derive(passphrase)
+    except MemoryError:
+        needed = (128 * _BLOCK << cost) >> 20
+        raise KeyFileError("memory", f"to work the key out of its passphrase takes {needed} MiB of memory") from None
     return ChaCha20Poly1305(made)
 
 

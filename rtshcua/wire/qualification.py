@@ -104,6 +104,10 @@ class Qualification(Flat, frozen=True):
         return tuple(changes)
 
 
+#: no calendar has a name for a later time
+_YEAR_10000_US: Final = 253_402_300_800_000_000
+
+
 def parameters_digest(parameters: tuple[tuple[str, bytes], ...]) -> bytes:
     """The name of a set of parameters and their values."""
     return digest.digest(digest.PARAMETERS, cbor.encode(parameters))
@@ -139,6 +143,7 @@ def read_qualification(payload: bytes) -> Qualification:
     makes_sense = (
         record.digest == parameters_digest(record.parameters)
         and 0 <= record.firmware.version < 1 << 32
+        and 0 <= record.issued_at_us < _YEAR_10000_US
         and all(each.outcome in outcomes for each in record.checks)
     )
     if not makes_sense:

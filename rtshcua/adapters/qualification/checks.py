@@ -451,6 +451,8 @@ def _takeover(
         late = max(late, takeover.mode_us - sent - takeover.unwatched_us)
     moved = takeover.moved_us is not None and takeover.moved_us - sent > limit and not stalls
     measured = f"after {_time(late)}, by `{takeover.how}`"
+    if takeover.kind is TakeoverKind.MODE and takeover.unwatched_us:
+        measured += f", not counting {_time(takeover.unwatched_us)} in which the log was closed and nobody looked"
     if moved:
         measured += f"; a motion frame was sent {_time((takeover.moved_us or 0) - sent)} after"
     return _check(slug, late <= limit and not moved, expected, measured, limit, late, _US, advice)

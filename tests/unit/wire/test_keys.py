@@ -272,3 +272,15 @@ def test_any_changed_byte_gives_a_refusal_or_another_key(at, byte):
     except Untrusted:
         return
     assert (key.kid == signing_key().kid) is (damaged == PLAIN)
+
+
+def test_a_machine_without_the_memory_that_a_guess_takes_is_told(monkeypatch):
+    class Full:
+        def __init__(self, **_):
+            pass
+
+        def derive(self, _):
+            raise MemoryError
+
+    monkeypatch.setattr(key_file, "Scrypt", Full)
+    assert refusal(SEALED, passphrase=PASSPHRASE) == "memory"

@@ -74,6 +74,7 @@ def test_another_artefact_of_the_log_key_is_none() -> None:
         {"digest": bytes(32)},
         {"firmware": Firmware("px4", -1, b"")},
         {"firmware": Firmware("px4", 1 << 32, b"")},
+        {"issued_at_us": 253_402_300_800_000_000},
         {"checks": (replace(HELD, outcome=4),)},
     ],
 )

@@ -158,6 +158,7 @@ class AgentSocket:
         self._numbers = count(1) if numbers is None else numbers
         self._next_us = 0
         self._listener = _listen(path, group)
+        self._place = _place(path)
 
     def poll(self, now_us: int) -> Presented | None:
         """The next document, if one came in: one of each reader in turn, and at most one in `GAP_US`."""
@@ -200,7 +201,8 @@ class AgentSocket:
             self._drop(reader)
         self._listener.close()
         with suppress(OSError):
-            self.path.unlink()
+            if self._place == _place(self.path):  # what somebody put there since is theirs
+                self.path.unlink()
 
     def _welcome(self) -> None:
         for _ in range(MOST_WELCOMED):  # and no more: whoever connects again and again must not keep us here
@@ -279,6 +281,12 @@ def peer_of(link: socket.socket) -> Peer:
     except OSError:
         return Peer(0, None)
     return Peer(process, user)
+
+
+def _place(path: Path) -> tuple[int, int]:
+    """What lies there, whatever it is called."""
+    found = path.lstat()
+    return found.st_dev, found.st_ino
 
 
 def _listen(path: Path, group: int | None) -> socket.socket:

@@ -12,6 +12,7 @@ from typing import Final, Self
 import msgspec
 
 from rtshcua.adapters.agent_socket import AgentSocket
+from rtshcua.cli.showing import words
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
@@ -153,7 +154,7 @@ class Agents:
                 "step": each.step,
                 "phase": mission.phases[each.phase],
                 "skill": each.contract.name,
-                "text": each.text,
+                "text": words.call(bundle.policy, each),
                 "id": each.invocation_id.hex(),
                 "binding": each.binding.hex(),
             }

@@ -10,6 +10,7 @@ from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.faults import say
 from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page, for_terminal
 from rtshcua.cli.showing.why import would_pass
 from rtshcua.cli.stdout import out_json, out_rendered
@@ -89,7 +90,8 @@ def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, refus
     for each in found:
         invocation, decision = mission.invocations[each.step], each.decision
         outcome = decision.outcome.name.lower()
-        page.text(f"{each.step:>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {invocation.text}")
+        called = words.call(loaded.bundle.policy, invocation)
+        page.text(f"{each.step:>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {called}")
         if decision.outcome is not Outcome.ALLOW:
             clause = "" if decision.clause is None else f": `{decision.clause.text}`"
             page.row("because", f"{decision.reason.value}{clause}", indent=7, width=10)
@@ -112,7 +114,7 @@ def _object(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, cod
             {
                 "step": each.step,
                 "phase": mission.phases[invocation.phase],
-                "text": invocation.text,
+                "text": words.call(loaded.bundle.policy, invocation),
                 "outcome": decision.outcome.name.lower(),
                 "reason": decision.reason.value,
                 "clause": None if decision.clause is None else decision.clause.text,

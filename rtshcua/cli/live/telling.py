@@ -4,10 +4,10 @@ import msgspec
 
 from rtshcua.cli.live.story import Happening, Plan, Signal, Step
 from rtshcua.cli.showing.log import detail_of
-from rtshcua.cli.showing.words import arguments
+from rtshcua.cli.showing.words import call
 from rtshcua.cli.unconfirmed import is_unconfirmed
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
@@ -49,19 +49,11 @@ def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Pla
         mode=mode,
         speed=speed,
         phases=mission.phases,
-        steps=tuple(Step(step_text(policy, invocation), invocation.phase) for invocation in mission.invocations),
+        steps=tuple(Step(call(policy, invocation), invocation.phase) for invocation in mission.invocations),
         signals=tuple(Signal(signal.name, signal.dimension, dict(signal.labels)) for signal in policy.signals),
         position=next((signal.name for signal in policy.signals if signal.kind == POSITION), ""),
         path=tuple(point for path in paths for point in zip(path[::2], path[1::2], strict=True)),
     )
-
-
-def step_text(policy: Policy, invocation: Invocation) -> str:
-    """A step as it was written; one of a specification in JSON as a source would write it."""
-    if not invocation.text.startswith("{"):
-        return invocation.text
-    contract = policy.contracts[invocation.skill]
-    return f"{contract.name}({arguments(policy, contract.parameters, invocation.arguments)})"
 
 
 class Teller:
@@ -120,7 +112,7 @@ class Teller:
             return ""  # of a mission that is only just put into force
         invocation = self._mission.invocations[record.step]
         if record.kind == STEP:
-            return step_text(self._policy, invocation)
+            return call(self._policy, invocation)
         if record.link >= 0:
             return f"fallback: {invocation.contract.fallback[record.link].text}"
         return "fallback: what the policy degrades to"

@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import msgspec
 
+from rtshcua.cli.showing import words
 from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
@@ -154,4 +155,4 @@ class Names:
         if kind != STEP:
             return chain[link].text if 0 <= link < len(chain) else ""
         steps = self._bundle.mission.invocations
-        return steps[step].text if 0 <= step < len(steps) else ""
+        return words.call(self._bundle.policy, steps[step]) if 0 <= step < len(steps) else ""

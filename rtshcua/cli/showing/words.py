@@ -67,6 +67,17 @@ def arguments(policy: Policy, parameters: Sequence[Parameter], cells: Sequence[i
     return ", ".join(f"{parameter.name} = {_argument(policy, parameter, cells)}" for parameter in parameters)
 
 
+def call(policy: Policy, one: Invocation) -> str:
+    """A step as it was written, if that calls the skill that is bound; else as a source would write it.
+
+    The text is whoever's who signed the mission, and may be JSON: what may be flown is what is bound.
+    """
+    contract = policy.contracts[one.skill]
+    if one.text.startswith(f"{contract.name}("):
+        return one.text
+    return f"{contract.name}({arguments(policy, contract.parameters, one.arguments)})"
+
+
 def step(policy: Policy, one: Invocation) -> str:
     """A step as its skill and arguments are bound, in nobody's words but ours and the policy's; zones by name, size and
     way from home, places by their way from home.

@@ -325,6 +325,19 @@ def test_a_socket_that_a_crash_left_is_replaced_and_a_file_never_is(folder: Path
     assert (folder / "file").read_text() == "mine"
 
 
+def test_what_somebody_put_in_the_place_of_a_socket_is_left_there(folder: Path) -> None:
+    path = folder / "socket"
+    ours = AgentSocket(path, lambda: HELLO)
+    path.unlink()
+    theirs = AgentSocket(path, lambda: HELLO)
+    ours.close()
+    with reader(theirs):
+        theirs.poll(0)
+        assert len(theirs.readers) == 1
+    theirs.close()
+    assert not path.exists()
+
+
 def test_a_path_that_no_socket_can_have(folder: Path) -> None:
     with pytest.raises(OSError, match="at most 107 bytes"):
         AgentSocket(folder / ("x" * 107), lambda: HELLO)

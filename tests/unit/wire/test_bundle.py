@@ -37,6 +37,18 @@ def test_a_bundle_for_another_vehicle() -> None:
     assert slug(sealed(), vehicle="quad-08") == "wrong-vehicle"
 
 
+def test_a_bundle_says_whose_it_is_whoever_signed_it() -> None:
+    assert bundle.claimed_vehicle(sealed(key=STRANGER)) == "quad-07"
+    with pytest.raises(Untrusted):
+        bundle.claimed_vehicle(b"no bundle")
+
+
+def test_a_key_that_was_revoked() -> None:
+    trust = root()
+    without = tuple(key for key in trust.keys if key.kid != MISSION.kid)
+    assert slug(sealed(), trust=msgspec.structs.replace(trust, keys=without, revoked=(MISSION.kid,))) == "revoked-key"
+
+
 def test_a_mission_for_another_vehicle_than_its_policy() -> None:
     assert slug(sealed(mission=msgspec.structs.replace(THE_MISSION, vehicle="quad-08"))) == "wrong-vehicle"
 

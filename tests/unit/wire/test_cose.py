@@ -85,6 +85,13 @@ def test_signatures_that_do_not_fit():
     assert refusal(rebuilt(signature=signature[:-1])) == "malformed"
 
 
+def test_a_key_is_named_by_its_whole_identifier():
+    header = {1: -19, 3: TYPE, 4: KEY.kid}
+    assert rebuilt(protected=cbor.encode(header)) == ENVELOPE
+    assert refusal(rebuilt(protected=cbor.encode(header | {4: KEY.kid[:-1]}))) == "malformed"
+    assert refusal(rebuilt(protected=cbor.encode(header | {5: 0}))) == "malformed"
+
+
 def test_only_its_own_form_is_taken():
     assert refusal(b"") == "malformed"
     assert refusal(ENVELOPE[1:]) == "malformed"  # COSE allows an untagged message

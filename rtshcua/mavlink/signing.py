@@ -69,14 +69,18 @@ class SignedLink:
     """One link with a key: signs what leaves as `link`, and says what of the rest may come in.
 
     `stored` is the state of the run before. `utc_us` and `monotonic_us` are the present; from here on only monotonic
-    time counts, so that setting a clock back opens nothing.
+    time counts, so that setting a clock back opens nothing. `as_library`: of a stream that is known no frame is too old
+    that is newer than the one before, as in the C library that both autopilots have (`mavlink_signature_check`).
     """
 
-    def __init__(self, key: bytes, stored: State, utc_us: int, monotonic_us: int, link: int = 0) -> None:
+    def __init__(
+        self, key: bytes, stored: State, utc_us: int, monotonic_us: int, link: int = 0, *, as_library: bool = False
+    ) -> None:
         if len(key) != KEY_OCTETS:
             raise ValueError(f"a link key has {KEY_OCTETS} octets, not {len(key)}")
         self._key = key
         self._link = link
+        self._as_library = as_library
         # "The timestamp used on startup should be the maximum of the timestamp implied by the system clock and the
         # stored timestamp."
         self._ahead = max(timestamp_of(utc_us), stored.timestamp)
@@ -122,7 +126,9 @@ class SignedLink:
         #    "more than 1 minute (6,000,000) behind the local system's timestamp"
         timestamp = int.from_bytes(frame[-_TAG - _STAMP : -_TAG], "little")
         local = max(self._ahead, self._clock(now_us))
-        if timestamp <= self._streams.get(stream, -1) or timestamp < local - MINUTE or timestamp > _LAST:
+        last = self._streams.get(stream, -1)
+        least = local - MINUTE if last < 0 or not self._as_library else 0
+        if timestamp <= last or timestamp < least or timestamp > _LAST:
             self.counts.stale += 1
             return False
         if not self._has_room(stream, local):

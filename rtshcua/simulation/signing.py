@@ -17,7 +17,7 @@ _LATEST: Final = 1 << 47
 
 class VehicleSigning:
     """One vehicle's key, if it has one. `speed`: see `SimulationConfig.speed`; `ahead_us`: how far ahead of the time
-    that it was given with a key begins.
+    that it was given with a key begins; then its time stamps count what it sends, and not the time (recorded).
     """
 
     def __init__(self, key: bytes | None, utc_us: int, speed: int, ahead_us: int) -> None:
@@ -26,7 +26,7 @@ class VehicleSigning:
         self._before_us = 0  # how long it ran before it was started again
         self._link: SignedLink | None = None
         if key is not None:
-            self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US) + ahead_us, 0)
+            self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US) + ahead_us, 0, as_library=True)
 
     @property
     def on(self) -> bool:
@@ -42,7 +42,7 @@ class VehicleSigning:
         key = bytes(message.secret_key)
         if any(key):
             first = min(message.initial_timestamp + self._ahead_us // UNIT_US, _LATEST)
-            self._link = SignedLink(key, State(first, {}), EPOCH_US, self._clock(now_us))
+            self._link = SignedLink(key, State(first, {}), EPOCH_US, self._clock(now_us), as_library=True)
         else:
             self._link = None
 
@@ -55,4 +55,4 @@ class VehicleSigning:
         return frame if self._link is None else self._link.sign(frame, self._clock(now_us))
 
     def _clock(self, now_us: int) -> int:
-        return (self._before_us + now_us) * _FULL_SPEED // self._speed
+        return 0 if self._ahead_us else (self._before_us + now_us) * _FULL_SPEED // self._speed

@@ -183,11 +183,11 @@ def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_the_autopilots_own_fence_is_a_second_line_of_defence_and_wins(flavour: str) -> None:
-    """ArduCopter returns. PX4 holds, in the mode that it is in already: only its target tells."""
+    """ArduCopter returns. PX4 holds, in the mode that it is in already: its state is critical."""
     flown = fly_on(flavour, JUMP)
     assert flown.ending is Ending.STOOD_DOWN
     (taken,) = flown.effects("taken-over")
-    assert taken["detail"] == {"px4": "another target", "ardupilot": "RTL"}[flavour]
+    assert taken["detail"] == {"px4": "failsafe", "ardupilot": "RTL"}[flavour]
 
 
 #: a landing shows in the landed state before the mode is told

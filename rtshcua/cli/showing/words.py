@@ -1,6 +1,7 @@
 """Canonical integers in the words of the language."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import atan2, degrees, isqrt
 
 from rtshcua.decision.outline import rings as outline
@@ -80,14 +81,22 @@ def call(policy: Policy, one: Invocation) -> str:
 
 def step(policy: Policy, one: Invocation) -> str:
     """A step as its skill and arguments are bound, in nobody's words but ours and the policy's; zones by name, size and
-    way from home, places by their way from home.
+    way from home, places by their way from home. Who signed the mission chose the path in a zone: how far it leads is
+    told too.
     """
     contract = policy.contracts[one.skill]
     told = []
     for each in contract.parameters:
         where = _where(policy, each, one.arguments)
         told.append(f"{each.name} = {_argument(policy, each, one.arguments)}{f' [{where}]' if where else ''}")
-    return f"{contract.name}({', '.join(told)})"
+    covers = f" along {_path(one.plan.path)}" if one.plan.kind == MotionKind.COVER else ""
+    return f"{contract.name}({', '.join(told)}){covers}"
+
+
+def _path(path: Sequence[int]) -> str:
+    points = list(zip(path[::2], path[1::2], strict=True))
+    far = sum(isqrt((x - before_x) ** 2 + (y - before_y) ** 2) for (before_x, before_y), (x, y) in pairwise(points))
+    return f"{len(points)} points, {_metres(far)} in all"
 
 
 def _where(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:

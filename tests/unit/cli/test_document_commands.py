@@ -1,6 +1,7 @@
 """`approve`, `recall`, `replace` and `compile --replaces`, from the command line to what a boundary says to them."""
 
 import json
+import re
 import tempfile
 import threading
 import time
@@ -79,7 +80,9 @@ def presented(of: Loaded, document: Path) -> Receipt:
 def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     of = in_force(here / "low.bundle")
     assert main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT]) == ExitCode.OK
-    assert "approved as supervisor" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "approved as supervisor" in said.out
+    assert re.search(r" along \d+ points, \d+\.\d m in all", said.out + said.err), "who signed chose it"
     assert (here / "yes").stat().st_mode & 0o777 == 0o600
     assert presented(of, here / "yes").granted == 1
     assert main(["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT]) == ExitCode.OK

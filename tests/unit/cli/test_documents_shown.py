@@ -49,7 +49,7 @@ def test_a_timeline_names_the_steps_that_are_in_force(log: Path, capsys: pytest.
     assert "calls home the mission" in out
     assert "steps, new from step 2" in out
     assert max(map(len, out.splitlines())) < 240
-    assert "step 2 `step 3`" in out, "the last step, which is the third one now"
+    assert "step 2 `return_home()`" in out, "the last step, which is the third one now"
 
 
 def test_a_decision_is_told_from_the_mission_in_force(log: Path, capsys: pytest.CaptureFixture[str]) -> None:

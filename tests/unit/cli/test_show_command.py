@@ -114,7 +114,7 @@ def test_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "log.jsonl").write_bytes(b"".join(other_flight()))
     out = shown(tmp_path, capsys)
     assert "not verified" in out
-    assert "allow     step 0 `step 0`: admitted" in out
+    assert "allow     step 0 `takeoff(" in out, "what is bound, whatever the text says"
     assert "· violated" in out
     assert f"closed after {len(other_flight()) - 1} records: aborted" in out
     assert sum("  · dispatched" in line for line in out.splitlines()) == 3

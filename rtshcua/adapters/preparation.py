@@ -6,6 +6,7 @@ happens on the ground: a vehicle that flies is left as it is, and what it is owe
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Final
 
 from rtshcua.adapters.vehicle.driver import Driver
@@ -44,13 +45,14 @@ class _Stopped(Exception):
 class Preparations:
     """What is set, and owed, in one run. Each method waits by `turn`, which lets time pass, and says whether to go on.
 
-    `record` puts an effect into the log and comes back when it is on the disk; it and `keep_owed` raise OSError. With
-    `trouble`, which says why nobody knows what is owed, nothing is set.
+    `record` puts an effect into the log and comes back when it is on the disk, `note` does not wait for that; they and
+    `keep_owed` raise OSError. With `trouble`, which says why nobody knows what is owed, nothing is set.
     """
 
     def __init__(
         self, loaded: Loaded, driver: Driver, clock: Clock, owed: Mapping[str, Owed],
-        record: Callable[[str, str], None], keep_owed: Callable[[Mapping[str, Owed]], None],
+        record: Callable[[str, str], None], note: Callable[[str, str], None],
+        keep_owed: Callable[[Mapping[str, Owed]], None],
         slack: int = 1, trouble: str | None = None,
     ) -> None:  # fmt: skip
         #: what is to be put back
@@ -60,6 +62,7 @@ class Preparations:
         self._driver = driver
         self._clock = clock
         self._record = record
+        self._note = note
         self._keep_owed = keep_owed
         self._slack = slack
         self._trouble = trouble
@@ -70,10 +73,13 @@ class Preparations:
         if not self._driver.prepares:
             return None
         try:
-            return self._begin(turn)
+            problem = self._begin(turn)
+            return None if self._flies else problem  # what flies is brought down as it is
         except _Stopped:
             return None  # `end` puts back what was set
         except OSError as error:
+            if self._flies:
+                return None
             return f"parameters are not set, for that cannot be recorded: {error.strerror or error}"
         finally:
             self._executor.prepared()
@@ -93,14 +99,15 @@ class Preparations:
             self._executor.prepared()
 
     def _begin(self, turn: Callable[[], bool]) -> str | None:
-        if not self._stands(turn, BEFORE_US):
+        # what broke off in the air is not waited for: nothing steers it until this is over
+        stands = self._stands(turn, 0 if self._driver.resumes else BEFORE_US)
+        if not stands:
+            record = self._tell if self._flies else self._record
             if self.owed:
-                self._record(NOT_RESTORED, f"it is not known to stand on the ground: {self._kept()}")
+                record(NOT_RESTORED, f"it is not known to stand on the ground: {self._kept()}")
             if self._settings:
-                self._record(NOT_PREPARED, "it is not known to stand on the ground: nothing is set")
-            flies = self._driver.seen.airborne or (self._driver.resumes and self._driver.seen.armed)
-            # what flies is brought down as it is
-            return None if flies or not self._settings else "it is not known to stand on the ground: nothing is set"
+                record(NOT_PREPARED, "it is not known to stand on the ground: nothing is set")
+            return "it is not known to stand on the ground: nothing is set" if self._settings else None
         if self._trouble is not None:
             return self._refuse(self._trouble)
         if not self._settings:
@@ -125,6 +132,15 @@ class Preparations:
         if problem is not None:
             self._restore(turn, AFTER_US)
         return problem
+
+    @property
+    def _flies(self) -> bool:
+        return self._driver.seen.airborne or self._driver.resumes
+
+    def _tell(self, event: str, detail: str) -> None:
+        """Put it into the log if that takes it, and wait for nothing: the vehicle is in the air."""
+        with suppress(OSError):
+            self._note(event, detail)
 
     def _refuse(self, why: str) -> str:
         self._record(NOT_PREPARED, why)

@@ -127,8 +127,9 @@ class Flight:
         witnesses.begin(log.path, lambda: self._sink.synced)
         self._incidents = incidents
         self._preparations = Preparations(
-            loaded, vehicle.driver, clock, debts.left, self._record, debts.keep, max(1, round(speed / 5)), debts.trouble
-        )
+            loaded, vehicle.driver, clock, debts.left, self._record, self._note, debts.keep, max(1, round(speed / 5)),
+            debts.trouble,
+        )  # fmt: skip
         self._unprepared, self._told = False, ""
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
@@ -260,12 +261,16 @@ class Flight:
 
     def _record(self, event: str, detail: str) -> None:
         """Put an effect of before or after the loop into the log; it is on the disk then. Raises OSError."""
+        self._note(event, detail)
+        self._sink.settle()
+
+    def _note(self, event: str, detail: str) -> None:
+        """Put one there, and do not wait for the disk: the loop sees what becomes of it. Raises OSError."""
         now = self._clock.now()
         if self._recorder.overdue(now):
             self._sink.append(self._recorder.seal(now), SYNCED_FIRST)
         line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
         self._sink.append(line, SYNCED_FIRST)
-        self._sink.settle()
         self._told = detail
         self._watch(now, (), (Append(line, SYNCED_FIRST),))
 

@@ -206,7 +206,9 @@ class VirtualFlight:
             kept.clear()
             kept.update(now_owed)
 
-        self.preparations = Preparations(loaded, self.vehicle.driver, self.clock, kept, self._record, keep_owed)
+        self.preparations = Preparations(
+            loaded, self.vehicle.driver, self.clock, kept, self._record, self._record, keep_owed
+        )
         self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us, prepares=False)
 
     def fly(self, each: Callable[[Self], Sequence[Event]] = lambda _: (), most_s: int = 3_600) -> FlownFlight:

@@ -143,6 +143,35 @@ def test_what_a_run_that_died_left_is_put_back_by_the_next(flavour: str) -> None
     assert flown.audit().report.failure is None
 
 
+@pytest.mark.parametrize("settings", [{}, {"FENCE_ALT_MAX": 90.0}], ids=["nothing is set", "something is to be set"])
+def test_what_broke_off_in_the_air_is_brought_down_by_a_run_that_cannot_record(settings: dict[str, float]) -> None:
+    owed: dict[str, Owed] = {}
+    first = prepared("ardupilot", owed)
+    assert first.prepare() is None
+    while first.vehicle.simulation.truth().up_mm < 8_000:
+        assert first.turn() is None
+    bundle, left = first.loaded.bundle, dict(owed)
+    again = VirtualVehicle(
+        bundle.policy, simulated("ardupilot"), first.clock, FrameSession(), steps=bundle.mission.invocations
+    )
+    again.simulation = first.vehicle.simulation
+    second = Flight(
+        shipped("short"), simulated("ardupilot"), vehicle=again, resumed=True, owed=owed, settings=bits(settings)
+    )
+
+    def fails(*_: object) -> None:
+        raise OSError(28, "no space left on device")
+
+    second.preparations._record = second.preparations._note = fails
+    began_us = second.clock.elapsed_us
+    assert second.prepare() is None
+    assert second.clock.elapsed_us == began_us, "nothing steers it until the loop begins"
+    flown = second.fly()
+    assert flown.ending is Ending.ABORTED
+    assert again.simulation.truth().up_mm < 100
+    assert owed == left
+
+
 @pytest.mark.parametrize(("flavour", "fault", "ending", "says"), [
     ("px4", PilotMode(at_us=20 * S), Ending.STOOD_DOWN, 1),
     ("ardupilot", Kill(at_us=20 * S), Ending.CRASHED, 0),

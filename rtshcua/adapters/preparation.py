@@ -110,24 +110,20 @@ class Preparations:
             return "it is not known to stand on the ground: nothing is set" if self._settings else None
         if self._trouble is not None:
             return self._refuse(self._trouble)
+        self._restore(turn, BEFORE_US)
         if not self._settings:
-            self._restore(turn, BEFORE_US)
             return None  # what is not put back is recorded, and the mission judged by what is there
-        values = self._read({*self._settings, *self.owed}, turn)
+        values = self._read(self._settings, turn)
         missing = [name for name in self._settings if name not in values]
         if missing:
-            self._restore(turn, BEFORE_US)
             return self._refuse(f"it does not tell `{'`, `'.join(missing)}`, which is to be set")
-        self._forgive(values)
-        left = {name for name in self.owed if name not in self._settings and name in values}
+        left = sorted(self._settings.keys() & self.owed)
         if left:
-            self._put_back(left, values, turn)
+            return self._refuse(f"`{'`, `'.join(left)}` could not be put back first")
         changes = {name: value for name, value in self._settings.items() if values[name] != value}
         if not changes:
             return None
-        for name, value in changes.items():
-            was = self.owed.get(name)
-            self.owed[name] = Owed(values[name] if was is None else was.before, value)
+        self.owed |= {name: Owed(values[name], value) for name, value in changes.items()}
         problem = self._write(changes, values, turn, restoring=False)
         if problem is not None:
             self._restore(turn, AFTER_US)

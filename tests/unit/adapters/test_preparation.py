@@ -118,9 +118,26 @@ def test_what_an_earlier_run_owes_is_put_back_to_what_it_was_at_first() -> None:
     one.vehicle.simulation._autopilot.parameters.own("FENCE_ALT_MAX", 60.0)
     assert one.prepare() is None
     assert (has(one), owed) == (80.0, {"FENCE_ALT_MAX": Owed(bits(15.0), bits(80.0))})
-    one.close(Ending.INTERRUPTED)
     assert one.preparations.end(lambda: one._pass(lambda _: ())) is None
     assert (has(one), owed) == (15.0, {})
+    flown = one.close(Ending.REFUSED)
+    assert [each["detail"] for each in flown.effects("preparation")] == [
+        "restore FENCE_ALT_MAX from 60 to 15", "set FENCE_ALT_MAX from 15 to 80", "restore FENCE_ALT_MAX from 80 to 15",
+    ]  # fmt: skip
+    assert flown.audit().report.failure is None
+
+
+def test_what_cannot_be_put_back_first_is_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    owed = {"FENCE_ALT_MAX": Owed(bits(15.0), bits(60.0))}
+    one = flight({"FENCE_ALT_MAX": 80.0}, owed)
+    parameters = one.vehicle.simulation._autopilot.parameters
+    parameters.own("FENCE_ALT_MAX", 60.0)
+    monkeypatch.setattr(parameters, "write", lambda name, raw, kind: parameters.read(name, -1))
+    flown = one.fly()
+    assert flown.ending is Ending.REFUSED
+    assert "`FENCE_ALT_MAX` could not be put back first" in [each["detail"] for each in flown.effects("not-prepared")]
+    assert (has(one), owed) == (60.0, {"FENCE_ALT_MAX": Owed(bits(15.0), bits(60.0))})
+    assert flown.audit().report.failure is None
 
 
 def test_what_is_owed_beside_what_is_configured_is_put_back_first() -> None:

@@ -19,6 +19,7 @@ from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, di
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.qualification.standing import standing
 from rtshcua.adapters.store.reading import read_regular
@@ -29,7 +30,6 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.configured import MeantSettings, settings_of
-from rtshcua.cli.debts import Debts
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.qualified import record_of
@@ -124,7 +124,7 @@ def doctor(
             )
         )  # fmt: skip
     if mission is not None:
-        findings += _owed(Debts(state_folder(), policy.vehicle.identity))
+        findings += _owed(OwedParameters(state_folder(), policy.vehicle.identity))
     code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
     if as_json:
         out_json(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
@@ -133,7 +133,7 @@ def doctor(
     return code
 
 
-def _owed(debts: Debts) -> list[VehicleFinding]:
+def _owed(debts: OwedParameters) -> list[VehicleFinding]:
     """What a run that broke off has left in the vehicle's parameters."""
     slug = "settings/owed"
     if debts.trouble is not None:

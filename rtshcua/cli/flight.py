@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rtshcua.adapters.clock import LinkClock, StepWatch
+from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
@@ -17,7 +18,6 @@ from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.closing import close_log, keep_summary
-from rtshcua.cli.debts import Debts
 from rtshcua.cli.interrupts import Interrupts, Wish
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
@@ -85,7 +85,7 @@ class Flight:
         tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, witnesses: Witnessing, utc: UtcWatch,
-        trusted: Callable[[], None], debts: Debts, agents: Agents | None = None,
+        trusted: Callable[[], None], debts: OwedParameters, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded

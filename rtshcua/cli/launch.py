@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
@@ -24,7 +25,6 @@ from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_tra
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.configured import would_set
-from rtshcua.cli.debts import Debts
 from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
@@ -129,12 +129,15 @@ def launch(order: Launch) -> ExitCode:
     utc = _utc(order, clock)
     trust, log_key, loaded = _trusting(order, bundle, clock)
     root, signed_root = trust.root, trust.signed
-    debts = Debts(order.state, loaded.vehicle)
     witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
+            sets = None if order.dry_run else bool(order.settings)
+            debts = OwedParameters(order.state, loaded.vehicle, sets=sets)
+            stack.callback(debts.close)
+            loaded.preparation.owes(debts.left)
             slack = max(1, round(order.speed / _UNHURRIED))
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
@@ -342,7 +345,7 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     loaded = load(
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=secrets.token_bytes(FLIGHT_BYTES),
-        peer_is_own_simulator=order.link is None, settings=order.settings, owed=Debts(order.state, identity).left,
+        peer_is_own_simulator=order.link is None, settings=order.settings,
     )  # fmt: skip
     if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)

@@ -4,7 +4,6 @@ Both messages have a 32-bit float for it. PX4 puts the octets of an integer ther
 (https://mavlink.io/en/services/parameter.html, "Parameter encoding").
 """
 
-import re
 from math import isfinite
 from struct import pack, unpack
 from typing import Final
@@ -16,12 +15,6 @@ NAME_OCTETS: Final = 16
 
 #: MAV_PARAM_TYPE of integers, and the bytes that they are in a float's place
 _INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
-_NAME: Final = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
-
-
-def is_name(text: str) -> bool:
-    """Whether it could be the name of a parameter."""
-    return _NAME.fullmatch(text) is not None
 
 
 def is_bytewise(autopilot: int) -> bool:

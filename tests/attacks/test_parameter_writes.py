@@ -42,9 +42,10 @@ def prepares(settings: dict[str, float], owed: dict[str, Owed] | None = None) ->
     configured = {name: bits(value) for name, value in settings.items()}
     of = load(
         sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
-        peer_is_own_simulator=False, settings=configured, owed=owed or {},
+        peer_is_own_simulator=False, settings=configured,
     )  # fmt: skip
     assert isinstance(of, Loaded)
+    of.preparation.owes(owed or {})
     says(of, ON_GROUND)
     return of
 
@@ -179,6 +180,11 @@ def test_what_an_earlier_run_left_is_put_back_to_what_that_recorded() -> None:
     assert of.preparation.permit(asks(("FENCE_RADIUS", 300.0, 60.0), restoring=True), AT) is NOT_AS_BEFORE
     of.executor.prepare(permit(of, BACK), AT)
     assert sent(of, 50.0) is True
+
+
+def test_what_is_never_set_is_not_put_back_whatever_was_recorded() -> None:
+    of = prepares({}, {"ARMING_CHECK": Owed(bits(0.0), bits(1.0))})
+    assert of.preparation.permit(asks(("ARMING_CHECK", 1.0, 0.0), restoring=True), AT) is NOT_AS_BEFORE
 
 
 def test_what_is_set_again_is_put_back_to_what_it_was_at_first() -> None:

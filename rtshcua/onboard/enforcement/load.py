@@ -18,7 +18,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.executor import Commands, Executor
-from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
+from rtshcua.onboard.enforcement.preparation import PreparationIssuer
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.bundle import Bundle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
@@ -76,11 +76,10 @@ def load(
     flight: bytes,
     peer_is_own_simulator: bool,
     settings: Mapping[str, int] = MappingProxyType({}),
-    owed: Mapping[str, Owed] = MappingProxyType({}),
 ) -> Loaded | Refusal:
     """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
     `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log. `settings` are
-    the parameters that an operator has set before it, `owed` what earlier flights left to be put back.
+    the parameters that an operator has set before it.
 
     `now` is when the bundle was received (paper symbol `t_r`).
 
@@ -105,7 +104,7 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
-    issuer = PreparationIssuer(session_key, settings, owed)
+    issuer = PreparationIssuer(session_key, settings)
     in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
     return session(in_force, policy, vehicle, mode, session_key, issuer)
 
@@ -118,5 +117,5 @@ def session(
     commands = Commands(policy.policy, in_force.bundle.mission)
     enforced = mode is not Mode.NONE
     boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, enforced=enforced)
-    issuer = issuer or PreparationIssuer(session_key, {}, {})
+    issuer = issuer or PreparationIssuer(session_key, {})
     return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode, issuer)

@@ -62,16 +62,18 @@ class Owed(NamedTuple):
 
 
 class PreparationIssuer:
-    """Seals preparation permits under the session key. `settings` is what was configured, by name, `owed` what earlier
-    runs left to be put back.
-    """
+    """Seals preparation permits under the session key. `settings` is what was configured, by name."""
 
-    def __init__(self, key: bytes, settings: Mapping[str, int], owed: Mapping[str, Owed]) -> None:
+    def __init__(self, key: bytes, settings: Mapping[str, int]) -> None:
         #: what is set before the flight
         self.settings = dict(settings)
         self._key = key
-        self._owed = dict(owed)
+        self._owed: dict[str, Owed] = {}
         self._serial = 0
+
+    def owes(self, owed: Mapping[str, Owed]) -> None:
+        """This is what earlier runs left to be put back."""
+        self._owed = dict(owed)
 
     def permit(self, ask: bytes, now_us: int) -> bytes | Refusal:
         """The permit for what is asked for, at a monotonic time."""
@@ -86,8 +88,10 @@ class PreparationIssuer:
 
     def _restoring(self, asked: Preparation) -> Refusal | None:
         owed = self._owed
-        as_before = all(each.name in owed and owed[each.name].before == each.value for each in asked.writes)
-        return None if as_before else NOT_AS_BEFORE
+        for name, _, value in asked.writes:
+            if name not in SETTABLE or name not in owed or owed[name].before != value:
+                return NOT_AS_BEFORE
+        return None
 
     def _setting(self, asked: Preparation) -> Refusal | None:
         """What was set already, and is set to something else, is put back to what it was before all that."""

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
+from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.cli import app
 from rtshcua.cli.configured import settings_of, would_set
-from rtshcua.cli.debts import Debts
 from rtshcua.cli.doctor import _owed
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.parameters import value_of
@@ -57,15 +57,15 @@ def test_the_bounds_of_each_are_its_own(name: str) -> None:
 
 
 def test_the_doctor_says_what_a_run_that_broke_off_has_left(tmp_path: Path) -> None:
-    debts = Debts(tmp_path, "quad")
+    debts = OwedParameters(tmp_path, "quad")
     assert _owed(debts) == []
     fifty, wide = settings_of(["A=50"])["A"], settings_of(["A=300"])["A"]
     debts.keep({"FENCE_RADIUS": Owed(fifty, wide)})
-    (found,) = _owed(Debts(tmp_path, "quad"))
+    (found,) = _owed(OwedParameters(tmp_path, "quad"))
     assert found.verdict is MissionVerdict.WARN
     assert "FENCE_RADIUS from 300 to 50" in found.found
     (tmp_path / "parameters" / "vehicle-quad").write_text("?")
-    (found,) = _owed(Debts(tmp_path, "quad"))
+    (found,) = _owed(OwedParameters(tmp_path, "quad"))
     assert "is damaged" in found.found
 
 

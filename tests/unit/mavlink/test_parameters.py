@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
-from rtshcua.mavlink.parameters import bits_of, decode, encode, is_bytewise, is_name, shown, value_of
+from rtshcua.mavlink.parameters import bits_of, decode, encode, is_bytewise, shown, value_of
 from virtual.rows import rows
 
 
@@ -54,11 +54,3 @@ def test_integers_are_octets_for_px4_and_numbers_for_ardupilot(kind: int, value:
 def test_who_has_which() -> None:
     assert is_bytewise(PX4)
     assert not is_bytewise(ARDUPILOT)
-
-
-@rows(("text", "good"), [
-    ("FENCE_RADIUS", True), ("A", True), ("ABCDEFGHIJKLMNOP", True), ("ABCDEFGHIJKLMNOPQ", False), ("", False),
-    ("fence", False), ("_A", False), ("A B", False), ("A\n", False), ("\u00c4", False),
-])  # fmt: skip
-def test_names(text: str, good: bool) -> None:
-    assert is_name(text) == good

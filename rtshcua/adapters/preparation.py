@@ -82,7 +82,7 @@ class Preparations:
                 return None
             return f"parameters are not set, for that cannot be recorded: {error.strerror or error}"
         finally:
-            self._executor.prepared()
+            self._over()
             self._driver.prepares = False
 
     def end(self, turn: Callable[[], bool]) -> str | None:
@@ -96,7 +96,14 @@ class Preparations:
         except OSError as error:
             return f"{self._kept()}, for that cannot be recorded: {error.strerror or error}"
         finally:
-            self._executor.prepared()
+            self._over()
+
+    def _over(self) -> None:
+        """Nothing more is asked for or set, wherever it broke off."""
+        self._executor.prepared()
+        if self._driver.flavour is not None:  # it was heard, so it could be asked
+            for name in {*self._settings, *self.owed}:
+                self._driver.settings.drop(name)
 
     def _begin(self, turn: Callable[[], bool]) -> str | None:
         # what broke off in the air is not waited for: nothing steers it until this is over
@@ -123,6 +130,10 @@ class Preparations:
         changes = {name: value for name, value in self._settings.items() if values[name] != value}
         if not changes:
             return None
+        unfit = [name for name, value in changes.items() if not self._driver.settings.fits(name, value_of(value))]
+        if unfit:
+            listed = ", ".join(f"{name} {shown(changes[name])}" for name in unfit)
+            return self._refuse(f"by the type that it says its parameter has, it cannot keep {listed}")
         self.owed |= {name: Owed(values[name], value) for name, value in changes.items()}
         problem = self._write(changes, values, turn, restoring=False)
         if problem is not None:
@@ -208,7 +219,10 @@ class Preparations:
             self._record(PREPARED, ", ".join(f"{name} is {shown(value)}" for name, value in found.items()))
             return None
         said = [f"{name} is {shown(found[name])}" if name in found else f"{name} is not told" for name in wrong]
-        text = f"{'not put back' if restoring else 'not set'} as it was to be{why}: {', '.join(said)}"
+        text = f"{'not put back' if restoring else 'not set'} as it was to be{why or ': ' + ', '.join(said)}"
+        if not restoring:  # what the vehicle made of a value is of our making too, and is put back
+            self.owed |= {name: Owed(self.owed[name].before, found[name]) for name in wrong if name in found}
+            self._keep_owed(self.owed)
         self._record(NOT_PREPARED, text)
         return text
 

@@ -5,6 +5,7 @@ Both messages have a 32-bit float for it. PX4 puts the octets of an integer ther
 """
 
 from math import isfinite
+from struct import error as struct_error
 from struct import pack, unpack
 from typing import Final
 
@@ -28,11 +29,26 @@ def decode(raw: float, kind: int, *, bytewise: bool) -> float:
     return float(raw) if shape is None else float(unpack(shape, pack("<f", raw))[0])
 
 
-def encode(value: float, kind: int, *, bytewise: bool) -> float:
-    """What stands in a message for a value."""
+def fits(value: float, kind: int) -> bool:
+    """Whether a parameter of this MAV_PARAM_TYPE keeps the value as it is."""
+    shape = _INTEGERS.get(kind)
+    if shape is None:
+        return True
+    if not float(value).is_integer():
+        return False
+    try:
+        pack(shape, int(value))
+    except struct_error:
+        return False
+    return True
+
+
+def encode(value: float, kind: int, *, bytewise: bool) -> float | None:
+    """What stands in a message for a value; None for one that does not fit into its octets."""
     shape = _INTEGERS.get(kind) if bytewise else None
-    found: float = value if shape is None else unpack("<f", pack(shape, int(value)))[0]
-    return found
+    if shape is None:
+        return value
+    return float(unpack("<f", pack(shape, int(value)))[0]) if fits(value, kind) else None
 
 
 def bits_of(value: float) -> int | None:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.parameters import decode, encode
+from rtshcua.mavlink.parameters import decode, encode, fits
 
 RETRY_US: Final = 1_000_000
 RETRIES: Final = 5
@@ -63,6 +63,10 @@ class VehicleParameters:
         self.changed[name] = before, value
         self._wanted[name] = _Wanted(value)
 
+    def fits(self, name: str, value: float) -> bool:
+        """Whether one that was read keeps this value as it is, by the type that the vehicle says it has."""
+        return fits(value, self._types[name])
+
     def has(self, name: str, bits: int) -> bool:
         """Whether one that was read has all these bits set."""
         return self._bits(name) & bits == bits
@@ -101,8 +105,9 @@ class VehicleParameters:
             del self._wanted[name]
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """The requests to send now."""
+        """The requests to send now. What no message can carry, by the type that the vehicle says now, is given up."""
         out: list[Message] = []
+        unfit: list[str] = []
         for name, wanted in self._wanted.items():
             pause_us = (AGAIN_US if wanted.silent else RETRY_US) * self._slack
             if wanted.tries and now_us - wanted.sent_us < pause_us:
@@ -114,5 +119,10 @@ class VehicleParameters:
             else:
                 kind = self._types[name]
                 raw = encode(wanted.value, kind, bytewise=self._bytewise)
-                out.append(messages.parameter_set(system, name, raw, kind))
+                if raw is None:
+                    unfit.append(name)
+                else:
+                    out.append(messages.parameter_set(system, name, raw, kind))
+        for name in unfit:
+            del self._wanted[name]
         return out

@@ -1,12 +1,14 @@
 """Setting parameters and putting them back: what happens where the vehicle, its owner or the disk do otherwise."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.parameters import bits_of
+from rtshcua.onboard.enforcement.executor import LATE
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import Ending, Event
 from virtual.flight import Flight
@@ -179,3 +181,61 @@ def test_a_vehicle_that_never_says_that_it_stands_is_not_written_to() -> None:
     ]
     assert one.prepare() is Ending.REFUSED
     assert sent == []
+
+
+def test_what_the_vehicle_makes_of_a_value_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    owed: dict[str, Owed] = {}
+    one = flight({"FENCE_ALT_MAX": 80.5}, owed)
+    parameters = one.vehicle.simulation._autopilot.parameters
+    write = parameters.write
+    monkeypatch.setattr(parameters, "write", lambda name, raw, kind: write(name, float(round(raw)), kind))
+    flown = one.fly()
+    assert flown.ending is Ending.REFUSED
+    assert (has(one), owed) == (15.0, {})
+    assert flown.effects("not-restored") == []
+    (said,) = flown.effects("not-prepared")
+    assert said["detail"] == "not set as it was to be: FENCE_ALT_MAX is 80"
+    assert flown.audit().report.failure is None
+
+
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_a_value_that_the_parameter_cannot_keep_is_not_written(flavour: str) -> None:
+    name, value = ("FENCE_ALT_MAX", 80.5) if flavour == "ardupilot" else ("GF_MAX_HOR_DIST", 300.0)
+    one = flight({name: value}, flavour=flavour)
+    table = one.vehicle.simulation._autopilot.parameters._table
+    table[name] = replace(table[name], type=1)
+    sent = writes(one)
+    flown = one.fly()
+    assert flown.ending is Ending.REFUSED
+    (said,) = flown.effects("not-prepared")
+    assert f"it cannot keep {name} {value:g}" in said["detail"]
+    assert sent == []
+
+
+def test_a_type_that_changes_before_it_is_written_ends_as_not_set() -> None:
+    one = flight({"GF_MAX_HOR_DIST": 300.0}, flavour="px4")
+    one.preparations._keep_owed = lambda _: one.vehicle.driver.settings._types.update(GF_MAX_HOR_DIST=1)
+    sent = writes(one)
+    flown = one.fly()
+    assert flown.ending is Ending.REFUSED
+    (said,) = flown.effects("not-prepared")
+    assert said["detail"].startswith("not set as it was to be: GF_MAX_HOR_DIST is ")
+    assert sent == []
+
+
+def test_a_permit_that_is_refused_is_recorded_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = flight({"FENCE_ALT_MAX": 80.0})
+    monkeypatch.setattr(one.loaded.executor, "prepare", lambda sealed, now_us: LATE)
+    flown = one.fly()
+    (said,) = flown.effects("not-prepared")
+    assert said["detail"] == f"not set as it was to be ({LATE.slug})"
+
+
+def test_nothing_is_asked_for_any_more_where_it_broke_off() -> None:
+    one = flight({"FENCE_ALT_MAX": 80.0})
+
+    def turn() -> bool:
+        return one._pass(lambda _: ()) and not one.vehicle.driver.settings._wanted
+
+    assert one.preparations.begin(turn) is None
+    assert not one.vehicle.driver.settings._wanted

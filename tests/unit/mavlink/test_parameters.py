@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
-from rtshcua.mavlink.parameters import bits_of, decode, encode, is_bytewise, shown, value_of
+from rtshcua.mavlink.parameters import bits_of, decode, encode, fits, is_bytewise, shown, value_of
 from virtual.rows import rows
 
 
@@ -45,10 +45,22 @@ def test_what_no_float_holds_has_no_bits(value: float) -> None:
 @rows(("kind", "value"), [(1, 200), (2, -5), (3, 60_000), (4, -30_000), (5, 2**32 - 1), (6, -(2**31)), (9, 7)])
 def test_integers_are_octets_for_px4_and_numbers_for_ardupilot(kind: int, value: int) -> None:
     raw = encode(value, kind, bytewise=True)
+    assert raw is not None
     assert decode(raw, kind, bytewise=True) == value
     if kind != 9:
         assert int.from_bytes(struct.pack("<f", raw), "little") & 0xFF == value & 0xFF
     assert encode(value, kind, bytewise=False) == decode(value, kind, bytewise=False) == value
+
+
+@rows(("kind", "value", "good"), [
+    (1, 255, True), (1, 256, False), (1, -1, False), (2, -128, True), (2, 128, False), (4, 30_000, True),
+    (4, 1e9, False), (0, 80.5, True), (6, 80.5, False), (6, -(2.0**31), True), (6, 2.0**31, False), (6, inf, False),
+    (9, 80.5, True),
+])  # fmt: skip
+def test_what_an_integer_does_not_keep_is_not_written_as_one(kind: int, value: float, good: bool) -> None:
+    assert fits(value, kind) == good
+    assert (encode(value, kind, bytewise=True) is not None) == good
+    assert encode(value, kind, bytewise=False) == value
 
 
 def test_who_has_which() -> None:

@@ -10,9 +10,12 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from reference.forgery import edit, read, signed
 from reference.kept_frames import Entries, kept
 from rtshcua.codec.frames import Codec
+from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.audit import Auditor
 from rtshcua.ground.auditor.frames import OURS, Frames
+from rtshcua.ground.auditor.preparations import ListedParameters
 from rtshcua.mavlink.parameters import bits_of
+from rtshcua.onboard.enforcement.preparation import SETTABLE, unsettable
 from rtshcua.wire.keys import Duty
 from virtual import case
 from virtual.flight import Flight
@@ -113,6 +116,11 @@ def changed(number: int, detail: str) -> str | None:
     (0, "set FENCE_ENABLE from 1 to 0", "preparation/value"),
     (0, "set FENCE_TYPE from 7 to 3", "preparation/value"),
     (0, "set GF_ACTION from 2 to 4", "preparation/value"),
+    (0, "set FENCE_RADIUS from 50 to 1000000", "preparation/value"),
+    (0, "set RTL_ALT from 1500 to 0", "preparation/value"),
+    (0, "restore RTL_ALT from 1500 to 0", None),
+    (0, "set GF_MAX_HOR_DIST from 50 to 1e39", "preparation/malformed"),
+    (0, "restore GF_MAX_HOR_DIST from -1e39 to 50", "preparation/malformed"),
     (0, "restore FENCE_RADIUS from 300 to 50", None),
     (0, "set FENCE_RADIUS", "preparation/malformed"),
     (0, "set FENCE_RADIUS from a to b", "preparation/malformed"),
@@ -124,6 +132,21 @@ def changed(number: int, detail: str) -> str | None:
 ])  # fmt: skip
 def test_what_a_record_lists_makes_sense(number: int, detail: str, slug: str | None) -> None:
     assert changed(number, detail) == slug
+
+
+@rows("name", sorted(SETTABLE))
+def test_the_audit_and_the_gate_accept_the_same(name: str) -> None:
+    accepted = SETTABLE[name]
+    around = {float(each) for each in (*accepted[:2], *accepted[-2:])}
+    for value in sorted(around | {each + by for each in around for by in (-1, 0.5, 1)}):
+        bits = bits_of(value)
+        assert bits is not None
+        record = Effect(
+            prev="", at_us=0, detail=f"set {name} from 1 to {value:.9g}", durability=3, event="preparation", kind=-1,
+            link=-1, seq=1, step=-1, token=-1, type="effect", utc_error_us=0, utc_us=0,
+        )  # fmt: skip
+        flaw = ListedParameters().check(record)
+        assert (flaw is None) == (unsettable(name, bits) is None), value
 
 
 def test_nothing_is_listed_while_a_command_is_under_way() -> None:

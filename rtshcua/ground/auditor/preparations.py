@@ -6,25 +6,27 @@ value than it had, or list any while a command is under way.
 """
 
 import re
-from math import isfinite
 from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.cover import DISPATCHED
+from rtshcua.mavlink.parameters import bits_of
 
 PREPARATION: Final = "preparation"
 _DONE: Final = frozenset({"prepared", "not-prepared", DISPATCHED})
-#: what is set of an autopilot, and the values that make sense where not every number does
+#: what is set of an autopilot: to one of these values,
 _VALUES: Final = {
     "FENCE_ENABLE": frozenset({1.0}),
     "FENCE_TYPE": frozenset(float(kinds) for kinds in (4, 5, 6, 7, 12, 13, 14, 15)),
     "GF_ACTION": frozenset({2.0, 3.0, 5.0}),
 }
-_NUMBERS: Final = frozenset({
-    "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_MARGIN", "RTL_ALT", "RTL_ALT_M", "GF_MAX_HOR_DIST",
-    "GF_MAX_VER_DIST", "RTL_RETURN_ALT",
-})  # fmt: skip
+#: or to one from the first to the second
+_RANGES: Final = {
+    "FENCE_RADIUS": (30, 10_000), "FENCE_ALT_MAX": (10, 1_000), "FENCE_ALT_MIN": (-100, 100), "FENCE_MARGIN": (1, 10),
+    "RTL_ALT": (30, 300_000), "RTL_ALT_M": (1, 3_000), "RTL_RETURN_ALT": (1, 3_000), "GF_MAX_HOR_DIST": (0, 10_000),
+    "GF_MAX_VER_DIST": (0, 10_000),
+}  # fmt: skip
 _LISTED: Final = re.compile(r"(?P<what>set|restore) (?P<writes>[^,]+(?:, [^,]+)*)")
 _WRITE: Final = re.compile(r"(?P<name>[A-Z0-9_]{1,16}) from (?P<before>\S+) to (?P<value>\S+)", re.ASCII)
 
@@ -74,13 +76,14 @@ class ListedParameters:
 
     def _flaw(self, write: Listed, *, restoring: bool) -> Flaw | None:
         name, _, value = write
-        if name not in _NUMBERS and name not in _VALUES:
+        if name not in _RANGES and name not in _VALUES:
             return Flaw("preparation/parameter", "it lists a parameter that is never set", name)
         if restoring:
             before = self._before.get(name, value)
             text = "a parameter was to be put back to another value than it had"
             return None if before == value else Flaw("preparation/other-value", text, _shown(value), _shown(before))
-        if value in _VALUES.get(name, (value,)):
+        low, high = _RANGES.get(name, (value, value))
+        if low <= value <= high and value in _VALUES.get(name, (value,)):
             return None
         return Flaw("preparation/value", "a parameter was to be set to what it is never set to", f"{name} {value:g}")
 
@@ -96,7 +99,7 @@ def _read(detail: str) -> tuple[bool, tuple[Listed, ...]]:
             values = (0.0, float("nan")) if write is None else (float(write["before"]), float(write["value"]))
         except ValueError:
             return False, ()
-        if write is None or not all(map(isfinite, values)):
+        if write is None or any(bits_of(value) is None for value in values):
             return False, ()
         writes.append(Listed(write["name"], *values))
     return found["what"] == "restore", tuple(writes)

@@ -90,6 +90,12 @@ class Agents:
             self._notes.append(ALIKE)
         return found
 
+    def turn_away(self, now: Now) -> None:
+        """Answer what came in that it is too late: the mission is over, and nobody decides about it any more."""
+        for event in self.events(now):
+            if isinstance(event, Presented):
+                self.watch([Reply(event.sender, "falling-back", "the mission is over")])
+
     def notes(self) -> Sequence[str]:
         """What there is to tell of who listens, each once."""
         told, self._notes = self._notes, []

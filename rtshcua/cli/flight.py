@@ -32,7 +32,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Append, Ending, Event, Interrupted
+from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -57,6 +57,8 @@ _BACKLOG_S = 1.0
 _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
 _WAIT_S = 0.02
+#: how many documents are taken up before the loop begins; more of them wait in their sockets
+_MOST_EARLY = 32
 
 _LANDING = "interrupted: it falls back and lands first, and the log is closed then"
 _SILENT = (
@@ -219,10 +221,7 @@ class Flight:
                     return loop.turn(also) or self._leave()
                 case None:
                     pass
-            if self._agents is not None:
-                also += self._agents.events(self._clock.now())
-                for text in self._agents.notes():
-                    self._feed.post(Note(text))
+            also += self._handed_in()
             also += self._witnesses.events(self._clock.now().monotonic_us)
             also += self._steps.events(self._clock.now())
             if self._utc.waits:
@@ -235,6 +234,8 @@ class Flight:
     def _pass(self) -> bool:
         """Let time pass before the loop, which is told then what happened; False once somebody asked to stop."""
         self._early += self._poll()
+        if sum(isinstance(each, Presented) for each in self._early) < _MOST_EARLY:
+            self._early += self._handed_in()
         if self._interrupts.wish() is None:
             return True
         self._feed.post(Note(_ON_GROUND))
@@ -254,7 +255,18 @@ class Flight:
     def _linger(self) -> bool:
         """Let time pass after the loop; False once somebody would not wait."""
         self._poll()
+        if self._agents is not None:
+            self._agents.turn_away(self._clock.now())
         return self._interrupts.wish() is not Wish.LEAVE
+
+    def _handed_in(self) -> Sequence[Event]:
+        """What agents and operators handed in; whoever came to their sockets is heard and told from now on."""
+        if self._agents is None:
+            return ()
+        found = self._agents.events(self._clock.now())
+        for text in self._agents.notes():
+            self._feed.post(Note(text))
+        return found
 
     def _poll(self) -> Sequence[Event]:
         return self._vehicle.poll(self._clock.now().monotonic_us, self._clock.us_in(_WAIT_S))

@@ -2,6 +2,10 @@
 
 import json
 import signal
+import socket
+import tempfile
+import time
+from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
@@ -76,3 +80,26 @@ def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> 
     assert effects(run.folder, "preparation")[-1] == "restore FENCE_ALT_MAX from 90 to 12"
     assert effects(run.folder, "prepared")[-1] == "FENCE_ALT_MAX is 12"
     assert owed(ground) == {}
+
+
+def test_an_agent_is_heard_and_told_while_parameters_are_set(ground: Any, port: int) -> None:
+    ground.vehicle(port, SPEED, *OWNERS)
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder, socket.socket(socket.AF_UNIX) as link:
+        path = Path(folder) / "s"
+        words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--agent-socket", str(path))
+        run = ground.run(ground.bundle(), *words, *SET, speed=SPEED)
+        until_s = time.monotonic() + 60
+        while link.connect_ex(str(path)):
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        link.settimeout(60)
+        link.sendall(json.dumps({"id": 7, "document": b64encode(b"nonsense").decode()}).encode() + b"\n")
+        lines = link.makefile("rb")
+        told = [json.loads(next(lines)) for _ in range(3)]
+        while told[-1]["type"] != "answer":
+            told.append(json.loads(next(lines)))
+        run.signal(signal.SIGINT)
+        run.end()
+    events = [each.get("event", each["type"]) for each in told]
+    assert events[:3] == ["hello", "mission", "preparation"], "it was welcomed before"
+    assert (told[-1]["id"], told[-1]["slug"]) == (7, "malformed")

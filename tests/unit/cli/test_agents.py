@@ -42,11 +42,14 @@ class Followed(Run):
         except BlockingIOError:
             return []
 
-    def hand(self, document: bytes) -> list[dict[str, Any]]:
-        """Hand a document in; what is told in the turn in which it is taken up."""
+    def send(self, document: bytes) -> None:
         self.link.setblocking(True)
         self.link.sendall(json.dumps({"id": 5, "document": b64encode(document).decode()}).encode() + b"\n")
         self.link.setblocking(False)
+
+    def hand(self, document: bytes) -> list[dict[str, Any]]:
+        """Hand a document in; what is told in the turn in which it is taken up."""
+        self.send(document)
         events: list[Event] = []
         while not events:
             self.clock.advance(GAP_US)
@@ -112,6 +115,19 @@ def test_documents_and_their_answers(run: Followed) -> None:
     assert run.ending is Ending.RECALLED
     run.agents.tell(b'{"type":"close"}\n')
     assert run.told() == [{"type": "close"}]
+
+
+def test_what_comes_in_after_the_mission_is_answered(run: Followed) -> None:
+    run.send(recall(run.loaded))
+    told: list[dict[str, Any]] = []
+    before = len(run.lines)
+    while not any(each["type"] == "answer" for each in told):
+        run.clock.advance(GAP_US)
+        run.agents.turn_away(run.clock.now())
+        told += run.told()
+    assert [each["type"] for each in told] == ["hello", "mission", "answer"]
+    assert (told[-1]["id"], told[-1]["slug"]) == (5, "falling-back")
+    assert len(run.lines) == before
 
 
 def test_the_view_follows_a_replacement_and_shows_no_signature(run: Followed) -> None:

@@ -14,7 +14,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError
+from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.clock_error import duration_us, utc_error_text
 from rtshcua.cli.configured import Settings, settings_of
@@ -135,9 +135,9 @@ def run(
         witnesses = witnessed.addresses(witness or ())
     except AddressError as error:
         return misaddressed("--witness", error)
-    if link is not None and speed != 1 and not link.is_loopback:
-        text = f"`--speed` requires a simulated vehicle on this machine: at `{link}` a second is a second"
-        return fail(ExitCode.USAGE, text, "`rtshcua sim --speed N`, and `--connect udpin:127.0.0.1:14550`")
+    too_fast = _too_fast(link, speed, sets=bool(set_) and not rehearsal)
+    if too_fast is not None:
+        return fail(ExitCode.USAGE, *too_fast)
     with ExitStack() as stack:
         state = state_dir or state_folder()
         if fresh_state:
@@ -185,6 +185,8 @@ def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents"
     return Incidents(chosen(text, time.time_ns() // 1_000), flavour, seed)
 
 
+#: up to this many times as fast as life, what a permit for parameters lasts leaves the machine enough
+_FASTEST_SET = 5
 _SCENARIO_HELP = "with it go `--flavour` and `--seed`; `--battery`, `--wind`, `--fault` and `--dry-run` do not"
 _SYSTEM = "`--system` goes with `--connect`: the simulated vehicle is alone"
 _UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's time"
@@ -192,6 +194,17 @@ _UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's tim
 _LONELY = {(False, False): "", (True, False): _SYSTEM, (True, True): _SYSTEM, (False, True): _UTC}
 _VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
+
+
+def _too_fast(link: Address | None, speed: float, *, sets: bool) -> tuple[str, str] | None:
+    """Why nothing flies at this speed, and what helps."""
+    if link is not None and speed != 1 and not link.is_loopback:
+        text = f"`--speed` requires a simulated vehicle on this machine: at `{link}` a second is a second"
+        return text, "`rtshcua sim --speed N`, and `--connect udpin:127.0.0.1:14550`"
+    if sets and speed > _FASTEST_SET:
+        text = f"`--set` goes with a `--speed` of {_FASTEST_SET} at most"
+        return text, "a permit to set something lasts 30 s of flight: too short for this machine at a higher speed"
+    return None
 
 
 def _group(agent_socket: Path | None, operator_socket: Path | None, name: str | None) -> int | str | None:

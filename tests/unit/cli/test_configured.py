@@ -37,6 +37,14 @@ def test_what_may_not_be_set_is_said_before_anything_else(
         assert says in capsys.readouterr().err, words
 
 
+def test_nothing_is_set_of_a_vehicle_that_is_much_faster_than_life(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["run", "x.bundle", "--set=FENCE_RADIUS=50"]
+    assert app.main([*words, "--speed=6"]) == ExitCode.USAGE
+    assert "`--set` goes with a `--speed` of 5 at most" in capsys.readouterr().err
+    for more in (["--speed=5"], ["--speed=6", "--dry-run"]):
+        assert app.main([*words, *more]) == ExitCode.INPUT, "there is no such bundle"
+
+
 def test_what_may_be_set_is_read_as_a_number() -> None:
     read = settings_of(["FENCE_RADIUS=250", "FENCE_ALT_MAX=80.5"])
     assert {name: value_of(bits) for name, bits in read.items()} == {"FENCE_RADIUS": 250.0, "FENCE_ALT_MAX": 80.5}

@@ -1,4 +1,4 @@
-"""Parameters of the autopilot, set before a flight as configured, and put back after it (docs/adr/0063).
+"""Parameters of the autopilot, set before a flight as configured, and put back after it (docs/adr/0051).
 
 What is to be written is on the disk first, for the next run (`keep_owed`) and in the log (`record`). Then a permit is
 asked for, which opens the gate for just that; then it is written; and what is read back counts, nothing else. All of it

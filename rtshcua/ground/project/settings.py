@@ -71,6 +71,10 @@ class Settings:
     test: TestSettings = TestSettings()
 
 
+#: parts of a dotted key; ours have three
+_MOST_PARTS = 64
+
+
 def misconfigured(file: str, what: str, help: str = "", line: int | None = None) -> Refusal:
     """Why a configuration is none: in `file`, at `line` where that is known (from 1)."""
     return Refusal("configuration", f"{file}{'' if line is None else f':{line}'}: {what}", help)
@@ -80,6 +84,8 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | 
     """The settings in a configuration called `file`; `shared` where it is a `pyproject.toml`, in which others have
     tables too: None where that has none of ours.
     """
+    if _longest_key(text) > _MOST_PARTS:
+        return misconfigured(file, f"a key has more than {_MOST_PARTS} parts")
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -96,6 +102,17 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | 
         return _settings(Table.of(found, prefix))
     except NotSo as error:
         return misconfigured(file, error.message, error.help, _line(text, error.key))
+
+
+def _longest_key(text: str) -> int:
+    """How many parts the longest dotted key has, or what looks like one: `tomllib` takes the square of that in time."""
+    longest = parts = 0
+    for each in text.split("."):
+        word = each.strip(" \t")
+        quoted = len(word) > 1 and word[0] == word[-1] and word[0] in "\"'"
+        parts = parts + 1 if quoted or word.replace("-", "").replace("_", "").isalnum() else 0
+        longest = max(longest, parts)
+    return longest
 
 
 def _settings(table: Table) -> Settings:

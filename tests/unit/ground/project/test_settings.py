@@ -112,3 +112,20 @@ def test_refusals(text: str, told: str, help: str | None) -> None:
 )
 def test_patterns(pattern: str, meant: list[str], not_meant: list[str]) -> None:
     assert [matches(pattern, path) for path in (*meant, *not_meant)] == [True] * len(meant) + [False] * len(not_meant)
+
+
+@rows("part", ["a", '"a,b"', "a-b_c ", "'a'"])
+def test_a_key_of_very_many_parts_is_refused_unread(part: str) -> None:
+    """The library takes the square of them in time: an hour for a file of a megabyte."""
+    keys = ".".join([part] * 200_000)
+    for text in (f"{keys} = 1", f"[{keys}]", f"x = {{{keys} = 1}}"):
+        refused = parse_settings(text, "rtshcua.toml")
+        assert isinstance(refused, Refusal)
+        assert "more than 64 parts" in refused.text
+
+
+def test_many_patterns_are_no_key() -> None:
+    patterns = ", ".join(f'"missions/part.{number}.rts"' for number in range(500))
+    found = parse_settings(f"[test]\nexclude = [{patterns}]\n", "rtshcua.toml")
+    assert isinstance(found, Settings)
+    assert len(found.test.exclude) == 500

@@ -64,6 +64,8 @@ _UNHURRIED = 5
 _LOOPBACK = "127.0.0.1"
 _TOO_SLOW = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
+#: where it stands which vehicle a bundle is for
+IDENTITY_HELP = "`identity` of the policy's `vehicle` says which one it is for, `--vehicle` which one this is"
 
 
 class Sortied(Protocol):
@@ -349,7 +351,8 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Lo
     )  # fmt: skip
     if isinstance(loaded, Refusal):
         code = ExitCode.REFUSED if loaded.slug in _NOT_HERE else code_of(loaded.slug)
-        raise Refused(code, *loaded)
+        help = IDENTITY_HELP if loaded.slug == "wrong-vehicle" else ""
+        raise Refused(code, loaded.slug, loaded.text, loaded.help or help)
     return loaded
 
 

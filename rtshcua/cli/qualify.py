@@ -31,7 +31,7 @@ from rtshcua.cli.faults import code_of, fail, misaddressed, say, tell, untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.flight import EXIT_CODES
 from rtshcua.cli.interrupts import Interrupts
-from rtshcua.cli.launch import Launch, Refused, launch
+from rtshcua.cli.launch import IDENTITY_HELP, Launch, Refused, launch
 from rtshcua.cli.opening import AIR_S
 from rtshcua.cli.showing.qualification import described, told
 from rtshcua.cli.sources import compile_sources, read_text
@@ -153,7 +153,7 @@ def qualify(
         return exit_code(compiled.diagnostics)
     if compiled.policy.vehicle.identity != vehicle:
         text = f"the policy is for `{compiled.policy.vehicle.identity}`, this vehicle is `{vehicle}`"
-        return fail(ExitCode.REFUSED, text, slug="wrong-vehicle")
+        return fail(ExitCode.REFUSED, text, IDENTITY_HELP, slug="wrong-vehicle")
     plan = Qualifying(
         source, compiled.policy, compiled.mission, planned, missing, pilot=pilot or "", passphrase_file=passphrase_file
     )

@@ -18,7 +18,7 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.report.junit import junit
-from rtshcua.ground.testing.coverage.coverage import enough
+from rtshcua.ground.testing.coverage.coverage import enough, share
 from rtshcua.ground.testing.flown import flown_json, flown_suites
 from rtshcua.ground.testing.report import coverage_json, suites, summary_json, tests_json
 
@@ -140,7 +140,9 @@ def _finish(
             out_rendered(line)
         out_rendered(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
         if short:
-            out(f"less than {least} % is covered (`--fail-under`, or `fail-under` of the configuration)")
+            reached = sum(one.coverage.covered for one in covered or ())
+            found = share(reached, sum(one.coverage.total for one in covered or ()))
+            out(f"{found} is covered, less than {least} % (`--fail-under`, or `fail-under` of the configuration)")
     shares = None if covered is None else coverage_json(covered, results.sources)
     return findings.finish(
         code,

@@ -13,6 +13,7 @@ from rtshcua.adapters.qualification.sortie import SORTIES
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.table import find
 from rtshcua.virtual.vehicle import VirtualVehicle
+from virtual.forked import Forked
 from virtual.qualifying import Qualifying
 
 PAGES = Path(__file__).resolve().parents[2] / "docs/flying"
@@ -23,7 +24,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", FIRST, flags=re.DOTALL)
 
 
-def commands() -> list[str]:
+def typed() -> list[str]:
     lines = [line for block in blocks("sh") for line in block.splitlines()]
     return sorted({part.strip() for line in lines for part in line.split("&&") if part.strip().startswith("rtshcua ")})
 
@@ -40,7 +41,36 @@ def test_the_tethers_policy_and_mission_compile(tmp_path: Path, monkeypatch: pyt
     assert compiled.mission is not None
 
 
-@pytest.mark.parametrize("line", commands())
+def test_what_it_types_is_for_the_project_that_it_makes(commands: Forked, own_world: None, tmp_path: Path) -> None:
+    def typed_here(line: str, where: Path) -> str:
+        done = commands.run(shlex.split(line)[1:], where, 60)
+        assert done.code == 0, (line, done.out, done.err)
+        return done.out
+
+    typed_here("rtshcua init first", tmp_path)
+    here = tmp_path / "first"
+    site = (here / "site.rts").read_text(encoding="utf-8")
+    added = blocks("text")[0]
+    assert "brakes" in added
+    assert "return" in added
+    (here / "site.rts").write_text(
+        re.sub(r"(?m)^  home .*$", lambda home: f"{home[0]}\n{added}", site), encoding="utf-8"
+    )
+    for path, source in zip(("policies/tether.rts", "missions/tethered.rts"), blocks("rts"), strict=True):
+        (here / path).write_text(source, encoding="utf-8")
+    for line in ("rtshcua test --generate policies/tether.rts -o tests/tether.rts", "rtshcua test ."):
+        assert line in typed()
+        typed_here(line, here)
+    missions = {word for line in typed() for word in shlex.split(line) if word.startswith("missions/")}
+    assert all((here / word).with_suffix(".rts").is_file() for word in missions)
+    called = {word for line in typed() for word in re.findall(r"--vehicle (\S+)", line)}
+    for source in sorted({(here / word).with_suffix(".rts") for word in missions}):
+        compiled, _ = compile_sources([source], mission=None, issued_at_us=1)
+        assert compiled.policy is not None
+        assert called == {compiled.policy.vehicle.identity}
+
+
+@pytest.mark.parametrize("line", typed())
 def test_each_command_is_typed_as_it_is(line: str) -> None:
     _, name, *words = shlex.split(line)
     row = find(name)

@@ -8,6 +8,7 @@ from msgspec import structs
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.cli.configured import untold
 from rtshcua.cli.faults import say
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.showing import words
@@ -25,6 +26,8 @@ from rtshcua.onboard.runtime.monitor import StateMonitor
 READY_S = 60.0
 #: and then for a signal that it has not told yet
 TOLD_S = 3.0
+#: within which a parameter that it has was told, or was asked for often enough
+SETTINGS_S = 8.0
 #: how often it is said what is waited for
 SAID_S = 5.0
 
@@ -34,39 +37,48 @@ _POLL_S = 0.05
 def dry_run(
     loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, events: Sequence[Event],
     *, as_json: bool, notes: Sequence[str] = (), refusal: str | None = None, unheard: frozenset[int] = frozenset(),
-    say: Callable[[str], None] = say,
+    sets: Sequence[str] = (), say: Callable[[str], None] = say,
 ) -> ExitCode:  # fmt: skip
     """Rehearse the mission on the vehicle as it stands. `events` came while it was met.
 
     `notes` are what a run would tell first, `refusal` why it would not begin at all. `unheard` are the slots that
-    nothing can fill on this link. It is judged by the UTC time at which it was asked for: the wait is not the flight's.
+    nothing can fill on this link, `sets` the parameters that a flight would set, which the vehicle must tell. It is
+    judged by the UTC time at which it was asked for: the wait is not the flight's.
     """
     monitor = StateMonitor(loaded.policy)
     asked_us, interrupted = clock.now().utc_us, False
     for note in notes:
         say(f"note: {note}")
     ready, begun_s = False, time.monotonic()
-    until_s, said_s = begun_s + READY_S, begun_s
+    until_s, said_s, waited = begun_s + READY_S, begun_s, ""
+    for name in sets:
+        vehicle.driver.settings.read(name)
     while time.monotonic() < until_s:
         if interrupts.wish() is not None:
             interrupted = True
             break
         if not ready and time.monotonic() - said_s >= SAID_S:
-            said_s = time.monotonic()
-            say(f"waiting for the vehicle: {vehicle.driver.unready or 'its telemetry'}; until {READY_S:.0f} s")
+            said_s, waits = time.monotonic(), vehicle.driver.unready or "its telemetry"
+            if waits != waited:
+                waited = waits
+                say(f"waiting for the vehicle: {waits}; until {READY_S:.0f} s")
         for event in events:
             if isinstance(event, Readings):
                 monitor.update(event)
             elif isinstance(event, Ready):
-                ready, until_s = True, time.monotonic() + TOLD_S
+                ready, until_s = True, max(time.monotonic() + TOLD_S, begun_s + SETTINGS_S if sets else 0)
         now = clock.now()
         monitor.observe(now)
-        if ready and None not in monitor.state(now.monotonic_us).values:
+        settled = all(map(vehicle.driver.settings.is_known, sets)) if sets else True
+        if ready and settled and None not in monitor.state(now.monotonic_us).values:
             break
         events = vehicle.poll(now.monotonic_us, clock.us_in(_POLL_S))
     now = structs.replace(clock.now(), utc_us=asked_us)
     found = rehearse(loaded, monitor.state(now.monotonic_us), now, unheard)
     unready = None if ready else (vehicle.driver.unready or "it did not say that it is")
+    flavour = vehicle.driver.flavour if sets and not interrupted else None
+    if refusal is None and flavour is not None:
+        refusal = untold(sets, vehicle.driver.settings.values, flavour.name)
     would = ready and refusal is None and all(each.hopeful for each in found)
     code = ExitCode.INTERRUPTED if interrupted else ExitCode.OK if would else ExitCode.REFUSED
     if as_json:

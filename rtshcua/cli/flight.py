@@ -18,6 +18,7 @@ from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.closing import close_log, keep_summary
+from rtshcua.cli.configured import foreign
 from rtshcua.cli.interrupts import Interrupts, Wish
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
@@ -132,14 +133,14 @@ class Flight:
             loaded, vehicle.driver, clock, debts.left, self._record, self._note, debts.keep, max(1, round(speed / 5)),
             debts.trouble,
         )  # fmt: skip
-        self._unprepared, self._told = False, ""
+        self._preparing, self._told = True, ""
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
         vehicle.driver.resumes = resumed
         self._feed.post(self._plan())
         self._watch = Watching(
-            feed, self._teller, self._runtime.view, lambda: vehicle.driver.unready, live=live,
+            feed, self._teller, self._runtime.view, self._waits_for, live=live,
             replan=self._replan, agents=agents,
         )  # fmt: skip
 
@@ -154,7 +155,7 @@ class Flight:
             self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=False)
             raise
         self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
-        if ending is Ending.REFUSED and self._vehicle.driver.unready is not None and not self._unprepared:
+        if ending is Ending.REFUSED and self._vehicle.driver.unready is not None and not self._preparing:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
         if ending is Ending.CRASHED:
             self._feed.post(Note(_CRASHED))
@@ -204,9 +205,12 @@ class Flight:
             watch = self._incidents.around(watch, self._start_us)
         problem = self._preparations.begin(self._pass)
         if problem is not None:
-            self._unprepared = True
             self._tell_once(problem)
+            flavour = self._vehicle.driver.flavour
+            for text in () if flavour is None else foreign(self._loaded.preparation.settings, flavour.name):
+                self._feed.post(Note(text))
             return Ending.REFUSED
+        self._preparing = False
         loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
         while True:
@@ -241,6 +245,10 @@ class Flight:
         self._feed.post(Note(_ON_GROUND))
         self._early.append(Interrupted(self._clock.now().monotonic_us))
         return False
+
+    def _waits_for(self) -> str | None:
+        """What the vehicle is waited for, in words; until parameters are set, nothing is known of that."""
+        return None if self._preparing else self._vehicle.driver.unready
 
     def _put_back(self) -> None:
         problem = self._preparations.end(self._linger)

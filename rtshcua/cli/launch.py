@@ -174,7 +174,7 @@ def launch(order: Launch) -> ExitCode:
                 return dry_run(
                     loaded, vehicle, clock, interrupts, events, as_json=order.style == "json",
                     notes=(*signing.notes, *would_set(order.settings)),
-                    refusal=flown_before(order.state, loaded), unheard=signing.unheard,
+                    refusal=flown_before(order.state, loaded), unheard=signing.unheard, sets=tuple(order.settings),
                 )  # fmt: skip
             assert past is not None
             resumed, refusal = _opened(order, loaded, vehicle, clock, events, owes=bool(debts.left))

@@ -24,6 +24,8 @@ from rtshcua.model.flat.zone import Projection, project
 SAME_MM: Final = 10
 #: How often it is asked why it would not arm; by itself ArduPilot says so each 30 s.
 CHECK_US: Final = 10_000_000
+#: More than what its place needs, in m, that its circle is advised to be.
+ADVISED_ROOM_M: Final = 2
 #: What `take` looks at.
 HEEDED: Final = (*FENCE_HEEDED, "PARAM_VALUE")
 
@@ -51,6 +53,7 @@ class Preflight:
         self._arms = (fence or judges) and bool(flavour.fence.switches and fence_of(policy, flavour.fence).items)
         self._meant = meant
         self._told = False
+        self._advised = 0  # what its circle was said to be set to
         self._checked_us: int | None = None
         self.notes: list[str] = []
 
@@ -152,8 +155,18 @@ class Preflight:
         off = "" if own.types is None else f", or take {found.bit} out of `{own.types}`, which is {values[own.types]:g}"
         return (
             f"its own fence ends {found.value:g} m {found.about} (`{found.parameter}`), where the mission has targets "
-            f"beyond, which it would ignore: set `{found.parameter}` to {found.needed} at the {least}{off}"
+            f"beyond, which it would ignore: set `{found.parameter}` to {self._advice(found)} at the {least}{off}"
         )
+
+    def _advice(self, found: bounds.Narrow) -> int:
+        """What to set a bound to. Where it stands, and so how wide a circle has to be, is known to some decimetres:
+        that is given room, and said again while it would do.
+        """
+        if found.bit != bounds.CIRCLE_BIT:
+            return found.needed
+        if self._advised < found.needed:
+            self._advised = found.needed + ADVISED_ROOM_M
+        return self._advised
 
     def _far_from_home(self) -> str | None:
         """Where it stands becomes its home, which all of the policy is drawn around."""
@@ -185,7 +198,8 @@ class Preflight:
         should = quantise(self._wanted_mm, 1, found.mm)
         return (
             f"it returns at {has} (`{found.parameter}`), and the policy says {self._wanted_mm / 1_000:g} m: set "
-            f"`{found.parameter}` to {should}, or change `return at`"
+            f"`{found.parameter}` to {should} (for one flight: `--set {found.parameter}={should}`), "
+            "or change `return at`"
         )
 
 

@@ -32,6 +32,7 @@ class Watching:
         self._live = live
         self._replan = replan
         self._agents = agents
+        self._waited_for = ""
         self._shown_s = self._waited_s = time.monotonic()
 
     def __call__(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
@@ -60,5 +61,6 @@ class Watching:
         if moment_s - self._waited_s >= _WAITING_NOTE_S:
             self._waited_s = moment_s
             unready = self._unready()
-            if view.stage is Stage.WAITING and unready is not None:
+            if view.stage is Stage.WAITING and unready is not None and unready != self._waited_for:
+                self._waited_for = unready
                 self._feed.post(Note(f"waiting for the vehicle: {unready}"))

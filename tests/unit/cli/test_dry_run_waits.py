@@ -9,6 +9,7 @@ import pytest
 
 from reference.flat_case import LINK
 from reference.world import START, FakeVehicle, loaded
+from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.cli import dry_run
 from rtshcua.cli.interrupts import Wish
 from rtshcua.diagnostics.exits import ExitCode
@@ -18,6 +19,18 @@ from rtshcua.onboard.ports import Event, Readings, Ready
 SECOND = 1_000_000
 
 
+class Told:
+    """The parameters of a vehicle that has one only."""
+
+    values = {"RTL_RETURN_ALT": 30.0}  # noqa: RUF012
+
+    def read(self, name: str) -> None:
+        """It is asked for."""
+
+    def is_known(self, name: str) -> bool:
+        return name in self.values
+
+
 class World:
     """A vehicle that becomes ready after so many seconds of the machine; its clock runs `speed` times as fast."""
 
@@ -25,7 +38,7 @@ class World:
         self.s = 0.0
         self.said: list[str] = []
         self._ready_s, self._speed, self._wish_s, self._missing = ready_s, speed, wish_s, missing
-        self.driver = SimpleNamespace(unready="its own checks before arming fail")
+        self.driver = SimpleNamespace(unready="its own checks before arming fail", flavour=PX4, settings=Told())
 
     def monotonic(self) -> float:
         return self.s
@@ -68,7 +81,7 @@ def test_it_says_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     code, said = rehearsed(world, monkeypatch, capsys, notes=["the radio"])
     assert (code, said["ready"], said["notes"]) == (ExitCode.OK, True, ["the radio"])
     waits = "waiting for the vehicle: its own checks before arming fail; until 60 s"
-    assert world.said == ["note: the radio", waits, waits]
+    assert world.said == ["note: the radio", waits]
 
 
 def test_interrupted_it_says_how_it_stands(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,6 +94,18 @@ def test_its_own_wait_makes_nothing_stale(monkeypatch: pytest.MonkeyPatch, capsy
     code, said = rehearsed(World(59, speed=50), monkeypatch, capsys)
     assert {step["reason"] for step in said["steps"]} == {"admitted"}
     assert code is ExitCode.OK
+
+
+def test_what_it_does_not_tell_is_not_set_and_would_not_begin(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert rehearsed(World(1), monkeypatch, capsys, sets=["RTL_RETURN_ALT"])[0] is ExitCode.OK
+    world = World(1)
+    code, said = rehearsed(world, monkeypatch, capsys, sets=["RTL_RETURN_ALT", "FENCE_RADIUS"])
+    assert code is ExitCode.REFUSED
+    untold = "it does not tell `FENCE_RADIUS`, which is to be set"
+    assert said["refusal"] == f"{untold}; `FENCE_RADIUS` is a parameter of ArduPilot, and this is PX4"
+    assert dry_run.SETTINGS_S <= world.s <= dry_run.SETTINGS_S + 1
 
 
 def test_what_flew_before_would_not_begin(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

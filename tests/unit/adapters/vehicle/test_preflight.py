@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.bounds import CEILING_BIT, CIRCLE_BIT, Narrow
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour as Flavour
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
@@ -136,7 +137,8 @@ def test_arducopters_fence_is_switched_on_and_its_other_kinds_stay_on() -> None:
 
 @rows(("flavour", "parameters", "says"), [
     (PX4, {"RTL_RETURN_ALT": 60.0}, "it returns at 60 m (`RTL_RETURN_ALT`), and the policy says 30 m: "
-                                    "set `RTL_RETURN_ALT` to 30, or change `return at`"),
+                                    "set `RTL_RETURN_ALT` to 30 (for one flight: `--set RTL_RETURN_ALT=30`), "
+                                    "or change `return at`"),
     (PX4, {"RTL_RETURN_ALT": 3_000.0}, "it returns at 3000 m"),
     (PX4, {"RTL_RETURN_ALT": float("nan")}, "it returns at no number"),
     (PX4, {}, "it does not tell its return altitude (`RTL_RETURN_ALT`)"),
@@ -328,3 +330,11 @@ def test_a_fence_is_written_only_where_place_and_return_altitude_are_right(flavo
         port.settle(one)
         assert len(port.items) == 4
         assert one.unready is None
+
+
+def test_the_advised_circle_has_room_for_the_noise_of_its_place_and_stays() -> None:
+    one = preflight(ARDUPILOT)
+    needed = [99, 100, 99, 101, 102, 101]
+    advised = [one._advice(Narrow("FENCE_RADIUS", 50.0, each, "from home", CIRCLE_BIT)) for each in needed]
+    assert advised == [101, 101, 101, 101, 104, 104]
+    assert one._advice(Narrow("FENCE_ALT_MAX", 10.0, 33, "above home", CEILING_BIT)) == 33

@@ -556,13 +556,16 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
         out_json(json.dumps(_as_object(store, root), indent=2, ensure_ascii=False))
         return ExitCode.OK
     kind = "development root: for trying out, its keys are not encrypted" if root.development else "trust root"
-    out(kind, f"  folder   {store.folder}", f"  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}", "")
-    out(f"  {'duty':<9} {'key':<33} may speak for")
+    out(kind, f"  folder   {store.folder}", f"  version  {root.version}")
+    out(f"  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}", "")
+    names = {kid: path.name for kid, path in store.paths(root).items()}
+    wide = max(map(len, names.values()))
+    out(f"  {'duty':<9} {'key':<33} {'file':<{wide}}  may speak for")
     for key in root.keys:
-        out(f"  {key.duty:<9} {key.kid.hex():<33} {speaks(key)}")
+        out(f"  {key.duty:<9} {key.kid.hex():<33} {names[key.kid]:<{wide}}  {speaks(key)}")
     for name in sorted(root.revocations):
         what = "the key of a link" if len(name) == LINK_ID_BYTES else "never trusted again"
-        out(f"  {'revoked':<9} {name.hex():<33} {what}")
+        out(f"  {'revoked':<9} {name.hex():<33} {what if len(name) == LINK_ID_BYTES else f'revoked-{name.hex()}.key'}")
     if root.witness_threshold > 1:
         out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
     return ExitCode.OK

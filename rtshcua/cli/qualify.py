@@ -15,11 +15,12 @@ from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.doctor.diagnosis import settings_told
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.qualifications import keep_record
+from rtshcua.adapters.files.qualifications import keep_record, read_record
 from rtshcua.adapters.qualification.checks import ends_after, judge
 from rtshcua.adapters.qualification.missions import NAME, Trial, source_of, trials
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
+from rtshcua.adapters.qualification.standing import unflown
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
@@ -47,13 +48,16 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending, Event
+from rtshcua.wire import cose
 from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.qualification import (
+    MAX_QUALIFICATION,
     Firmware,
     Qualification,
     QualificationCheck,
     parameters_digest,
+    read_qualification,
     sign_qualification,
 )
 from rtshcua.wire.untrusted import Untrusted
@@ -322,7 +326,8 @@ class Qualifying:
         path = None
         if not broken:
             signed = sign_qualification(record, self.keys[Duty.LOG])
-            path = keep_record(data_folder(), record.vehicle, signed)
+            whole = not unflown(record) or not self._was_whole()
+            path = keep_record(data_folder(), record.vehicle, signed) if whole else None
         if broken or ended is Ending.CRASHED:
             code = EXIT_CODES[ended]
         else:
@@ -334,7 +339,19 @@ class Qualifying:
             out(*told(record, ended if broken else None))
             if path is not None:
                 out(f"the record is in {path}")
+            elif not broken:
+                out("no record is made of it: that of the whole qualification before stays")
         return code
+
+    def _was_whole(self) -> bool:
+        """Whether the record that there is is one of a whole qualification, which no partial one replaces."""
+        try:
+            signed = read_record(data_folder(), self.policy.vehicle.identity)
+            return signed is not None and not unflown(
+                read_qualification(cose.unverified(signed, limit=MAX_QUALIFICATION).payload)
+            )
+        except Untrusted:
+            return False
 
     def _refused(self, trial: Trial) -> Compiled | None:
         """The first of the missions that does not compile; those with a leg are tried before the others."""

@@ -47,7 +47,7 @@ def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_pat
     said = flown.events[-1]
     checks = {each["slug"]: each for each in said["checks"]}
     assert flown.code == said["exit_code"] == ExitCode.OK, (flown.stderr, said)
-    assert said["qualified"]
+    assert (said["qualified"], said["not_flown"]) == (False, ["leg"])
     assert {checks[slug]["outcome"] for slug in ("stop/climb", "land/down", "fence/on", "sortie/climb")} == {"held"}
     assert checks["takeover/mode"]["outcome"] == "unchecked"
     assert Path(said["record"]).parent.name == "qualifications"
@@ -58,7 +58,7 @@ def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_pat
 
     rehearsal = ground.start("run", "short.bundle", "--dry-run", *as_quad).end()
     (note,) = [text for text in notes(rehearsal) if "qualified" in text]
-    assert note.startswith("this vehicle was qualified in simulation only, on ")
+    assert note.startswith("this vehicle is partly qualified only: not flown: leg (`--only`)")
     assert doctor(ground, link)["found"] in note
 
     vehicle.signal(signal.SIGTERM)

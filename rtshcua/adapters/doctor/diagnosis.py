@@ -80,6 +80,23 @@ def diagnose(
     """
     if vehicle.flavour is None:
         return
+    found = _found(vehicle, policy, flown, keyed, utc_error_us, unheard, named, qualified)
+    if keyed or not locked(vehicle):
+        yield from found
+        return
+    for each in found:  # who answers nothing is not to blame for each single thing that is not known then
+        if each.verdict is STOP and each.slug not in _WITHOUT_ANSWERS:
+            yield VehicleFinding(each.slug, UNKNOWN, _NOT_ASKED)
+        else:
+            yield each
+
+
+def _found(
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, keyed: bool, utc_error_us: int | None,
+    unheard: frozenset[int], named: bool,
+    qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None,
+) -> Iterator[VehicleFinding]:  # fmt: skip
+    assert vehicle.flavour is not None
     flavour = vehicle.flavour.name
     yield _heartbeat(vehicle, flavour)
     yield _loss(vehicle)
@@ -98,6 +115,14 @@ def diagnose(
         yield _place(vehicle)
         yield _clock(vehicle, utc_error_us)
     yield from _settings(vehicle, flavour, policy, flown)
+
+
+#: what stops a mission, known without any answer
+_WITHOUT_ANSWERS: Final = (
+    "link/signing", "link/loss", "link/component", "link/other-vehicle", "autopilot/kind", "vehicle/airborne",
+    "vehicle/armed", "sensor/unwell",
+)  # fmt: skip
+_NOT_ASKED: Final = "not asked: it answers signed frames only, and no key was given (`link/signing`)"
 
 
 def _graded(
@@ -140,14 +165,27 @@ def _signing(vehicle: ExaminingDriver, *, keyed: bool) -> VehicleFinding:
     signed = f"{talker.signed} of {talker.frames} frames are signed"
     if keyed:
         return VehicleFinding("link/signing", OK if talker.signed else STOP, signed)
+    if locked(vehicle):
+        found = f"{signed}, and it answers nothing without them"
+        return VehicleFinding("link/signing", STOP, found, "its key", "give its key with `--signing-key`")
     if talker.signed:
         return VehicleFinding("link/signing", WARN, signed, "", "give its key with `--signing-key`")
     advice = "whoever reaches this link commands the vehicle: `rtshcua keys link` makes a key for MAVLink 2 signing"
     return VehicleFinding("link/signing", WARN, "nothing is signed", "", advice)
 
 
+def locked(vehicle: ExaminingDriver) -> bool:
+    """Whether all that it sends is signed, and it answers nothing that is not."""
+    talker = vehicle.talkers[vehicle.system, AUTOPILOT]
+    return talker.frames == talker.signed and not _it_answers(vehicle)
+
+
+def _it_answers(vehicle: ExaminingDriver) -> bool:
+    return vehicle.answered or vehicle.source.clock.answered_us is not None
+
+
 def _answers(vehicle: ExaminingDriver) -> VehicleFinding:
-    answers = vehicle.answered or vehicle.source.clock.answered_us is not None
+    answers = _it_answers(vehicle)
     found = "it answers what it is asked" if answers else "it answers nothing that it was asked"
     advice = "it may demand signed frames (`--signing-key`), or the way there may be closed"
     return _graded("link/answers", found, "answers", advice, stops=not answers)

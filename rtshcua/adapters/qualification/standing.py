@@ -2,9 +2,12 @@
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification
+
+#: the sorties without which a qualification is a partial one; a real vehicle flies its takeovers only when asked to
+WHOLE: Final = ("climb", "leg")
 
 
 class Standing(NamedTuple):
@@ -12,6 +15,12 @@ class Standing(NamedTuple):
 
     qualified: bool
     text: str
+
+
+def unflown(record: Qualification) -> list[str]:
+    """The sorties of a whole qualification that a partial one (`--only`) left out. Takeovers are none of them."""
+    flown = {each.slug for each in record.checks}
+    return [name for name in WHOLE if f"sortie/{name}" not in flown]
 
 
 def standing(record: Qualification | str | None, firmware: Firmware | None, known: Mapping[str, bytes]) -> Standing:
@@ -25,8 +34,12 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
         return Standing(False, f"this vehicle is not qualified: its record is not to be trusted: {record}")
     failed = [each.slug for each in record.failed]
     if not record.qualifies:
-        what = f"{len(failed)} checks did not hold: {', '.join(failed)}" if failed else "nothing was checked"
+        what = f"{_many(len(failed))} did not hold: {', '.join(failed)}" if failed else "nothing was checked"
         return Standing(False, f"this vehicle is not qualified: {what}")
+    left_out = unflown(record)
+    if left_out:
+        text = f"this vehicle is partly qualified only: not flown: {', '.join(left_out)} (`--only`)"
+        return Standing(False, text)
     day = datetime.fromtimestamp(record.issued_at_us / 1_000_000, UTC).date().isoformat()
     changes = record.changes(firmware, known)
     if changes:
@@ -41,5 +54,11 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
         unsaid.append(f"{missing} of its parameters are not told now")
     more = f"; {'; '.join(unsaid)}" if unsaid else ""
     return Standing(
-        not unsaid, f"qualified on {day} for {record.firmware.text}: {held} checks hold, {left} were not made{more}"
+        not unsaid,
+        f"qualified on {day} for {record.firmware.text}: {_many(held)} {'holds' if held == 1 else 'hold'}, "
+        f"{left} {'was' if left == 1 else 'were'} not made{more}",
     )
+
+
+def _many(checks: int) -> str:
+    return f"{checks} check" if checks == 1 else f"{checks} checks"

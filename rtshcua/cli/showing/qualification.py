@@ -1,10 +1,12 @@
 """A qualification record for a person: a line a check; of those that fail, what was expected and what to do."""
 
 from collections.abc import Iterator, Mapping
+from struct import calcsize, unpack
 from typing import Any, Final
 
 import msgspec
 
+from rtshcua.adapters.qualification.standing import unflown
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
 from rtshcua.onboard.ports import Ending
@@ -34,8 +36,16 @@ def told(record: Qualification, broken: Ending | None) -> Iterator[str]:
     if broken is not None:
         yield f"broken off ({broken}) after {flown}: no record is made"
         return
-    end = "qualified" if record.qualifies else "NOT qualified"
+    left_out = unflown(record)
+    end = "NOT qualified" if not record.qualifies else "partly qualified" if left_out else "qualified"
     yield f"{end}: {counts['ok']} hold, {counts['FAIL']} do not, {counts['-']} not checked, in {flown}"
+    if left_out:
+        yield f"not flown: {', '.join(left_out)}; `doctor` and `run` take a vehicle for qualified when all were flown"
+
+
+def _number(octets: bytes) -> str:
+    """A parameter's value as it is set; as its octets where they are no number."""
+    return f"{unpack('>d', octets)[0]:.10g}" if len(octets) == calcsize(">d") else octets.hex()
 
 
 def described(record: Qualification) -> dict[str, Any]:
@@ -46,7 +56,8 @@ def described(record: Qualification) -> dict[str, Any]:
         "parameters": record.digest.hex(),
         "pilot": record.pilot,
         "flown_us": record.flown_us,
-        "qualified": record.qualifies,
+        "qualified": record.qualifies and not unflown(record),
+        "not_flown": unflown(record),
         "checks": [
             msgspec.structs.asdict(each) | {"outcome": CheckOutcome(each.outcome).name.lower()}
             for each in record.checks
@@ -70,7 +81,7 @@ def show_qualification(page: Page, data: bytes) -> dict[str, object]:
     page.row("consent", f"pilot {record.pilot}" if record.pilot else "a simulation")
     page.row("policy", record.policy.hex())
     page.rows("logs", record.logs)
-    page.rows("parameters", [f"{name} {value.hex()}" for name, value in record.parameters])
+    page.rows("parameters", [f"{name} {_number(value)}" for name, value in record.parameters])
     for line in told(record, None):
         page.text(line)
     return {"kind": "qualification", "verified": False, "key": envelope.kid.hex()} | described(record)

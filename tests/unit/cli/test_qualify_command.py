@@ -2,12 +2,15 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from rtshcua import library
+from rtshcua.adapters.files.qualifications import keep_record
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES
+from rtshcua.cli import qualify as command
 from rtshcua.cli.qualify import _planned
 from rtshcua.cli.showing.qualification import told
 from rtshcua.wire.keys import Duty
@@ -103,8 +106,26 @@ def test_the_table_says_what_failed_and_why() -> None:
         "                     help: declare `brakes`",
         "-     takeover/mode  not asked for",
         "NOT qualified: 1 hold, 1 do not, 1 not checked, in 61 s of flight",
+        "not flown: climb, leg; `doctor` and `run` take a vehicle for qualified when all were flown",
     ]
-    assert list(told(record(held), None))[-1].startswith("qualified: 1 hold")
+    sorties = [QualificationCheck(f"sortie/{name}", CheckOutcome.HELD, "", "") for name in ("climb", "leg")]
+    assert list(told(record(held, *sorties), None))[-1].startswith("qualified: 3 hold")
+    *_, end, why = told(record(held, sorties[0]), None)
+    assert end.startswith("partly qualified: 2 hold")
+    assert why.startswith("not flown: leg; ")
+
+
+def test_a_partial_record_replaces_no_whole_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command, "data_folder", lambda: tmp_path)
+    held = QualificationCheck("land/down", CheckOutcome.HELD, "", "")
+    sorties = [QualificationCheck(f"sortie/{name}", CheckOutcome.HELD, "", "") for name in ("climb", "leg")]
+    trial: Any = SimpleNamespace(policy=SimpleNamespace(vehicle=SimpleNamespace(identity="quad-07")))
+    assert not command.Qualifying._was_whole(trial)
+    for checks, whole in (([held, sorties[0]], False), ([held, *sorties], True)):
+        keep_record(tmp_path, "quad-07", sign_qualification(record(*checks), case.KEYS[Duty.LOG]))
+        assert command.Qualifying._was_whole(trial) is whole
+    keep_record(tmp_path, "quad-07", b"nonsense")
+    assert not command.Qualifying._was_whole(trial)
 
 
 def test_a_record_is_shown_unverified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,23 +10,31 @@ from msgspec.structs import replace
 from rtshcua.adapters.files.qualifications import keep_record, path_of, read_record
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.qualification.identity import IdentityQuestions, as_octets, those_that_matter
-from rtshcua.adapters.qualification.standing import standing
+from rtshcua.adapters.qualification.sortie import SORTIES
+from rtshcua.adapters.qualification.standing import WHOLE, standing
 from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification, QualificationCheck, parameters_digest
 
 PARAMETERS = (("GF_ACTION", as_octets(2)), ("RTL_RETURN_ALT", as_octets(30)))
 VERSION = Firmware("px4", 0x01100000, bytes(8))
+FLOWN = tuple(QualificationCheck(f"sortie/{name}", CheckOutcome.HELD, "", "") for name in ("climb", "leg"))
 HELD = QualificationCheck("stop/fly", CheckOutcome.HELD, "", "")
 LEFT = QualificationCheck("takeover/mode", CheckOutcome.UNCHECKED, "", "")
 FAILED = QualificationCheck("fence/on", CheckOutcome.FAILED, "", "")
 RECORD = Qualification(
     "quad-07", VERSION, PARAMETERS, parameters_digest(PARAMETERS), bytes(32), "ada", "0.1",
-    1_767_225_600_000_000, 0, (), (HELD, LEFT),
+    1_767_225_600_000_000, 0, (), (*FLOWN, HELD, LEFT),
 )  # fmt: skip
 
 
 def test_one_that_is_as_it_was_is_qualified() -> None:
     stands = standing(RECORD, VERSION, dict(PARAMETERS))
-    assert stands == (True, "qualified on 2026-01-01 for px4 1.16.0: 1 checks hold, 1 were not made")
+    assert stands == (True, "qualified on 2026-01-01 for px4 1.16.0: 3 checks hold, 1 was not made")
+
+
+def test_one_of_which_a_part_was_flown_is_partly_qualified() -> None:
+    assert [each.name for each in SORTIES if each.takeover is None] == list(WHOLE)
+    stands = standing(replace(RECORD, checks=(FLOWN[0], HELD, LEFT)), VERSION, dict(PARAMETERS))
+    assert stands == (False, "this vehicle is partly qualified only: not flown: leg (`--only`)")
 
 
 def test_a_simulation_qualifies_no_vehicle() -> None:
@@ -40,7 +48,7 @@ def test_a_simulation_qualifies_no_vehicle() -> None:
     [
         (None, "there is no record"),
         ("unknown key", "its record is not to be trusted: unknown key"),
-        (replace(RECORD, checks=(HELD, FAILED)), "1 checks did not hold: fence/on"),
+        (replace(RECORD, checks=(HELD, FAILED)), "1 check did not hold: fence/on"),
         (replace(RECORD, checks=(LEFT,)), "nothing was checked"),
     ],
 )

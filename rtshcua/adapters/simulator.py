@@ -12,11 +12,16 @@ from typing import Any, Self
 
 START_S = 20.0
 _STOP_S = 2.0
+_USAGE = 2  # its exit code for options that it does not take
 _MODULE = "rtshcua.simulation"
 
 
 class SimulatorError(Exception):
-    """The simulated vehicle did not start; the text is for a person."""
+    """The simulated vehicle did not start; the text is for a person. `usage`: its options are none that it takes."""
+
+    def __init__(self, text: str, *, usage: bool = False) -> None:
+        super().__init__(text)
+        self.usage = usage
 
 
 class Simulator:
@@ -39,7 +44,8 @@ class Simulator:
         if line is None:
             reason = self._reason()
             self.stop()
-            raise SimulatorError(f"the simulated vehicle did not start: {reason}")
+            usage = self._process.returncode == _USAGE
+            raise SimulatorError(f"the simulated vehicle did not start: {reason}", usage=usage)
         self.ready: dict[str, Any] = json.loads(line)
 
     def wait(self) -> int:

@@ -31,8 +31,10 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.configured import MeantSettings, settings_of
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
+from rtshcua.cli.launch import expect_no_source
 from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.qualified import record_of
+from rtshcua.cli.refused import Refused
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out, out_json
@@ -94,6 +96,8 @@ def doctor(
         policy, mission, root = _wanted(bundle, clock.now().utc_us)
     except Untrusted as error:
         return distrust(error)
+    except Refused as refused:
+        return fail(refused.code, str(refused), refused.help, slug=refused.slug)
     frames = FrameSession()
     with ExitStack() as stack:
         try:
@@ -154,6 +158,7 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, T
         assert compiled.policy is not None
         return compiled.policy, None, None
     data = read_regular(bundle, MAX_BUNDLE)
+    expect_no_source(bundle)
     signed = KeyStore(data_folder()).root()
     root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
     opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)

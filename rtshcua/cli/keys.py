@@ -216,6 +216,8 @@ def revoke(
             name = _link_named(text)
             if name is None:
                 return fail(ExitCode.USAGE, f"`{text}` is no link key", "accepted: 16 hexadecimal digits, or its file")
+            if name in root.revocations:
+                return _revoked_already(text)
             names.append(name)
         if not names:
             return fail(ExitCode.USAGE, "no key was named", "`rtshcua keys list` shows them")
@@ -471,7 +473,7 @@ def _added(
         )
     except Untrusted as error:
         return _refused(error)
-    return _listed(store, as_json=as_json)
+    return _handed(store, as_json=as_json)
 
 
 def _succeeded(
@@ -488,12 +490,17 @@ def _succeeded(
         code = change(store, root, signer, time.time_ns() // 1000)
         if code is not None:
             return code
-        newer = _root(store)
     except Untrusted as error:
         return _refused(error)
+    return _handed(store, as_json=as_json)
+
+
+def _handed(store: KeyStore, *, as_json: bool) -> ExitCode:
+    """Say what the root trusts now, and how vehicles get it: with those before, which some may have missed."""
     code = _listed(store, as_json=as_json)
     if code is ExitCode.OK and not as_json:
-        files = [*(store.earlier_path(each) for each in range(root.version + 1, newer.version)), store.root_path]
+        before = range(_root(store).version - len(store.chain()) + 1, _root(store).version)
+        files = [*map(store.earlier_path, before), store.root_path]
         out("", f"hand it to each vehicle: `rtshcua keys accept {' '.join(map(str, files))} --vehicle IDENTITY`")
     return code
 
@@ -510,8 +517,14 @@ def _named(store: KeyStore, root: TrustRoot, text: str) -> VerificationKey | Exi
     ]
     if len(found) == 1:
         return found[0]
+    if digits is not None and any(name.hex().startswith(digits) for name in root.revocations):
+        return _revoked_already(text)
     what = "means several keys" if found else "is no key that the trust root names"
     return fail(ExitCode.USAGE, f"`{text}` {what}", "`rtshcua keys list` shows them: an id, or the name of its file")
+
+
+def _revoked_already(text: str) -> ExitCode:
+    return fail(ExitCode.USAGE, f"`{text}` was revoked already", "`rtshcua keys list` shows what is")
 
 
 def _link_named(text: str) -> bytes | None:
@@ -565,7 +578,7 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
         out(f"  {key.duty:<9} {key.kid.hex():<33} {names[key.kid]:<{wide}}  {speaks(key)}")
     for name in sorted(root.revocations):
         what = "the key of a link" if len(name) == LINK_ID_BYTES else "never trusted again"
-        out(f"  {'revoked':<9} {name.hex():<33} {what if len(name) == LINK_ID_BYTES else f'revoked-{name.hex()}.key'}")
+        out(f"  {'revoked':<9} {name.hex():<33} {'':<{wide}}  {what}")
     if root.witness_threshold > 1:
         out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
     return ExitCode.OK

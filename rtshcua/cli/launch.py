@@ -251,11 +251,16 @@ def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterabl
     return code if all(each.met for each in met) else ExitCode.TESTS
 
 
-def _read(path: Path) -> bytes:
-    data = read_regular(path, MAX_BUNDLE)
+def expect_no_source(path: Path) -> None:
+    """Raises `Refused` for a source in the place of a bundle."""
     if path.suffix == ".rts":  # what names it elsewhere is of the ground
         advice = f"`rtshcua compile {path} -o {path.stem}.bundle` makes one of it"
         raise Refused(ExitCode.INPUT, "wrong-kind", f"`{path}` is a source, and no bundle", advice)
+
+
+def _read(path: Path) -> bytes:
+    data = read_regular(path, MAX_BUNDLE)
+    expect_no_source(path)
     if len(data) > MAX_BUNDLE:
         raise Refused(ExitCode.INPUT, "too-large", f"`{path}` is larger than a bundle may be")
     kind = kind_of_document(data)

@@ -1,6 +1,7 @@
 """The vehicle is met: its first heartbeat, that it is the only one, and what is said when it is not heard."""
 
 import time
+from errno import ENOENT
 from typing import Final
 
 from rtshcua.adapters.clock import LinkClock
@@ -29,11 +30,15 @@ PORT_HELP: Final = {
     "`dialout` may open serial devices; `ls /dev/serial/by-id` shows which there are",
 }
 
+_NO_DEVICE: Final = "is it plugged in? `ls /dev/serial/by-id` shows which there are"
+
 
 def unopened(link: Address, error: OSError) -> Refusal:
     """That a link cannot be opened, and what to do."""
     verb = "listen at" if link.way in (Way.UDP_IN, Way.TCP_IN) else "open"
-    return Refusal("port", f"cannot {verb} `{link}`: {(error.strerror or str(error)).lower()}", PORT_HELP[link.way])
+    missing = link.way is Way.SERIAL and error.errno == ENOENT
+    help = _NO_DEVICE if missing else PORT_HELP[link.way]
+    return Refusal("port", f"cannot {verb} `{link}`: {(error.strerror or str(error)).lower()}", help)
 
 
 #: How long the vehicle's time is waited for where the operator stated how far ours is off, in seconds

@@ -128,6 +128,8 @@ def qualify(
     It flies, so somebody has to consent: `--sitl` or `--pilot NAME`. Ends with 0 when every check that was made holds,
     with 13 when one does not.
     """
+    if sitl and pilot is not None:
+        return fail(ExitCode.USAGE, "`qualify` requires consent: `--sitl` or `--pilot NAME`, not both", _CONSENT_HELP)
     if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
         return fail(ExitCode.USAGE, "`qualify` requires consent: either `--sitl` or `--pilot NAME`", _CONSENT_HELP)
     if takeover and sitl:

@@ -106,7 +106,7 @@ def sim(
     try:
         vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", "--system", str(system), *words])
     except SimulatorError as error:
-        return fail(ExitCode.LINK, str(error))
+        return fail(ExitCode.USAGE if error.usage else ExitCode.LINK, str(error))
     with vehicle:
         if as_json:
             out_json(json.dumps(vehicle.ready), flush=True)

@@ -58,7 +58,7 @@ def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_pat
 
     rehearsal = ground.start("run", "short.bundle", "--dry-run", *as_quad).end()
     (note,) = [text for text in notes(rehearsal) if "qualified" in text]
-    assert note.startswith("this vehicle is partly qualified only: not flown: leg (`--only`)")
+    assert note.startswith("this vehicle was qualified in simulation only, on ")
     assert doctor(ground, link)["found"] in note
 
     vehicle.signal(signal.SIGTERM)

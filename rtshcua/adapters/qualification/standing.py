@@ -36,16 +36,16 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
     if not record.qualifies:
         what = f"{_many(len(failed))} did not hold: {', '.join(failed)}" if failed else "nothing was checked"
         return Standing(False, f"this vehicle is not qualified: {what}")
-    left_out = unflown(record)
-    if left_out:
-        text = f"this vehicle is partly qualified only: not flown: {', '.join(left_out)} (`--only`)"
-        return Standing(False, text)
     day = datetime.fromtimestamp(record.issued_at_us / 1_000_000, UTC).date().isoformat()
     changes = record.changes(firmware, known)
     if changes:
         return Standing(False, f"this vehicle was qualified on {day}, and is another now: {'; '.join(changes)}")
     if not record.pilot:
         return Standing(False, f"this vehicle was qualified in simulation only, on {day}")
+    left_out = unflown(record)
+    if left_out:
+        text = f"this vehicle is partly qualified only: not flown: {', '.join(left_out)} (`--only`)"
+        return Standing(False, text)
     held = sum(each.outcome == CheckOutcome.HELD for each in record.checks)
     left = sum(each.outcome == CheckOutcome.UNCHECKED for each in record.checks)
     unsaid = [] if firmware is not None else ["it does not tell its version now"]

@@ -267,6 +267,16 @@ def test_a_signal_that_nobody_signs_stops_a_mission_that_needs_it() -> None:
     assert "--unsigned-radio" in found["signal/link.quality"].advice
 
 
+@FLAVOURS
+def test_one_that_answers_signed_frames_only_is_stopped_by_that_alone_where_no_key_was_given(flavour: str) -> None:
+    utc_us = VirtualClock().now().utc_us
+    found = examine(case.simulated(flavour, signing_key=KEY, utc_us=utc_us))
+    assert stops(found) == {"link/signing"}
+    assert "--signing-key" in found["link/signing"].advice
+    assert found["link/answers"].verdict is MissionVerdict.UNKNOWN
+    assert "no key was given" in found["link/round-trip"].found
+
+
 def test_what_is_not_believed_is_no_value() -> None:
     found = signed("ardupilot")
     assert found["signal/link.quality"].verdict is MissionVerdict.STOP, "the radio's frames are heard, and not taken in"

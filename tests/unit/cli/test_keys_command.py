@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -416,3 +417,22 @@ def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureF
     accept[2] = str(damaged)
     (tmp_path / "trust" / "vehicle-quad-07").rmdir()
     assert app.main(accept) == ExitCode.INPUT
+
+
+def test_the_list_names_files_and_the_roots_version_and_what_is_revoked_is_not_again(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    app.main(["keys", "init"])
+    app.main(["keys", "approver", "ada", "--role", "supervisor"])
+    told = capsys.readouterr().out
+    assert "  version  2\n" in told
+    assert re.search(r"approval  [0-9a-f]{32}  approval-ada-supervisor\.key  ada in person", told)
+    gone = listed(capsys)["approval"][-1]
+    assert app.main(["keys", "revoke", gone]) == ExitCode.OK
+    hint = capsys.readouterr().out.splitlines()[-1]
+    assert re.search(r"accept \S+/root-1\.trust \S+/root-2\.trust \S+/root\.trust --vehicle", hint)
+    assert app.main(["keys", "revoke", gone[:8]]) == ExitCode.USAGE
+    assert f"`{gone[:8]}` was revoked already" in capsys.readouterr().err
+    assert app.main(["keys", "revoke", "--link", "0" * 16]) == ExitCode.OK
+    assert app.main(["keys", "revoke", "--link", "0" * 16]) == ExitCode.USAGE
+    assert "was revoked already" in capsys.readouterr().err

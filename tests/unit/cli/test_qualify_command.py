@@ -33,7 +33,7 @@ LINK = ["--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]
     ("words", "code", "says"),
     [
         ([SHORT, *LINK], 2, "`qualify` requires consent"),
-        ([SHORT, *LINK, "--sitl", "--pilot", "ada"], 2, "`qualify` requires consent"),
+        ([SHORT, *LINK, "--sitl", "--pilot", "ada"], 2, "`--sitl` or `--pilot NAME`, not both"),
         ([SHORT, *LINK, "--pilot", " "], 2, "`qualify` requires consent"),
         ([SHORT, *LINK, "--sitl", "--takeover"], 2, "`--takeover` requires `--pilot`"),
         ([SHORT, *LINK, "--sitl", "--unsigned-radio"], 2, "`--unsigned-radio` requires `--signing-key`"),

@@ -328,7 +328,7 @@ class Qualifying:
         path = None
         if not broken:
             signed = sign_qualification(record, self.keys[Duty.LOG])
-            whole = not unflown(record) or not self._was_whole()
+            whole = not unflown(record) or bool(record.failed) or not self._was_whole()
             path = keep_record(data_folder(), record.vehicle, signed) if whole else None
         if broken or ended is Ending.CRASHED:
             code = EXIT_CODES[ended]

@@ -91,11 +91,10 @@ def unverified(envelope: bytes, *, limit: int = cbor.LIMIT) -> Unverified:
 
 def _headers(protected: bytes) -> tuple[str, bytes]:
     match _decode(protected, len(protected)):
-        case {1: int(algorithm), 3: str(content_type), 4: bytes(kid), **others} if not others:
+        case {1: int(algorithm), 3: str(content_type), 4: bytes(kid), **others} if not others and len(kid) == KID_BYTES:
             if algorithm != ED25519:
                 raise EnvelopeError("malformed", f"signature algorithm {algorithm} is not Ed25519 ({ED25519})")
-            if len(kid) == KID_BYTES:
-                return content_type, kid
+            return content_type, kid
     raise EnvelopeError("malformed", "the protected header is not algorithm, content type and key identifier")
 
 

@@ -58,8 +58,9 @@ def test_more_rules_than_fit_are_not_looked_at(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(elaborate, "MAX_RULES", 20)
     text = policy("apart", 10 if of_templates else 30)
     if of_templates:
-        text = "template t() {\n  permit goto by role other\n  permit goto by role third\n}\n" + text.replace(
-            "  contingency", "  use t()\n" * 6 + "  contingency"
+        text = (
+            "role other, third\ntemplate t() {\n  permit goto by role other\n  permit goto by role third\n}\n"
+            + text.replace("  contingency", "  use t()\n" * 6 + "  contingency")
         )
     lines = text.splitlines(keepends=True)
     text = "".join(sorted(lines, key=lambda line: not line.startswith("import")))

@@ -87,10 +87,16 @@ def _check(
         case (
             {1: -19, 4: bytes(kid), 15: {1: str(origin), 2: str(subject), **no_claims}, 395: 1, **no_more},
             (int(size), int(number), (*path,)),
-        ) if not no_claims and not no_more:
-            hashes = [node for node in path if type(node) is bytes and len(node) == _HASH]
-            if len(hashes) == len(path) and path and type(size) is type(number) is int and subject == str(size):
-                return _verify(protected, kid, origin, (size, number, hashes), line, root, signature, pinned)
+        ) if (
+            not no_claims
+            and not no_more
+            and path
+            and all(type(node) is bytes and len(node) == _HASH for node in path)
+            and type(size) is type(number) is int
+            and subject == str(size)
+        ):
+            hashes = [node for node in path if isinstance(node, bytes)]
+            return _verify(protected, kid, origin, (size, number, hashes), line, root, signature, pinned)
     return Flaw("proof/malformed", "the headers of the receipt, or its proof, are not those of RFC 9942")
 
 

@@ -80,7 +80,7 @@ def test_no_role_is_invented_where_the_policy_names_one(here: Path, capsys: pyte
     put(
         "own.rts",
         'import "lib:policies/site.rts"\nimport "lib:skills/takeoff.rts"\nimport "lib:skills/return_home.rts"\n'
-        'import "lib:skills/emergency_land.rts"\npolicy own version 1 {\n  permit takeoff by role pilot\n'
+        'import "lib:skills/emergency_land.rts"\nrole pilot\npolicy own version 1 {\n  permit takeoff by role pilot\n'
         "  permit return_home, emergency_land by any\n  contingency return_home, emergency_land\n}\n",
     )
     code, out, _ = run(capsys, "--generate", "own.rts")

@@ -30,6 +30,7 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.configured import MeantSettings, settings_of
+from rtshcua.cli.connection import Connect, LinkKey, System, UnsignedRadio
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.launch import expect_no_source
 from rtshcua.cli.meeting import unmet, unopened
@@ -57,20 +58,13 @@ _EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
 
 @app.command()
 def doctor(
-    connect: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="`serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, "
-                                                   "`udpout:HOST:PORT`")
-    ],
+    connect: Connect,
     bundle: Annotated[Path | None, typer.Argument(help="a mission that it is to fly; else the signals that ship")]
     = None,
     seconds: Annotated[float, typer.Option(min=3, max=600, help="how long to listen")] = 10.0,
-    signing_key: Annotated[Path | None, typer.Option(metavar="FILE", help="the link's key, if it is signed")] = None,
-    unsigned_radio: Annotated[
-        bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, as for `run`")
-    ] = False,
-    system: Annotated[
-        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
-    ] = None,
+    signing_key: LinkKey = None,
+    unsigned_radio: UnsignedRadio = False,
+    system: System = None,
     agent_user: Annotated[
         str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
     ] = None,

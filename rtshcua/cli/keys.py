@@ -22,6 +22,7 @@ from rtshcua.adapters.link_setup import LinkSetup, after_setup, carry_out
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.cli.connection import System
 from rtshcua.cli.documents import AsJson
 from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.meeting import unopened
@@ -358,9 +359,7 @@ def link(
         bool,
         typer.Option("--trusted-link", help="you vouch that nobody else hears this link: the key crosses it in clear"),
     ] = False,
-    system: Annotated[
-        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
-    ] = None,
+    system: System = None,
 ) -> ExitCode:
     """Make a key for MAVLink 2 signing: `rtshcua run --signing-key FILE`, and the same key in the vehicle.
 

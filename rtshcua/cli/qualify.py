@@ -27,7 +27,7 @@ from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.cli.clock_error import duration_us, utc_error_text
+from rtshcua.cli.connection import Connect, LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_us
 from rtshcua.cli.faults import code_of, fail, misaddressed, say, tell, untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.flight import EXIT_CODES
@@ -81,13 +81,7 @@ _CONSENT_HELP: Final = (
 @app.command()
 def qualify(
     source: Annotated[Path, typer.Argument(help="a source with a mission (.rts): the sorties fly under its policy")],
-    connect: Annotated[
-        str,
-        typer.Option(
-            metavar="ADDRESS",
-            help="the vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
-        ),
-    ],
+    connect: Connect,
     vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is, as its policy says")],
     sitl: Annotated[
         bool, typer.Option("--sitl", help="it is a simulation: a second ground station takes it over")
@@ -104,22 +98,11 @@ def qualify(
     mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
     speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")] = None,
-    signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="the link's key: sign what is sent, believe nothing unsigned")
-    ] = None,
-    unsigned_radio: Annotated[
-        bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, as for `run`")
-    ] = False,
-    system: Annotated[
-        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
-    ] = None,
-    no_fence: Annotated[bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is")] = False,
-    utc_error: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME", callback=utc_error_text, help="how far UTC is off here, if neither kernel nor vehicle says"
-        ),
-    ] = None,
+    signing_key: LinkKey = None,
+    unsigned_radio: UnsignedRadio = False,
+    system: System = None,
+    no_fence: NoFence = False,
+    utc_error: UtcError = None,
     runs: Annotated[Path, typer.Option(help="where the folders of the sorties are made")] = Path("runs"),
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the record last")] = False,
 ) -> ExitCode:  # fmt: skip
@@ -207,6 +190,7 @@ class _Flown:
 
     sortie: Sortie
     sends: bool
+    as_json: bool = False
     driven: QualifyingDriver | None = None
     observed: ObservedSortie | None = None
     final_hash: str = ""
@@ -227,6 +211,7 @@ class _Flown:
         while not seen.down and not (seen.landed_state and seen.armed) and time.monotonic() < until_s:
             events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
         if seen.down:
+            _announce(self.sortie, as_json=self.as_json)
             return events
         what = (
             "the vehicle is armed or in the air"
@@ -302,8 +287,7 @@ class Qualifying:
         """Fly one after the other, until one does not go as planned; how the last one ended."""
         folder = order.bundle
         for sortie in self.sorties:
-            _announce(sortie, as_json=as_json)
-            flown = _Flown(sortie, sends=not self.pilot)
+            flown = _Flown(sortie, sends=not self.pilot, as_json=as_json)
             bundle = folder / f"{NAME}-{sortie.name}.bundle"
             write_new(bundle, self._bundle(sortie))
             launch(replace(order, bundle=bundle, sortie=flown))

@@ -16,8 +16,8 @@ from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.cli import simulated, witnessed
-from rtshcua.cli.clock_error import duration_us, utc_error_text
 from rtshcua.cli.configured import Settings, settings_of
+from rtshcua.cli.connection import LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_us
 from rtshcua.cli.faults import fail, misaddressed, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.cli.stdout import out_json
@@ -57,30 +57,17 @@ def run(
     ] = None,
     log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
-    signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="the link's key: sign what is sent, believe nothing unsigned")
-    ] = None,
-    unsigned_radio: Annotated[
-        bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, the worst of the last seconds")
-    ] = False,
-    system: Annotated[
-        int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
-    ] = None,
+    signing_key: LinkKey = None,
+    unsigned_radio: UnsignedRadio = False,
+    system: System = None,
     runs: Annotated[Path, typer.Option(help="where the run's folder is made")] = Path("runs"),
     state_dir: Annotated[Path | None, typer.Option(help="where it is kept which bundles flew (the data folder)")]
     = None,
     fresh_state: Annotated[bool, typer.Option("--fresh-state", help="forget which bundles flew; simulation only")]
     = False,
-    no_fence: Annotated[
-        bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
-    ] = False,
+    no_fence: NoFence = False,
     set_: Settings = None,
-    utc_error: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME", callback=utc_error_text, help="how far UTC is off here, if neither kernel nor vehicle says"
-        ),
-    ] = None,
+    utc_error: UtcError = None,
     agent_socket: Annotated[
         Path | None, typer.Option(metavar="PATH", help="a local socket: records go out, signed documents come in")
     ] = None,

@@ -15,6 +15,7 @@ from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, Parameter, 
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
+from rtshcua.model.quantity import Dimension, display
 
 #: the shipped skill of each kind of motion, where a policy has several of the kind
 _SHIPPED: Final = {
@@ -93,11 +94,11 @@ def _step(contract: Contract, hold_us: int, trial: Trial, policy: Policy) -> str
         if each.kind == PLACE and motion.kind == MotionKind.FLY:
             arguments.append(f"{each.name} = {_place(trial, policy)}")
         elif each.cell == motion.altitude:
-            arguments.append(f"{each.name} = {_within(each, trial.height)} mm")
+            arguments.append(f"{each.name} = {display(_within(each, trial.height), Dimension.LENGTH)}")
         elif each.cell == motion.speed:
-            arguments.append(f"{each.name} = {_within(each, trial.speed)} mm/s")
+            arguments.append(f"{each.name} = {display(_within(each, trial.speed), Dimension.SPEED)}")
         elif each.cell == motion.time:
-            arguments.append(f"{each.name} = {_within(each, hold_us) // 1_000} ms")
+            arguments.append(f"{each.name} = {display(_within(each, hold_us) // 1_000 * 1_000, Dimension.DURATION)}")
     return f"{contract.name}({', '.join(arguments)})"
 
 

@@ -1,0 +1,53 @@
+"""The options of a connection to a vehicle, as `run`, `qualify` and `doctor` share them."""
+
+import re
+from decimal import ROUND_CEILING, Decimal
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+_TIME = re.compile(r"(?P<number>[0-9]{1,9}(?:\.[0-9]{1,6})?) ?(?P<unit>ms|s|min)", re.ASCII)
+_US = {"ms": 1_000, "s": 1_000_000, "min": 60_000_000}
+
+
+def _utc_error(text: str | None) -> str | None:
+    """The option's value, checked."""
+    if text is not None and not _TIME.fullmatch(text):
+        raise typer.BadParameter(f"`{text}` is no time, such as 500ms or 2s")
+    return text
+
+
+Connect = Annotated[
+    str,
+    typer.Option(
+        metavar="ADDRESS",
+        help="the vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
+    ),
+]
+LinkKey = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="the link's key: sign what is sent, believe nothing unsigned")
+]
+UnsignedRadio = Annotated[
+    bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, the worst of the last seconds")
+]
+System = Annotated[
+    int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
+]
+NoFence = Annotated[
+    bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
+]
+UtcError = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME", callback=_utc_error, help="how far UTC is off here, if neither kernel nor vehicle says"
+    ),
+]
+
+
+def duration_us(text: str | None) -> int | None:
+    """`500ms`, `1.5s` or `2min` in us, rounded up; None for no text. It was checked before."""
+    found = None if text is None else _TIME.fullmatch(text)
+    if found is None:
+        return None
+    return int((Decimal(found["number"]) * _US[found["unit"]]).to_integral_value(ROUND_CEILING))

@@ -57,8 +57,7 @@ size: setup ## count modules, code lines, shared names and functions that are to
 	@$(BIN)/python .make/size
 
 dist: setup ## build the wheel into dist, and its bill of materials (CycloneDX); the same bytes each time
-	$(BIN)/python -m build --wheel --no-isolation --outdir dist
-	$(BIN)/python .make/sbom > dist/rtshcua.cdx.json
+	@.make/dist $(BIN)/python
 
 clean: ## remove set-up, builds and caches; runs/ and keys stay
 	rm -rf .venv build dist .coverage .coverage.* .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

@@ -1,6 +1,14 @@
 """Threat: a source of megabytes keeps a build busy for minutes, or fills its log."""
 
+import ast
+import json
+import re
+import re._constants as constants  # type: ignore[import-not-found]
+import re._parser as patterns  # type: ignore[import-not-found]
+import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,11 +19,13 @@ from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.elaborate import elaborate
+from rtshcua.ground.format.comments import gap_of
 from rtshcua.ground.language import load as loading
 from rtshcua.ground.language import parse as parsing
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.size import MAX_TOKENS
+from rtshcua.ground.language.table import PATH as TABLE
 from rtshcua.mavlink import dialect
 
 MOST = 1_000  # instead of `MAX_TOKENS`, for speed
@@ -73,3 +83,74 @@ def test_more_rules_than_fit_are_not_looked_at(monkeypatch: pytest.MonkeyPatch, 
 def test_a_long_text_that_a_finding_quotes_is_cut_for_a_person() -> None:
     told = render_one(Diagnostic(IMPORT_PATH, "x" * 10_000_000, None, "y" * 10_000_000), {})
     assert len(told) < 3 * MOST_TEXT
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['import "{}"\n', 'import "{}', '"{}"', "zone {} {{}}\n", "zone a = circle(47 N, 8 E, {} m)\n", "/*{}*/"],
+)
+@pytest.mark.parametrize("filling", ["x", "\U0001f600", '\\"', "1_", "a.", "* "])
+def test_a_word_of_a_source_takes_no_memory_for_each_of_its_characters(text: str, filling: str) -> None:
+    source = Source("a.rts", text.format(filling * 50_000))
+    parse(source)  # the table is read
+    tracemalloc.start()
+    try:
+        parse(source)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 20 * len(source.text.encode()) + 500_000
+
+
+def single(items: Any) -> bool:
+    """Whether a part of a pattern is one character."""
+    (op, value), *more = items
+    if op is constants.SUBPATTERN:
+        return not more and value[0] is None and single(value[-1])
+    return not more and op in (constants.ANY, constants.IN, constants.LITERAL, constants.NOT_LITERAL)
+
+
+def given_back(items: Any) -> Iterator[Any]:
+    """The groups that a pattern repeats without end and may give back: each repetition is kept in memory for that, 130
+    bytes of it, so a text of 8 MiB takes gigabytes.
+    """
+    for op, value in items:
+        match op:
+            case constants.MAX_REPEAT | constants.MIN_REPEAT | constants.POSSESSIVE_REPEAT:
+                _, most, repeated = value
+                if op is not constants.POSSESSIVE_REPEAT and most is constants.MAXREPEAT and not single(repeated):
+                    yield repeated
+                yield from given_back(repeated)
+            case constants.SUBPATTERN:
+                yield from given_back(value[-1])
+            case constants.BRANCH:
+                for branch in value[1]:
+                    yield from given_back(branch)
+            case constants.ASSERT | constants.ASSERT_NOT:
+                yield from given_back(value[1])
+            case constants.ATOMIC_GROUP:
+                yield from given_back(value)
+
+
+def written_patterns() -> Iterator[tuple[str, str, int]]:
+    """Each pattern that stands in a module as a whole, and those of the language's words."""
+    raw = json.loads(TABLE.read_text(encoding="utf-8"))
+    yield from ((name, each, 0) for name, each in [*raw["patterns"], *(("ignored", each) for each in raw["ignored"])])
+    for file in sorted((Path(LIBRARY) / "rtshcua").rglob("*.py")):
+        text = file.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if re.search(r"\bre\.[a-z]+\(", text) else ():
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name(id="re")), args=[ast.Constant(value=str(each)), *_]):
+                    yield file.name, each, re.VERBOSE if "VERBOSE" in ast.unparse(node) else 0
+
+
+def test_no_pattern_keeps_what_it_might_give_back() -> None:
+    assert list(given_back(patterns.parse(r'"(?:[^"]|\\.)*"')))
+    found = [(name, each) for name, each, flags in written_patterns() if list(given_back(patterns.parse(each, flags)))]
+    assert found == []
+
+
+def test_comments_on_one_line_are_put_together_once() -> None:
+    gap = gap_of("/*1*/ /*2*/\n/*3*/  // 4\n" + "/**/" * 300_000, at_start=True, at_end=True)
+    assert [each.text[:11] for each in gap.comments] == ["/*1*/ /*2*/", "/*3*/ // 4", "/**/ /**/ /"]
+    assert [(each.first, each.last) for each in gap.comments] == [(True, True)] * 3

@@ -23,7 +23,7 @@ from rtshcua.model.ir.signals import SignalDecl
 Steps = Callable[[Sequence[View]], Iterable[View]]
 RENAMED = (Sort.DECLARED, Sort.PARAMETER, Sort.MEMBER, Sort.CHOICE)
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
-_DOTTED = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*", re.ASCII)
+_DOTTED = re.compile(r"[A-Za-z_][A-Za-z0-9_]*+(?:\.[A-Za-z_][A-Za-z0-9_]*+)*+", re.ASCII)
 _TAKEN = ("phase", "local")
 """Names that would be read as words where values stand."""
 _READ = dict.fromkeys(WELL_KNOWN, "every decision needs it") | dict.fromkeys(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.ground.lint.comments import ignores_line
 
-COMMENT = re.compile(r"//[^\n]*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/")
+COMMENT = re.compile(r"//[^\n]*+|/\*[^*]*+\*++(?:[^/*][^*]*+\*++)*+/")
 #: what may be taken away at the end of a line; other characters that Python calls blank are what a comment says
 BLANKS = " \t\r\f"
 
@@ -59,6 +59,7 @@ def gap_of(text: str, *, at_start: bool, at_end: bool) -> Gap:
         lines = text.count("\n")
         return Gap((), lines > 0, lines > 1)
     rows: list[Comment] = []
+    beside: list[str] = []  # the comments of the last row, put together once: there may be millions
     before, end, ended = at_start, 0, at_start
     blank = False
     for found in COMMENT.finditer(text):
@@ -66,13 +67,14 @@ def gap_of(text: str, *, at_start: bool, at_end: bool) -> Gap:
         ended = ended or lines > 0
         told = content(found[0])
         if rows and not lines:
-            rows[-1] = rows[-1]._replace(text=f"{rows[-1].text} {told}")
+            beside.append(told)
         else:
             if rows:
-                rows[-1] = rows[-1]._replace(last=True)
+                rows[-1] = rows[-1]._replace(text=" ".join(beside), last=True)
             blank = lines > 1
+            beside = [told]
             rows.append(Comment(told, before or lines > 0, False, blank))
         before, end = False, found.end()
     lines = text.count("\n", end)
-    rows[-1] = rows[-1]._replace(last=lines > 0 or at_end)
+    rows[-1] = rows[-1]._replace(text=" ".join(beside), last=lines > 0 or at_end)
     return Gap(tuple(rows), ended or lines > 0 or any("\n" in row.text for row in rows), lines > 1)

@@ -30,7 +30,9 @@ from rtshcua.model.ir.tests import NominalDecl, TestDecl
 T = TypeVar("T", bound=Node)
 
 _TOKENS = re.compile(
-    r"""//[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | \s++ | (?P<token>"(?:[^"\\\n]|\\.)*+"? | [A-Za-z0-9_.]++ | .)""", re.VERBOSE
+    r"""//[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | \s++
+      | (?P<token>"(?:[^"\\\n]++|\\.)*+"? | [A-Za-z0-9_.]++ | .)""",
+    re.VERBOSE,
 )
 
 

@@ -14,7 +14,7 @@ from rtshcua.diagnostics.span import Source, Span
 LINE, FILE = "ignore", "ignore-file"
 
 _TOKEN = re.compile(
-    r'(?P<text>"(?:[^"\\\n]|\\[^\n])*"?)|(?P<comment>//[^\n]*|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]+|/)', re.DOTALL
+    r'(?P<text>"(?:[^"\\\n]++|\\[^\n])*+"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)', re.DOTALL
 )
 _ASKED = re.compile(r"\s*rtshcua:\s*(?P<word>[^\s,]*)(?P<rest>.*)", re.DOTALL)
 

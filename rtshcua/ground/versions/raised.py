@@ -19,7 +19,7 @@ from rtshcua.model.ir.policies import PolicyDecl
 #: of how many differences a finding tells
 MAX_TOLD = 3
 
-_VERSION = re.compile(r"(?:\s|//[^\n]*|/\*.*?\*/)*version(?:\s|//[^\n]*|/\*.*?\*/)*(\d+)", re.DOTALL)
+_VERSION = re.compile(r"(?:\s++|//[^\n]*+|/\*.*?\*/)*+version(?:\s++|//[^\n]*+|/\*.*?\*/)*+(\d+)", re.DOTALL)
 
 
 class Compared(NamedTuple):

@@ -9,6 +9,7 @@
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
 | `unseen` | motion after a takeover | ArduCopter's pause, sticks that nudge; PX4's where it stands, or ends a climb |
+| `report` | standing down in the air | the mode in a stuck HEARTBEAT, as if somebody had chosen it again |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
 | `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
@@ -46,6 +47,8 @@ _TICK_US: Final = 50_000
 _SAME_MM: Final = 1_000
 #: a process that is killed has not written the last of these
 _UNWRITTEN_US: Final = 250_000
+#: us: a mode that a stuck HEARTBEAT told is believed so long after
+_MODE_US: Final = 2_000_000
 _RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
 _FOREVER: Final = 1 << 60
 
@@ -77,7 +80,7 @@ class Excuses:
             "collision": (
                 self._motors, self._battery, self._taken, self._wind, self._process, self._link, self._obstacle,
             ),
-            "not-ended": (self._taken, self._wind, self._process),
+            "not-ended": (self._taken, self._wind, self._process, self._misled),
             "motion-after-takeover": (self._unseen,),
             "late": (self._link,),
             "log": (self._disk,),
@@ -180,6 +183,8 @@ class Excuses:
         off, since_us = 0.0, failure.at_us
         for fault in self._before(failure.at_us, faults.ReceiverFault):
             ended_us = fault.at_us + (getattr(fault, "for_us", None) or _FOREVER)
+            if isinstance(fault, faults.GpsLoss) and self._lands_blind(ended_us + _AFTER_GLITCH_US, failure.at_us):
+                ended_us = failure.at_us
             lasted_s = (min(ended_us, failure.at_us) - fault.at_us) / 1e6
             match fault:
                 case faults.GpsJump(_, north_mm, east_mm):
@@ -194,6 +199,21 @@ class Excuses:
                     continue
             since_us = min(since_us, fault.at_us)
         return "position" if off and failure.amount <= off + self._stop_mm(since_us, failure.at_us) else None
+
+    def _lands_blind(self, back_us: int, at_us: int) -> bool:
+        """Whether it lands since before its position was back: ArduCopter asks for one as a landing begins, and not
+        again (`ModeLand::init`).
+        """
+        lands = [sample.mode is Mode.LAND for sample in self._flown.samples if back_us <= sample.at_us < at_us]
+        return self._flown.flavour == "ardupilot" and all(lands)
+
+    def _misled(self, failure: Failure) -> str | None:
+        """The last mode that showed came from a HEARTBEAT that was stuck: as if somebody had chosen it again."""
+        if self._flown.ending != "stood-down":
+            return None
+        stuck = self._during(failure.at_us - _MODE_US, failure.at_us)
+        told = any(isinstance(fault, faults.MessageStuck) and fault.message == "HEARTBEAT" for fault in stuck)
+        return "report" if told else None
 
     def _air_mm_s(self, at_us: int) -> float:
         start = self._flown.scenario.start

@@ -381,7 +381,8 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         at = bisect_left(times, frame.sent_us)
         since_us = flown.samples[at].taken_over_us if at < len(times) else None
         if since_us is None or (frame.heard_us or frame.sent_us) <= since_us:
-            holds = kinds == {MotionKind.HOLD}
+            if frame.heard_us is not None:
+                holds = kinds == {MotionKind.HOLD}
             crossed = crossed or (since_us is not None and frame.heard_us == since_us)  # at that very moment
             continue
         after_us = frame.sent_us - since_us

@@ -7,6 +7,7 @@ from campaign.test_wrong import at, of, slugs
 from rtshcua.model import faults
 from rtshcua.model.faults import Way
 from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.judge import judge
 
 S = 1_000_000
 
@@ -36,7 +37,12 @@ def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_a
 
 
 def events(was: ScenarioFlown) -> set[str]:
-    return {json.loads(line).get("event") for life in was.lives for line in life.lines}
+    return {record(line).get("event") for life in was.lives for line in life.lines}
+
+
+def record(line: bytes) -> dict[str, object]:
+    found: dict[str, object] = json.loads(line)
+    return found
 
 
 def test_motors_that_stop_low_in_a_takeoff_are_no_landing_before_it_lies_there() -> None:
@@ -53,3 +59,10 @@ def test_a_failsafe_of_px4_in_the_mode_that_we_fly_in_is_a_takeover() -> None:
         was = flown(of("px4", lost, at(jump_s, faults.GpsJump(0, 60_000, 0))))
         assert any(each.taken_over_by == "failsafe" for each in was.samples), "nothing took over"
         assert (was.ending, slugs(was)) == ("stood-down", set())
+
+
+def test_who_stands_down_on_a_stuck_mode_is_excused() -> None:
+    """Nothing tells it from somebody who chose the mode of before again."""
+    was = flown(of("ardupilot", at(41.2, faults.MessageStuck(0, "HEARTBEAT", 4 * S))))
+    assert (was.ending, slugs(was)) == ("stood-down", set())
+    assert {each.cause for each in judge(was).exceptions} == {"report"}

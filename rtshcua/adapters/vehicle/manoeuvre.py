@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle.effects import apart, still
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
-from rtshcua.adapters.vehicle.supervision import NEVER, Brakes, BrakingWatch, StageProgress, TargetWatch
+from rtshcua.adapters.vehicle.supervision import MODE_BEATS, NEVER, Brakes, BrakingWatch, StageProgress, TargetWatch
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Succeeded, TakenOver
 
@@ -195,9 +195,8 @@ UNKNOWN: Final = "unknown/no-answer"
 MODE_UNKNOWN_US: Final = 5_000_000
 #: mm: a vehicle that holds, and is further than this from where it came to stand, does not hold
 HOLDS_WITHIN: Final = 15_000
-#: so long after it accepted a mode, in us of link time, and so many heartbeats, the mode shows
+#: so long after it accepted a mode, in us of link time, and `MODE_BEATS`, the mode shows
 TAKEN_BACK_US: Final = 1_500_000
-TAKEN_BACK_BEATS: Final = 2
 #: these stop the vehicle, or bring it home or down: they leave on the last mode report, while it is young
 _URGENT: Final = (MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
@@ -412,6 +411,7 @@ class Manoeuvre:
             return None
         if seen.mode in self._modes:
             self._before, self._accepted = frozenset(), None
+            self._aids.targets.obeyed()
         elif seen.mode not in self._before or self._was_taken_back(seen):
             return self._flavour.mode_name(seen.mode)
         self._was_landing = self._was_landing and seen.landing
@@ -429,7 +429,7 @@ class Manoeuvre:
         if self._accepted is None:
             self._accepted = seen.up_us, seen.beats
         accepted_us, beats = self._accepted
-        return seen.up_us - accepted_us > TAKEN_BACK_US and seen.beats - beats >= TAKEN_BACK_BEATS
+        return seen.up_us - accepted_us > TAKEN_BACK_US and seen.beats - beats >= MODE_BEATS
 
     def _failure(self, seen: ObservedVehicle) -> str | None:
         """Why the present stage cannot be waited for any longer, as a slug."""

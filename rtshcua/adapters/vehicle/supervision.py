@@ -6,12 +6,14 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-from rtshcua.adapters.vehicle.effects import STILL
-from rtshcua.adapters.vehicle.flavour import ExpectedProgress, ExpectedTarget
+from rtshcua.adapters.vehicle.effects import STILL, apart
+from rtshcua.adapters.vehicle.flavour import KEPT, ExpectedProgress, ExpectedTarget
 from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Reported
 from rtshcua.model.flat.policy import Vehicle
 
 NEVER: Final = (1 << 63) - 1  # us
+#: so many heartbeats after a mode took effect it shows
+MODE_BEATS: Final = 2
 
 #: mm by which some measure must fall for it to count as progress
 LEAST: Final = 1_000
@@ -141,6 +143,8 @@ class TargetWatch:
         self._settled_us = 0
         self._given: ExpectedTarget | None = None  # the present target as it was given, before the vehicle named it
         self._more = 0  # how often it may name another, for it was told again
+        self._left: Reported | None = None  # what it flew to before a command that has no target
+        self._strayed: int | None = None  # the number of the heartbeat after which it flew elsewhere
         #: whether the autopilot was seen to fly to the present target
         self.shown = False
 
@@ -156,6 +160,10 @@ class TargetWatch:
         somebody else's, also one that shows only after our next frame left.
         """
         settles_us = 0 if self.shown else SETTLES_US
+        if target is not None:
+            self._left = self._strayed = None
+        elif self._left is None and (self.shown or seen.target == self._prior):
+            self._left = seen.target
         self._expected, self.shown = target, False
         self._given, self._more = target, 0
         self._prior, self._settled_us = seen.target, seen.up_us + settles_us
@@ -175,8 +183,10 @@ class TargetWatch:
     def is_foreign(self, seen: ObservedVehicle) -> bool:
         """Whether it flies to somebody else's target."""
         expected, reported = self._expected, seen.target
-        if expected is None or reported is None:
+        if reported is None:
             return False
+        if expected is None:
+            return self._has_strayed(reported, seen.beats)
         if reported == self._prior and not self.shown:
             return False  # not obeyed yet; when it never is, there is no progress
         if expected.matches(reported):
@@ -192,10 +202,31 @@ class TargetWatch:
             return False  # not obeyed yet
         return seen.up_us >= self._settled_us
 
+    def obeyed(self) -> None:
+        """The mode of the present command shows: where it has no target, it goes where the autopilot has it go."""
+        if self._expected is None:
+            self._left = None
+
+    def _has_strayed(self, reported: Reported, beats: int) -> bool:
+        """Whether it left for somewhere else before our command, which has no target, showed in its mode.
+
+        Where our command itself is why, two heartbeats after that tell its mode.
+        """
+        if self._left is None or _same(self._left, reported):
+            self._strayed = None
+            return False
+        if self._strayed is None:
+            self._strayed = beats
+        return beats - self._strayed >= MODE_BEATS
+
     def _show(self, expected: ExpectedTarget, reported: Reported) -> None:
         if not self.shown:  # this is the one, from now on
             self._ours[-1] = self._expected = expected.as_reported(reported)
         self.shown = True
+
+
+def _same(one: Reported, other: Reported) -> bool:
+    return abs(one[2] - other[2]) <= KEPT and apart(*one[:2], *other[:2]) <= KEPT
 
 
 # ---------------------------------------------------------------- crashes

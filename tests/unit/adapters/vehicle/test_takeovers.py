@@ -398,3 +398,20 @@ def test_a_go_to_that_comes_before_our_question_is_not_flown_over(aloft: Make) -
 )
 def test_no_frame_leaves_later_than_w_at_any_moment(aloft: Make, flavour: str, name: str) -> None:
     try_all(aloft, flavour, name, whole=True)
+
+
+def test_before_a_command_without_a_target_shows_another_target_is_a_takeover() -> None:
+    """Two heartbeats later, for what our own command changes shows in the mode by then."""
+    ours, theirs = (470_000_000, 80_000_000, 500_000), (470_001_000, 80_000_000, 500_000)
+    targets, seen = TargetWatch(), ObservedVehicle()
+    targets.expect(ExpectedTarget(*ours), seen)
+    seen.target = ours
+    assert not targets.is_foreign(seen)
+    targets.expect(None, seen)  # a return, which a link that is silent upwards swallows
+    for beats, target, foreign in ((1, ours, False), (2, theirs, False), (3, theirs, False), (4, theirs, True)):
+        seen.beats, seen.target = beats, target
+        assert targets.is_foreign(seen) is foreign, beats
+    targets.expect(None, seen)  # the next fallback
+    assert targets.is_foreign(seen)
+    targets.obeyed()
+    assert not targets.is_foreign(seen)

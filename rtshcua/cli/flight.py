@@ -77,8 +77,8 @@ _KNOWING = (
 
 class Flight:
     """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off.
-    `simulated`: what the log says of a flight that was. `trusted` raises `Refused` where the bundle is not to be
-    trusted by the time that the clock has now.
+    `simulated`: what the log says of a flight that was. `lapsed` says why the bundle is not to be trusted by the
+    time that the clock has now.
 
     Once it is made, the first record is on the disk. Raises OSError where the disk does not take it.
     """
@@ -88,7 +88,7 @@ class Flight:
         tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, witnesses: Witnessing, utc: UtcWatch,
-        trusted: Callable[[], None], debts: OwedParameters, agents: Agents | None = None,
+        lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
@@ -124,7 +124,7 @@ class Flight:
             self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
         if past.note:
             self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
-        self._utc, self._trusted = utc, trusted
+        self._utc, self._lapsed = utc, lapsed
         self._sink.append(self._recorder.effect(now, CLOCK, detail=utc.bound.told()), WRITTEN)
         self._sink.settle()
         witnesses.begin(log.path, lambda: self._sink.synced)
@@ -304,12 +304,11 @@ class Flight:
         self._vehicle.driver.asks_utc = False
         now = self._clock.now()
         self._sink.append(self._recorder.effect(now, CLOCK, detail=self._utc.bound.told()), WRITTEN)
-        try:
-            self._trusted()
-        except Refused as refused:
-            self._feed.post(Note(f"by the vehicle's time: {refused}"))
-            return [Interrupted(now.monotonic_us)]
-        return []
+        lapsed = self._lapsed()
+        if lapsed is None:
+            return []
+        self._feed.post(Note(f"by the vehicle's time: {lapsed}"))
+        return [Interrupted(now.monotonic_us)]
 
     def _what_follows(self) -> str:
         """What comes of the first request to stop."""

@@ -302,7 +302,8 @@ def accept(
     except Untrusted as error:
         return fail(code_of(error.slug), str(error), HELPS.get(error.slug), slug=f"root-{error.slug}")
     if taken.distrust is not None:
-        return fail(taken.distrust.code, str(taken.distrust), taken.distrust.help, slug=taken.distrust.slug)
+        slug = f"root-{taken.distrust.slug.removeprefix('root-')}"
+        return fail(taken.distrust.code, str(taken.distrust), taken.distrust.help, slug=slug)
     RootStore(state, vehicle).keep(taken.signed)
     root = taken.root
     if as_json:

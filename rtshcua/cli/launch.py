@@ -44,6 +44,7 @@ from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.ports import Ending, Event
@@ -52,7 +53,7 @@ from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey
-from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 if TYPE_CHECKING:
@@ -161,7 +162,8 @@ def launch(order: Launch) -> ExitCode:
             vehicle.driver.asks_utc = utc.waits
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
-            _hold_trust(bundle, signed_root, loaded, clock)
+            lapsed = _lapsed(bundle, signed_root, loaded, clock)
+            _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
             if order.sortie is not None:
                 events += order.sortie.before(vehicle, clock)
             elif order.link is not None:
@@ -178,6 +180,7 @@ def launch(order: Launch) -> ExitCode:
                 )  # fmt: skip
             assert past is not None
             resumed, refusal = _opened(order, loaded, vehicle, clock, events, owes=bool(debts.left))
+            _expect_current(lapsed, resumed=resumed)
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
             told = trust.settle(resumed=resumed)
@@ -187,7 +190,7 @@ def launch(order: Launch) -> ExitCode:
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
                 past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
-                trusted=lambda: _hold_trust(bundle, signed_root, loaded, clock),
+                lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, loaded, clock),
                 simulated=simulation.told(order.speed, own=order.link is None),
             )  # fmt: skip
             del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
@@ -272,8 +275,9 @@ def _read(path: Path) -> bytes:
 def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, SigningKey, Loaded]:
     """The trust root that counts, the key that will sign the log, and the bundle under that root. Raises `Refused`.
 
-    Where the root does not follow from the one that was accepted last, or the bundle or the log's key is revoked, a run
-    of this bundle may still have broken off in the air: then it is brought down under the root that was given.
+    Where the root does not follow from the one that was accepted last, or has expired, or a key of the bundle or the
+    log has, or is revoked, a run of this bundle may still have broken off in the air: then it is brought down under the
+    root that was given.
     """
     now_us = clock.now().utc_us
     try:
@@ -283,7 +287,7 @@ def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, 
     except Untrusted as error:
         raise Refused(code_of(error.slug), *untrusted(error)) from None
     except Refused as refused:
-        for each in trusted.before(refused, now_us):
+        for each in trusted.before(refused):
             with suppress(Refused):
                 trusted, loaded = each, _loading(order, bundle, each, key, clock)
                 break
@@ -296,8 +300,19 @@ def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, 
 
 
 def _loading(order: Launch, bundle: bytes, trusted: Trusted, key: SigningKey, clock: LinkClock) -> Loaded:
+    """The bundle under a root; under one that is not to be trusted any more, whatever has expired since."""
+    now = clock.now()
+    if trusted.distrust is not None:
+        now = Now(now.monotonic_us, 0, now.utc_error_us)
     _expect_log_key(key, trusted.root)
-    return _load(order, bundle, trusted.root, clock)
+    loaded = _load(order, bundle, trusted.root, now)
+    refusal = key_refusal(trusted.root.keys_for(Duty.LOG)[key.kid], vehicle=loaded.vehicle, now_us=now.utc_us)
+    if refusal is not None:
+        text = f"the log key {key.kid.hex()} may not speak for `{loaded.vehicle}` now: nobody could verify the log"
+        raise Refused(
+            code_of(refusal), refusal, text, "`--log-key` gives one that may; `rtshcua keys replace` makes it"
+        )
+    return loaded
 
 
 def _may_have_flown(order: Launch, loaded: Loaded) -> bool:
@@ -331,18 +346,23 @@ def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
     return UtcWatch.simulated(clock)
 
 
-def _hold_trust(bundle: bytes, signed_root: bytes, loaded: Loaded, clock: LinkClock) -> None:
-    """What was verified by this machine's time of day holds by the vehicle's, too. Raises `Refused`."""
+def _lapsed(bundle: bytes, signed_root: bytes, loaded: Loaded, clock: LinkClock) -> Refused | None:
+    """Why what was verified by this machine's time of day does not hold by the vehicle's; None where it does."""
     now_us = clock.now().utc_us
     try:
         root = open_root(signed_root, pinned=cose.unverified(signed_root, limit=MAX_ROOT).kid, now_us=now_us)
         open_bundle(bundle, root=root, vehicle=loaded.vehicle, now_us=now_us)
     except Untrusted as error:
-        raise Refused(code_of(error.slug), *untrusted(error)) from None
+        return Refused(code_of(error.slug), *untrusted(error))
+    return None
 
 
-def _load(order: Launch, bundle: bytes, root: TrustRoot, clock: LinkClock) -> Loaded:
-    now = clock.now()
+def _expect_current(lapsed: Refused | None, *, resumed: bool) -> None:
+    if lapsed is not None and not resumed:
+        raise lapsed
+
+
+def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now) -> Loaded:
     identity = order.vehicle
     if identity is None:
         try:

@@ -14,6 +14,8 @@ from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 REVOKED: Final = "revoked-key"
+#: why what was good once is not any more: what began to fly under it comes down all the same
+LAPSED: Final = ("expired", "key-expired")
 #: what to do where a root is refused, by slug
 HELPS = {
     "version-gap": "give the roots between too, from the oldest to the newest: `root-N.trust` of the key store",
@@ -39,12 +41,12 @@ class Trusted(NamedTuple):
     news: str = ""
     distrust: Refused | None = None
 
-    def before(self, refused: Refused, now_us: int) -> Iterator["Trusted"]:
-        """The roots under which the bundle may have begun to fly, where this one revokes a key since."""
-        if refused.slug == REVOKED:
-            for signed in self.others:
+    def before(self, refused: Refused) -> Iterator["Trusted"]:
+        """The roots under which the bundle may have begun to fly, where something was revoked or has expired since."""
+        if refused.slug in (REVOKED, *LAPSED):
+            for signed in (self.signed, *self.others):
                 with suppress(Untrusted):
-                    yield Trusted(_open(signed, now_us), signed, distrust=self.distrust or refused)
+                    yield Trusted(opened(signed), signed, distrust=self.distrust or refused)
 
     def expect(self) -> None:
         """Raises `Refused` where nothing may fly under it."""
@@ -67,8 +69,8 @@ class Trusted(NamedTuple):
 def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, now_us: int) -> Trusted:
     """The trust root for a vehicle, of those that were named, else of the key store's.
 
-    Raises `Untrusted` and OSError; but what is the matter with the root that was accepted last, or does not follow from
-    it, is `distrust`.
+    Raises `Untrusted` and OSError; but what is the matter with the root that was accepted last, what does not follow
+    from it, and what has expired, is `distrust`.
     """
     store = None if vehicle is None else RootStore(state, vehicle)
     kept, distrust = None, None
@@ -79,11 +81,16 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
     chain = _given(roots, data, needed=kept is None)
     try:
         signed = in_force(kept, chain, named=bool(roots), now_us=now_us)
+        _open(signed, now_us)
     except Untrusted as error:
-        if kept is None or not chain:
+        if error.slug in LAPSED:
+            signed = in_force(kept, chain, named=bool(roots), now_us=0)
+            distrust = distrust or Refused(code_of(error.slug), *untrusted(error))
+        elif kept is None or not chain:
             raise
-        signed, distrust = chain[-1], _refused(error)
-    root = _open(signed, now_us)
+        else:
+            signed, distrust = chain[-1], _refused(error)
+    root = opened(signed)
     others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
     if distrust is not None or signed == kept or (kept is None and root.development):
         return Trusted(root, signed, others, distrust=distrust)

@@ -1,10 +1,11 @@
 """A program that died in the air comes back: whatever happens before it knows more, the vehicle is brought down."""
 
 import pytest
+from msgspec.structs import replace
 
 from reference.documents import low, recall
 from reference.flat_case import S
-from reference.world import START, FakeVehicle, Run, assert_audited, renewed
+from reference.world import ROOT, START, FakeVehicle, Run, assert_audited, renewed
 from rtshcua.onboard.ports import AirState, Answering, Ending, Event, EvidenceFailed, Interrupted, Presented, Ready
 from rtshcua.onboard.runtime.limits import Limits
 
@@ -101,3 +102,12 @@ def test_one_that_is_on_the_ground_is_left_there() -> None:
     run.tick(Interrupted(0))
     assert run.ending is Ending.INTERRUPTED
     assert run.flown == []
+
+
+def test_one_under_a_root_that_has_expired_comes_down_as_ever() -> None:
+    expired = replace(ROOT, expires_at_us=START.utc_us - 1)
+    run = Run(renewed(OF, expired), FakeVehicle(armed=True, airborne=True), resumed=True, ready=False)
+    run.tick(AirState(0, True, True), Ready(0))
+    run.until_over()
+    assert run.flown[-1] == "return_home"
+    assert run.ending is Ending.ABORTED

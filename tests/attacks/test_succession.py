@@ -27,6 +27,7 @@ from rtshcua.cli.trusting import trust
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.library import root as library
+from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.wire.keys import Duty, SigningKey
@@ -228,6 +229,61 @@ def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, w
     store.give_back(of.bundle.mission_digest)
     with pytest.raises(Refused):  # nothing of it is in the air
         launch._trusting(again, Path("old.bundle").read_bytes(), SystemClock())
+
+
+class Late(SystemClock):
+    """By this clock it is two years later."""
+
+    def now(self) -> Now:
+        now = super().now()
+        return Now(now.monotonic_us, now.utc_us + 730 * 86_400_000_000, now.utc_error_us)
+
+
+def expiring(fleet: KeyStore, duty: Duty) -> None:
+    """The next root, by which each key of a duty expires within the year; of the root's, the root itself does."""
+    root, soon = opened(fleet.root()), SystemClock().now().utc_us + 86_400_000_000
+    keys = tuple(replace(key, expires_us=soon) if key.duty is duty is not Duty.ROOT else key for key in root.keys)
+    until = root.expires_at_us if duty is Duty.ROOT else 1 << 60
+    newer = replace(root, version=2, keys=keys, expires_at_us=until)
+    fleet.root_path.write_bytes(newer.sign(fleet.signing_key(Duty.ROOT)))
+
+
+@pytest.mark.parametrize("accepted", [False, True])
+@pytest.mark.parametrize("duty", [Duty.ROOT, Duty.POLICY, Duty.MISSION, Duty.LOG])
+def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, duty: Duty, accepted: bool) -> None:
+    """A run is killed in the air, and started again after the root, or a key of its bundle or log, expired."""
+    expiring(fleet, duty)
+    bundle = Path("old.bundle").read_bytes()
+    if not accepted:
+        RootStore(state_folder(), QUAD).path.unlink()
+    of = launched(order())
+    assert launch._lapsed(bundle, fleet.root(), of, SystemClock()) is None
+    with pytest.raises(Refused) as fresh:  # nothing of it flew
+        launch._trusting(order(), bundle, Late())
+    assert fresh.value.slug == ("expired" if duty is Duty.ROOT else "key-expired")
+    store = FileReplayStore(state_folder(), QUAD)
+    store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
+    trusted, _, loaded = launch._trusting(order(), bundle, Late())
+    assert loaded.bundle.mission_digest == of.bundle.mission_digest
+    assert trusted.distrust is not None
+    assert trusted.distrust.slug == fresh.value.slug
+    assert "brought down all the same" in trusted.settle(resumed=True)
+    with pytest.raises(Refused):
+        trusted.settle(resumed=False)
+    with pytest.raises(Refused):
+        launch._trusting(order(dry_run=True), bundle, Late())
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_an_expired_root_is_accepted_by_no_vehicle(
+    fleet: KeyStore, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, named: bool
+) -> None:
+    if named:
+        RootStore(state_folder(), QUAD).path.unlink()
+    later_ns = Late().now().utc_us * 1000
+    monkeypatch.setattr("time.time_ns", lambda: later_ns)
+    assert refused(capsys, "keys", "accept", "first.trust", "--vehicle", QUAD) == "root-expired"
+    assert RootStore(state_folder(), QUAD).path.exists() is not named
 
 
 def launched(of: launch.Launch) -> Loaded:

@@ -5,7 +5,11 @@ import signal
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
+from rtshcua.adapters.files.roots import opened
 from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.wire.keys import Duty
 
 #: so slow that a busy machine's hold-ups stay below what a permit lasts
 SPEED = 3
@@ -60,3 +64,20 @@ def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the
     (last,) = runs() - {killed, other}
     assert records(last)[0]["before"] == leaf_hash(lines(other)[-1]).hex()
     assert "log-before" not in [record["event"] for record in records(last) if record["type"] == "effect"]
+
+
+def test_a_run_whose_root_expired_while_it_was_in_the_air_comes_down_too(ground: Any, port: int) -> None:
+    """Nothing else of an expired root flies, and nobody is asked to trust the log of it."""
+    ground.vehicle(port, SPEED)
+    bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
+    first = ground.run(bundle, *words, speed=SPEED)
+    first.until("dispatched", step=0)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    store, root = ground.store, opened(ground.store.root())
+    store.root_path.write_bytes(replace(root, expires_at_us=root.issued_at_us + 1).sign(store.signing_key(Duty.ROOT)))
+
+    second = ground.run(bundle, *words, speed=SPEED).end()
+    assert second.code == 6, second.stderr
+    assert [event for event in second.events if event["event"] == "resumed"]
+    assert "it is brought down all the same" in str(second.events)

@@ -45,6 +45,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.ports import Ending, Event
@@ -427,9 +428,10 @@ def _hear(order: Launch, loaded: Loaded, signing: Signing) -> None:
     """A mission that would break off in the air for a signal that cannot come does not begin; a rehearsal tells."""
     steps = stranded(loaded.bundle.policy, loaded.bundle.mission, signing.unheard)
     if steps and not order.dry_run:
+        first = call(loaded.bundle.policy, steps[0])
         raise Refused(
             ExitCode.REFUSED, "signal-unsigned",
-            f"`{steps[0].text}` needs a signal of RADIO_STATUS, which radios do not sign: it would wait for it in vain",
+            f"`{first}` needs a signal of RADIO_STATUS, which radios do not sign: it would wait for it in vain",
             "`--unsigned-radio` takes it unsigned, and the worst of the last seconds counts",
         )  # fmt: skip
 

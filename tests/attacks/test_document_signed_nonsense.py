@@ -16,7 +16,7 @@ from rtshcua.wire.bundle import BundleError, parse
 from rtshcua.wire.cbor import CborError, decode, encode
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.names import Artefact
-from rtshcua.wire.replacement import ReplacementDocument
+from rtshcua.wire.replacement import ReplacementDocument, _after
 
 OF = low()
 KINDS = {
@@ -67,9 +67,9 @@ def odd(value: object, of: Random) -> object:
 
 
 def bound(payload: bytes) -> bytes:
-    """The same nonsense, its bindings made good again, so that it is looked at more closely."""
+    """The same nonsense, its ids and bindings made good again, so that it is looked at more closely."""
     said = parse(names.REPLACEMENT, payload, ReplacementDocument)
-    mission = bind(said.mission, OF.bundle.policy_digest)
+    mission = bind(said.mission, OF.bundle.policy_digest, after=_after(said.flight, said.supersedes, said.kept))
     return artefact.wrap(names.REPLACEMENT, to_builtins(replace(said, mission=mission), builtin_types=(bytes,)))
 
 

@@ -63,6 +63,17 @@ def test_a_mission_that_weakens_its_policy_is_refused_even_when_bound(field: str
     assert refusal.slug == "malformed"
 
 
+@pytest.mark.parametrize("hidden", [{"speed": 9_000}, {"altitude": 30_000}])
+def test_a_plan_says_nothing_that_no_argument_says(hidden: dict[str, int]) -> None:
+    """Whoever approves a step sees its arguments: who signs the mission may not choose a speed beside them."""
+    step = 0 if "speed" in hidden else 3  # a takeoff has no speed, a return no altitude
+    odd = replace(INVOCATIONS[step], plan=replace(INVOCATIONS[step].plan, **hidden))
+    steps = (*INVOCATIONS[:step], odd, *INVOCATIONS[step + 1 :])
+    refusal = try_load(sealed(mission=replace(MISSION, invocations=steps)))
+    assert isinstance(refusal, Refusal)
+    assert "is not the argument, 0" in refusal.text
+
+
 def test_a_tampered_request_in_the_air_flies_the_contingency() -> None:
     of = loaded()
     first, second = (of.bundle.mission.invocations[step].binding for step in (0, 1))

@@ -23,6 +23,7 @@ from rtshcua.ground.auditor.audit import Audit, Auditor
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.calls import call
 from rtshcua.wire import cose, names
 from rtshcua.wire.bundle import Bundle, envelopes, parse
 from rtshcua.wire.replacement import ReplacementDocument
@@ -164,7 +165,7 @@ def _replacing(mission: Mission, record: Effect) -> Mission | None:
 def _rows(policy: Policy, mission: Mission) -> Iterator[tuple[int, int, int, str, str]]:
     yield from _links(CONTINGENCY_LINK, -1, policy.contingency, policy)
     for number, step in enumerate(mission.invocations):
-        yield STEP, number, -1, _skill(policy, step.skill), step.text
+        yield STEP, number, -1, _skill(policy, step.skill), call(policy, step)
         yield from _links(FALLBACK_LINK, number, step.contract.fallback, policy)
 
 

@@ -6,7 +6,10 @@ from typing import NamedTuple
 from rtshcua.cli.showing.named import named
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
+from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.struct import Flat
+from rtshcua.onboard.calls import quantity
 from rtshcua.wire import cose, names
 from rtshcua.wire.approval import ApprovalDocument
 from rtshcua.wire.bundle import parse
@@ -88,9 +91,26 @@ def show_document(page: Page, data: bytes) -> dict[str, object]:
             page.row("flight", newer.flight.hex())
             page.row("supersedes", newer.supersedes.hex())
             for step in newer.mission.invocations:
-                page.row("stays" if step.step < newer.kept else "new", f"step {step.step} {step.text}")
+                page.row("stays" if step.step < newer.kept else "new", f"step {step.step} {_called(step)}")
     page.row("use", HANDED_IN[what.kind])
     return {"kind": kind, "verified": False, "key": what.kid.hex(), "text": what.text, "said": named(what.body)}
+
+
+def _called(one: Invocation) -> str:
+    """A step as it is bound, by its own contract, for the policy is not here: a zone by its number there."""
+    told = (f"{each.name} = {_argument(each, one.arguments)}" for each in one.contract.parameters)
+    return f"{one.contract.name}({', '.join(told)})"
+
+
+def _argument(parameter: Parameter, cells: tuple[int, ...]) -> str:
+    values = cells[parameter.cell : parameter.cell + (2 if parameter.kind == PLACE else 1)]
+    if parameter.kind == PLACE and len(values) == 2:
+        return f"{quantity(values[0], 'length')} east and {quantity(values[1], 'length')} north of home"
+    if parameter.kind == PLACE or not values:
+        return "missing"
+    if parameter.kind == CHOICE and 0 <= values[0] < len(parameter.labels):
+        return parameter.labels[values[0]]
+    return f"zone {values[0]}" if parameter.kind == ZONE else quantity(values[0], parameter.dimension)
 
 
 def _body(body: Flat) -> str:

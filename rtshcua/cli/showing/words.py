@@ -8,10 +8,15 @@ from rtshcua.decision.outline import rings as outline
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
-from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, Zone, unproject
+from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.quantity import Dimension, display
+from rtshcua.onboard.calls import argument
+from rtshcua.onboard.calls import arguments as arguments
+from rtshcua.onboard.calls import call as call
+from rtshcua.onboard.calls import geographic as geographic
+from rtshcua.onboard.calls import place as place
+from rtshcua.onboard.calls import quantity as quantity
 
-_DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 _MOTIONS = {
     MotionKind.HOLD: "hold",
     MotionKind.CLIMB: "climb straight up",
@@ -42,43 +47,6 @@ def ratio(parts: int) -> str:
     return display(parts, Dimension.RATIO)
 
 
-def quantity(value: int, dimension: str) -> str:
-    """A value of a named dimension; a number alone where the name is of an enumeration."""
-    known = _DIMENSIONS.get(dimension)
-    return str(value) if known is None else display(value, known)
-
-
-def geographic(latitude: int, longitude: int) -> str:
-    """A place in 1e-7 degree."""
-    return f"{_degrees(latitude, 'N', 'S')}, {_degrees(longitude, 'E', 'W')}"
-
-
-def _degrees(value: int, positive: str, negative: str) -> str:
-    whole, part = divmod(abs(value), 10_000_000)
-    return f"{whole}.{f'{part:07d}'.rstrip('0') or '0'} {negative if value < 0 else positive}"
-
-
-def place(policy: Policy, x: int, y: int) -> str:
-    """A place in local mm."""
-    return geographic(*unproject(policy.projection, x, y))
-
-
-def arguments(policy: Policy, parameters: Sequence[Parameter], cells: Sequence[int]) -> str:
-    """Every argument by name, those that the compiler filled in too."""
-    return ", ".join(f"{parameter.name} = {_argument(policy, parameter, cells)}" for parameter in parameters)
-
-
-def call(policy: Policy, one: Invocation) -> str:
-    """A step as it was written, if that calls the skill that is bound; else as a source would write it.
-
-    The text is whoever's who signed the mission, and may be JSON: what may be flown is what is bound.
-    """
-    contract = policy.contracts[one.skill]
-    if one.text.startswith(f"{contract.name}("):
-        return one.text
-    return f"{contract.name}({arguments(policy, contract.parameters, one.arguments)})"
-
-
 def step(policy: Policy, one: Invocation) -> str:
     """A step as its skill and arguments are bound, in nobody's words but ours and the policy's; zones by name, size and
     way from home, places by their way from home. Who signed the mission chose the path in a zone: how far it leads is
@@ -88,7 +56,7 @@ def step(policy: Policy, one: Invocation) -> str:
     told = []
     for each in contract.parameters:
         where = _where(policy, each, one.arguments)
-        told.append(f"{each.name} = {_argument(policy, each, one.arguments)}{f' [{where}]' if where else ''}")
+        told.append(f"{each.name} = {argument(policy, each, one.arguments)}{f' [{where}]' if where else ''}")
     covers = f" along {_path(one.plan.path)}" if one.plan.kind == MotionKind.COVER else ""
     return f"{contract.name}({', '.join(told)}){covers}"
 
@@ -124,19 +92,6 @@ def _from_home(x: int, y: int) -> str:
     """The way from the declared home to a place in local mm; the bearing in degrees from true north, clockwise."""
     far = isqrt(x * x + y * y)
     return f"{_metres(far)} from home, bearing {round(degrees(atan2(x, y))) % 360}°" if far else "at home"
-
-
-def _argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
-    value = cells[parameter.cell]
-    if parameter.kind in (CHOICE, ZONE) and not parameter.low <= value <= parameter.high:
-        return f"{value}, out of range"
-    if parameter.kind == CHOICE:
-        return parameter.labels[value]
-    if parameter.kind == ZONE:
-        return policy.zones[value].name
-    if parameter.kind == PLACE:
-        return place(policy, value, cells[parameter.cell + 1])
-    return quantity(value, parameter.dimension)
 
 
 def parameter(policy: Policy, one: Parameter) -> str:

@@ -170,12 +170,13 @@ def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
             yield f"`{name}` is looser than in the policy"
 
 
-def _calls(links: tuple[Link, ...]) -> list[tuple[int, tuple[int, ...], int]]:
-    return [(link.skill, link.arguments, link.limit_us) for link in links]
+# What is the policy's says so in the policy's words: a log and its readers are told by them.
+def _calls(links: tuple[Link, ...]) -> list[tuple[int, tuple[int, ...], int, str]]:
+    return [(link.skill, link.arguments, link.limit_us, link.text) for link in links]
 
 
-def _codes(clauses: tuple[Clause, ...]) -> Counter[tuple[int, ...]]:
-    return Counter(clause.code for clause in clauses)
+def _codes(clauses: tuple[Clause, ...]) -> Counter[tuple[tuple[int, ...], str]]:
+    return Counter((clause.code, clause.text) for clause in clauses)
 
 
 def _same_parameters(mine: Contract, policys: Contract) -> bool:

@@ -11,6 +11,7 @@ from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Announce
 from rtshcua.onboard.runtime.dispatcher import RemainingLatency
@@ -152,7 +153,7 @@ class Admission:
         if of is None:
             return self._policy.contingency[ref.link].text
         if ref.kind == STEP:
-            return of.text
+            return call(self._policy, of)
         return "the target of a degrade rule" if ref.link == DEGRADE else of.contract.fallback[ref.link].text
 
     def _clause(self, contract: Contract | None, number: int) -> Decisive:

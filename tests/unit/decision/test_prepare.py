@@ -270,6 +270,14 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (mine(motion=Motion(3, 1, -1)), "`motion` is looser than in the policy"),
     (mine(timing_class=0), "`timing class` is looser than in the policy"),
     (mine(fallback=S.contract.fallback[:2]), "`fallback` is looser than in the policy"),
+    (
+        mine(fallback=(replace(S.contract.fallback[0], text="hover"), *S.contract.fallback[1:])),
+        "`fallback` is looser than in the policy",
+    ),
+    (
+        mine(maintain=(replace(S.contract.maintain[0], text="all is well"), *S.contract.maintain[1:])),
+        "`maintain` is looser than in the policy",
+    ),
     (mine(parameters=S.contract.parameters[:3]), "`parameters` is looser than in the policy"),
     (
         mine(parameters=(*S.contract.parameters[:3], replace(S.contract.parameters[3], high=9 * M))),

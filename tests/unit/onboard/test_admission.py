@@ -140,8 +140,9 @@ def test_every_decision_is_announced_and_every_document_answered() -> None:
     ]  # fmt: skip
     announced = [each for each in run.actions if isinstance(each, Announce)]
     assert len(announced) == sum(b'"type":"decision"' in line for line in run.lines)
-    assert announced[0] == Announce(6, "allow step 0")
-    assert announced[2] == Announce(5, f"defer approval/awaited: step {ASKED}")
+    assert announced[0] == Announce(6, "allow takeoff(altitude = 8 m)")
+    asked = "inspect_area(area = bridge_a, altitude = 8 m, pattern = grid, speed = 4 m/s)"
+    assert announced[2] == Announce(5, f"defer approval/awaited: {asked}")
 
 
 def test_what_the_vehicle_says_is_kept_as_its_own_words() -> None:

@@ -1,0 +1,64 @@
+"""A step in words: its skill and arguments as they are bound, and as a source would write them.
+
+The text that a mission carries is whoever's who signed it, and nothing holds it against what is bound: it is shown
+nowhere as what flies.
+"""
+
+from collections.abc import Sequence
+
+from rtshcua.decision.contracts import cells
+from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import unproject
+from rtshcua.model.quantity import Dimension, display
+
+_DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
+
+
+def call(policy: Policy, one: Invocation) -> str:
+    """A step: `takeoff(altitude = 9 m)`. The policy is well-formed; of the step that need not be known."""
+    if not 0 <= one.skill < len(policy.contracts) or len(one.arguments) != cells(policy.contracts[one.skill]):
+        return "no call of a skill of the policy"
+    contract = policy.contracts[one.skill]
+    return f"{contract.name}({arguments(policy, contract.parameters, one.arguments)})"
+
+
+def arguments(policy: Policy, parameters: Sequence[Parameter], cells: Sequence[int]) -> str:
+    """Every argument by name, those that the compiler filled in too."""
+    return ", ".join(f"{parameter.name} = {argument(policy, parameter, cells)}" for parameter in parameters)
+
+
+def argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
+    """One argument; one that no policy has a name for by its number."""
+    value = cells[parameter.cell]
+    if parameter.kind in (CHOICE, ZONE) and not parameter.low <= value <= parameter.high:
+        return f"{value}, out of range"
+    if parameter.kind == CHOICE:
+        return parameter.labels[value]
+    if parameter.kind == ZONE:
+        return policy.zones[value].name
+    if parameter.kind == PLACE:
+        return place(policy, value, cells[parameter.cell + 1])
+    return quantity(value, parameter.dimension)
+
+
+def quantity(value: int, dimension: str) -> str:
+    """A value of a named dimension; a number alone where the name is of an enumeration."""
+    known = _DIMENSIONS.get(dimension)
+    return str(value) if known is None else display(value, known)
+
+
+def place(policy: Policy, x: int, y: int) -> str:
+    """A place in local mm."""
+    return geographic(*unproject(policy.projection, x, y))
+
+
+def geographic(latitude: int, longitude: int) -> str:
+    """A place in 1e-7 degree."""
+    return f"{_degrees(latitude, 'N', 'S')}, {_degrees(longitude, 'E', 'W')}"
+
+
+def _degrees(value: int, positive: str, negative: str) -> str:
+    whole, part = divmod(abs(value), 10_000_000)
+    return f"{whole}.{f'{part:07d}'.rstrip('0') or '0'} {negative if value < 0 else positive}"

@@ -54,6 +54,7 @@ class Preflight:
         self._meant = meant
         self._told = False
         self._advised = 0  # what its circle was said to be set to
+        self._reached: tuple[tuple[int, int], bounds.Reach] | None = None  # where it stood, and what was made of it
         self._checked_us: int | None = None
         self.notes: list[str] = []
 
@@ -146,9 +147,9 @@ class Preflight:
         if not self._steps or not self._seen.located or self._bounds_unread() is not None:
             return None
         own, values = self._flavour.own_fence, self._values
-        home = project(self._projection, self._seen.latitude, self._seen.longitude)
-        reach, room = bounds.reach_of(self._steps, self._policy, home), self._policy.vehicle.position_error
-        found = next(bounds.narrower(own, values, reach, room, armed=self._arms), None)
+        found = next(
+            bounds.narrower(own, values, self._reach(), self._policy.vehicle.position_error, armed=self._arms), None
+        )
         if found is None:
             return None
         least = "most" if found.bit == bounds.FLOOR_BIT else "least"
@@ -157,6 +158,14 @@ class Preflight:
             f"its own fence ends {found.value:g} m {found.about} (`{found.parameter}`), where the mission has targets "
             f"beyond, which it would ignore: set `{found.parameter}` to {self._advice(found)} at the {least}{off}"
         )
+
+    def _reach(self) -> bounds.Reach:
+        """How far the mission goes from where it stands: asked for much more often than it moves."""
+        place = self._seen.latitude, self._seen.longitude
+        if self._reached is None or self._reached[0] != place:
+            home = project(self._projection, *place)
+            self._reached = place, bounds.reach_of(self._steps, self._policy, home)
+        return self._reached[1]
 
     def _advice(self, found: bounds.Narrow) -> int:
         """What to set a bound to. Where it stands, and so how wide a circle has to be, is known to some decimetres:

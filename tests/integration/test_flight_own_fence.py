@@ -3,6 +3,7 @@
 import pytest
 
 from rtshcua.onboard.ports import Ending
+from rtshcua.virtual.vehicle import SECOND
 from virtual.flight import Flight
 from virtual.shipped import shipped, simulated
 
@@ -17,17 +18,52 @@ NARROW = {
 }
 
 
-@pytest.mark.parametrize("case", NARROW)
-def test_a_mission_beyond_the_autopilots_own_fence_is_refused_and_why_is_said(case: str) -> None:
-    flavour, parameters, names, helps = NARROW[case]
-    flight = Flight(shipped("one_bridge"), simulated(flavour, parameters=tuple(parameters.items())))
-    flown = flight.fly()
-    assert flown.ending is Ending.REFUSED
-    assert flown.dispatched() == []
+#: by then all parameters were read, and a vehicle that fits would have taken off
+SETTLED_US = 20 * SECOND
+
+
+def narrow(case: str) -> Flight:
+    flavour, parameters, _, _ = NARROW[case]
+    return Flight(shipped("one_bridge"), simulated(flavour, parameters=tuple(parameters.items())))
+
+
+def says_why(flight: Flight, case: str) -> None:
+    _, _, names, helps = NARROW[case]
     unready = flight.vehicle.driver.unready
     assert unready is not None
     assert names in unready
     assert helps in unready
+
+
+@pytest.mark.parametrize("case", NARROW)
+def test_a_mission_beyond_the_autopilots_own_fence_waits_on_the_ground_and_why_is_said(case: str) -> None:
+    flight = narrow(case)
+    while flight.clock.elapsed_us < SETTLED_US:
+        assert flight.turn() is None
+    says_why(flight, case)
+    assert not flight.vehicle.simulation.truth().armed
+
+
+def test_one_that_fits_has_taken_off_by_then() -> None:
+    flight = Flight(shipped("one_bridge"), simulated("ardupilot"))
+    while flight.clock.elapsed_us < SETTLED_US:
+        assert flight.turn() is None
+    assert flight.vehicle.simulation.truth().armed
+
+
+#: for one autopilot each, which all bounds lead to alike
+WHOLE = ("a circle", "a ceiling of PX4's")
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=() if case in WHOLE else pytest.mark.soak) for case in NARROW]
+)
+def test_a_mission_that_waits_in_vain_is_refused_and_no_fence_is_uploaded(case: str) -> None:
+    flight = narrow(case)
+    flown = flight.fly()
+    assert flown.ending is Ending.REFUSED
+    assert flown.dispatched() == []
+    says_why(flight, case)
     assert not [each for each in flown.effects("noted") if "fence was set" in each["detail"]], "nothing was uploaded"
 
 

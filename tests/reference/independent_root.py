@@ -6,6 +6,7 @@ Written apart from `rtshcua.wire`, for `independent_verifier`. RFC 9052 section 
 import hashlib
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -42,6 +43,7 @@ def key_id(duty: str, public: bytes) -> bytes:
     return hashlib.sha256(b"rtshcua/key\0rtshcua/duty/" + duty.encode() + b"\0" + public).digest()[:16]
 
 
+@lru_cache(maxsize=1024)  # of one flight many logs are made
 def holds(public: bytes, signature: bytes, message: bytes) -> bool:
     """Whether an Ed25519 signature holds."""
     try:
@@ -213,6 +215,7 @@ def _encode(value: object) -> bytes:
     raise Untrusted("no such value")
 
 
+@lru_cache(maxsize=256)  # bundles and roots are those of many logs; nobody changes what was read
 def _whole(data: bytes) -> object:
     """The one item of `data`; canonical, for it is the encoding of what was read."""
     try:

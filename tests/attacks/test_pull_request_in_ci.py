@@ -45,6 +45,7 @@ def test_the_action_imports_nothing_from_the_checkout(hostile: Path, tmp_path: P
 
 def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_path: Path) -> None:
     (hostile / "tests/::warning::nobody said this.rts").write_text("test  x\n", encoding="utf-8")
+    (hostile / "tests/flights.rts").unlink()  # the test before flies it
     ended = runner(tmp_path)(hostile, sarif="")
     stopped = None
     for line in ended.printed.splitlines():

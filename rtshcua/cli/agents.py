@@ -46,13 +46,21 @@ class _Door:
 
 class Agents:
     """The sockets of one flight: `path` of agents, `operators` of operators, either or both. They never wait, and
-    nothing of the flight depends on them. `group`: the id of a group whose users are agents too.
+    nothing of the flight depends on them. `group`: the id of a group whose users are agents too. `waits`: nothing flies
+    yet, and `loaded` says under which policy something would.
     """
 
     def __init__(
-        self, path: Path | None, loaded: Loaded, *, operators: Path | None = None, group: int | None = None
+        self,
+        path: Path | None,
+        loaded: Loaded,
+        *,
+        operators: Path | None = None,
+        group: int | None = None,
+        waits: bool = False,
     ) -> None:
         self._loaded = loaded
+        self._waits = waits
         self._told = loaded.bundle.mission_digest
         self._greeted: tuple[bytes, bytes] | None = None
         self._switch_s = sys.getswitchinterval()
@@ -75,7 +83,7 @@ class Agents:
         for door in self._sockets:
             event = door.socket.poll(now.monotonic_us)
             if event is not None:
-                if len(event.document) <= _LARGE:
+                if len(event.document) <= _LARGE or self._waits:
                     found.append(event)
                 elif len(door.ahead) == _MOST_AHEAD:
                     door.socket.answer(event.sender, "busy", "other documents are being looked at")
@@ -89,6 +97,17 @@ class Agents:
             self._watches = False
             self._notes.append(ALIKE)
         return found
+
+    def fly(self, loaded: Loaded) -> None:
+        """What waited has a bundle that flies: its mission is told, and what comes in is for that flight."""
+        self._loaded, self._waits, self._greeted = loaded, False, None
+        self._told = loaded.bundle.mission_digest
+        self.tell(self._mission())
+
+    def answer(self, sender: int, slug: str, text: str) -> None:
+        """Tell whoever handed something in what became of it."""
+        for door in self._sockets:
+            door.socket.answer(sender, slug, text)
 
     def turn_away(self, now: Now) -> None:
         """Answer what came in that it is too late: the mission is over, and nobody decides about it any more."""
@@ -107,8 +126,7 @@ class Agents:
             if isinstance(action, Append):
                 self.tell(action.line)
             elif isinstance(action, Reply):
-                for door in self._sockets:
-                    door.socket.answer(action.sender, action.slug, action.text)
+                self.answer(action.sender, action.slug, action.text)
         if self._told != self._loaded.bundle.mission_digest:
             self._told = self._loaded.bundle.mission_digest
             self.tell(self._mission())
@@ -149,7 +167,17 @@ class Agents:
             "flight": loaded.in_force.flight.hex(),
             "mode": loaded.mode.value,
         }
-        return _encode(hello) + b"\n" + self._mission()
+        return _encode(hello) + b"\n" + (self._waiting() if self._waits else self._mission())
+
+    def _waiting(self) -> bytes:
+        """That no mission is in force yet, and under which policy one would fly."""
+        policy = self._loaded.bundle.policy
+        told = {
+            "type": "waiting",
+            "policy": f"{policy.name}@{policy.version}",
+            "policy_digest": self._loaded.bundle.policy_digest.hex(),
+        }
+        return _encode(told) + b"\n"
 
     def _mission(self) -> bytes:
         """The mission that is in force: sent first, and again after each replacement."""

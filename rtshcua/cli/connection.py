@@ -11,7 +11,7 @@ _TIME = re.compile(r"(?P<number>[0-9]{1,9}(?:\.[0-9]{1,6})?) ?(?P<unit>ms|s|min)
 _US = {"ms": 1_000, "s": 1_000_000, "min": 60_000_000}
 
 
-def _utc_error(text: str | None) -> str | None:
+def duration_text(text: str | None) -> str | None:
     """The option's value, checked."""
     if text is not None and not _TIME.fullmatch(text):
         raise typer.BadParameter(f"`{text}` is no time, such as 500ms or 2s")
@@ -40,7 +40,7 @@ NoFence = Annotated[
 UtcError = Annotated[
     str | None,
     typer.Option(
-        metavar="TIME", callback=_utc_error, help="how far UTC is off here, if neither kernel nor vehicle says"
+        metavar="TIME", callback=duration_text, help="how far UTC is off here, if neither kernel nor vehicle says"
     ),
 ]
 

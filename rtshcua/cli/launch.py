@@ -4,7 +4,7 @@ import gc
 import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -31,7 +31,7 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
-from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened
+from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
 from rtshcua.cli.refused import Refused as Refused
@@ -40,6 +40,7 @@ from rtshcua.cli.signing import Signing
 from rtshcua.cli.tape import Tape
 from rtshcua.cli.trusting import REVOKED, Trusted, trust
 from rtshcua.cli.unlock import unlock
+from rtshcua.cli.waiting import Admitted, Waiting
 from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -95,7 +96,8 @@ class Launch:
     `roots`: the trust root, and before it those that lead to it from the one that the vehicle accepted last; none for
     the key store's. `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
     `utc_error_us`: what the operator says that UTC is off by at most. `sortie`: it is one of a qualification.
-    `settings`: parameters that are set before the flight, by name, and put back after it.
+    `settings`: parameters that are set before the flight, by name, and put back after it. `wait_s`: the bundle says the
+    policy alone, and for so many seconds at most it waits for the one that flies.
     """
 
     bundle: Path
@@ -124,6 +126,7 @@ class Launch:
     utc_error_us: int | None = None
     sortie: Sortied | None = None
     settings: Mapping[str, int] = field(default_factory=dict)
+    wait_s: float | None = None
 
 
 def launch(order: Launch) -> ExitCode:
@@ -141,25 +144,27 @@ def launch(order: Launch) -> ExitCode:
             sets = None if order.dry_run else bool(order.settings)
             debts = OwedParameters(order.state, loaded.vehicle, sets=sets)
             stack.callback(debts.close)
-            loaded.preparation.owes(debts.left)
             slack = max(1, round(order.speed / _UNHURRIED))
+            transport, agents = None, None
+            if order.wait_s is not None:
+                transport, agents = _stand_by(order, loaded, stack)
+                bundle, loaded = _wait(order, loaded, trust, clock, interrupts, slack, transport, agents)
+            loaded.preparation.owes(debts.left)
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
             driver = _driver(order, loaded, slack, signing)
             driver.prepares = not order.dry_run and bool(order.settings or debts.left)
-            transport = _open(order.link)
+            transport = transport or _open(order.link)
             vehicle = ConnectedVehicle(transport, driver, clock, tape.keep)
             stack.callback(vehicle.close)
             if driver.shortfall is not None:
                 raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
-            if isinstance(transport, UdpTransport) and order.link is None:
+            if isinstance(transport, UdpTransport) and order.link is None and order.wait_s is None:
                 simulator = stack.enter_context(_simulate(order, loaded, transport.port))
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
-            agents = _agents(order, loaded)
-            if agents is not None:
-                stack.enter_context(agents)
+            agents = agents or _agents(order, loaded, stack)
             vehicle.driver.asks_utc = utc.waits
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
@@ -233,11 +238,77 @@ def _opened(
         return False, refused
 
 
-def _agents(order: Launch, loaded: Loaded) -> Agents | None:
-    """Who may follow the flight and hand in. Raises OSError."""
+def _agents(order: Launch, loaded: Loaded, stack: ExitStack, *, waits: bool = False) -> Agents | None:
+    """Who may follow the flight and hand in, until the stack is closed. Raises OSError."""
     if order.agent_socket is None and order.operator_socket is None:
         return None
-    return Agents(order.agent_socket, loaded, operators=order.operator_socket, group=order.agent_group)
+    agents = Agents(order.agent_socket, loaded, waits=waits, operators=order.operator_socket, group=order.agent_group)
+    return stack.enter_context(agents)
+
+
+def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transport, Agents]:
+    """The way to a vehicle, and the sockets, of a run that waits, until the stack is closed: its flight has both.
+    Raises `Refused` and OSError.
+    """
+    transport = _open(order.link)
+    stack.callback(transport.close)
+    if isinstance(transport, UdpTransport) and order.link is None:
+        stack.enter_context(_simulate(order, loaded, transport.port))
+    agents = _agents(order, loaded, stack, waits=True)
+    assert agents is not None  # the command line asks for one
+    return transport, agents
+
+
+def _wait(
+    order: Launch, base: Loaded, trusted: Trusted, clock: LinkClock, interrupts: Interrupts, slack: int,
+    transport: Transport, agents: Agents,
+) -> Admitted:  # fmt: skip
+    """Wait, connected, for the bundle that flies. Raises `Refused`."""
+    assert order.wait_s is not None
+    if trusted.distrust is not None:  # that is for what broke off in the air, which nothing here did
+        raise trusted.distrust
+    with ExitStack() as stack:
+        signing = _sign(order, base, clock)
+        stack.callback(signing.close)
+        driver = _driver(replace(order, fence=False), base, slack, signing)
+        vehicle = ConnectedVehicle(transport, driver, clock, lambda at_us, frame: None)
+        if driver.shortfall is not None:
+            raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
+        events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
+        notes = list(signing.notes)
+        if order.link is not None:
+            note, meanwhile = unqualified(record_of(base.vehicle, trusted.root, order.data), vehicle, clock)
+            events += meanwhile
+            notes += [note] if note is not None else []
+
+        def admit(data: bytes) -> Loaded | Refusal:
+            return _admit(order, data, base, trusted, signing, clock)
+
+        return Waiting(
+            base, admit, vehicle, clock, interrupts, agents,
+            most_s=order.wait_s, as_json=order.style == "json", notes=notes,
+        ).follow(events)  # fmt: skip
+
+
+def _admit(
+    order: Launch, data: bytes, base: Loaded, trusted: Trusted, signing: Signing, clock: LinkClock
+) -> Loaded | Refusal:
+    """What `run` asks of a bundle before it connects, of one that was handed in; and that its policy is the one that is
+    waited under. It flies as the flight that the sockets tell of.
+    """
+    try:
+        loaded = _load(order, data, trusted.root, clock.now(), base.in_force.flight)
+        if loaded.bundle.policy_digest != base.bundle.policy_digest:
+            theirs, ours = loaded.bundle.policy, base.bundle.policy
+            text = (
+                f"it is under {theirs.name}@{theirs.version}, and this vehicle waits under {ours.name}@{ours.version}"
+            )
+            return Refusal("other-policy", text, "the policy's envelope is that of the bundle that is waited with")
+        _expect_current(_lapsed(data, trusted.signed, loaded, clock), resumed=False)
+        _hear(order, loaded, signing)
+    except Refused as refused:
+        return Refusal(refused.slug, str(refused), refused.help or "")
+    return not_opened(order.state, loaded) or loaded
 
 
 def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterable[bytes], feed: Feed) -> ExitCode:
@@ -363,7 +434,8 @@ def _expect_current(lapsed: Refused | None, *, resumed: bool) -> None:
         raise lapsed
 
 
-def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now) -> Loaded:
+def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now, flight: bytes | None = None) -> Loaded:
+    """The bundle in force, as a flight of this id, or else of a new one. Raises `Refused`."""
     identity = order.vehicle
     if identity is None:
         try:
@@ -372,7 +444,7 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now) -> Loaded:
             raise Refused(code_of(error.slug), *untrusted(error)) from None
     loaded = load(
         bundle, root=root, vehicle=identity, now=now, mode=order.mode,
-        session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=secrets.token_bytes(FLIGHT_BYTES),
+        session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=flight or secrets.token_bytes(FLIGHT_BYTES),
         peer_is_own_simulator=order.link is None, settings=order.settings,
     )  # fmt: skip
     if isinstance(loaded, Refusal):

@@ -24,8 +24,14 @@ _MEND: Final = "put `replay/` of the state folder right; without it, each bundle
 
 def flown_before(state: Path, loaded: Loaded) -> str | None:
     """Why the bundle would not be opened, in words; nothing of it is used up."""
+    refusal = not_opened(state, loaded)
+    return None if refusal is None else refusal.text
+
+
+def not_opened(state: Path, loaded: Loaded) -> Refusal | None:
+    """Why the bundle would not be opened, if it would not be; nothing of it is used up."""
     opening = _looked_up(state, loaded)
-    return None if opening is Opening.OPENED else _not_opened(loaded, opening).text
+    return None if opening is Opening.OPENED else _not_opened(loaded, opening)
 
 
 def _looked_up(state: Path, loaded: Loaded) -> Opening:

@@ -17,7 +17,7 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.configured import Settings, settings_of
-from rtshcua.cli.connection import LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_us
+from rtshcua.cli.connection import LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_text, duration_us
 from rtshcua.cli.faults import fail, misaddressed, tell
 from rtshcua.cli.launch import Launch, Refused, launch
 from rtshcua.cli.stdout import out_json
@@ -84,6 +84,13 @@ def run(
     scenario: Annotated[
         str | None, typer.Option(metavar="FILE[:NAME]", help="let go wrong what a scenario says; simulation only")
     ] = None,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="connect, and fly nothing until a bundle is handed in at the agent socket")
+    ] = False,
+    wait_for: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", callback=duration_text, help="with --wait: how long at most [default: 60min]"),
+    ] = None,
     rehearsal: Annotated[
         bool, typer.Option("--dry-run", help="decide every step against the present state; send no motion")
     ] = False,
@@ -92,7 +99,8 @@ def run(
 ) -> ExitCode:  # fmt: skip
     """Fly a bundle, once. Every step is decided before it is sent, watched while it flies, and recorded.
 
-    Without `--connect` a simulated vehicle is started for it. Ctrl-C falls back and lands first.
+    Without `--connect` a simulated vehicle is started for it. Ctrl-C falls back and lands first. With `--wait` BUNDLE
+    says the policy alone: the mission that flies is handed in by an agent, once, and admitted as BUNDLE would be.
     """
     words = simulated.arguments(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
     own = connect is None
@@ -108,8 +116,11 @@ def run(
         return fail(ExitCode.USAGE, "`--scenario` is for the simulated vehicle, and does not go with `--connect`")
     if scenario is not None and (battery is not None or wind or fault or rehearsal):
         return fail(ExitCode.USAGE, "`--scenario` says how the vehicle starts and what goes wrong", _SCENARIO_HELP)
-    lonely = _LONELY[system is not None, utc_error is not None]
-    if own and lonely:
+    misplaced = _misplaced(
+        wait=wait, timed=wait_for is not None, socket=agent_socket is not None, never=rehearsal or scenario is not None
+    )
+    lonely = misplaced or (_LONELY[system is not None, utc_error is not None] if own else "")
+    if lonely:
         return fail(ExitCode.USAGE, lonely)
     if fresh_state and (state_dir is not None or not own):
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
@@ -159,6 +170,7 @@ def run(
             incidents=incidents,
             utc_error_us=duration_us(utc_error),
             settings=settings_of(set_),
+            wait_s=(duration_us(wait_for) or _WAIT_US) / 1_000_000 if wait else None,
         )
         try:
             return launch(order)
@@ -174,6 +186,8 @@ def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents"
 
 #: up to this many times as fast as life, what a permit for parameters lasts leaves the machine enough
 _FASTEST_SET = 5
+#: how long `--wait` waits, where nobody says
+_WAIT_US = 3_600_000_000
 _SCENARIO_HELP = "with it go `--flavour` and `--seed`; `--battery`, `--wind`, `--fault` and `--dry-run` do not"
 _SYSTEM = "`--system` goes with `--connect`: the simulated vehicle is alone"
 _UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's time"
@@ -191,6 +205,17 @@ def _too_fast(link: Address | None, speed: float, *, sets: bool) -> tuple[str, s
     if sets and speed > _FASTEST_SET:
         text = f"`--set` goes with a `--speed` of {_FASTEST_SET} at most"
         return text, "a permit to set something lasts 30 s of flight: too short for this machine at a higher speed"
+    return None
+
+
+def _misplaced(*, wait: bool, timed: bool, socket: bool, never: bool) -> str | None:
+    """What is wrong about `--wait` on a command line."""
+    if timed and not wait:
+        return "`--wait-for` goes with `--wait`"
+    if wait and not socket:
+        return "`--wait` needs `--agent-socket`: where is the bundle handed in?"
+    if wait and never:
+        return "`--wait` does not go with `--dry-run` and `--scenario`, which know the mission before"
     return None
 
 

@@ -18,7 +18,7 @@ def seen(text: str, prepared: PreparedInvocation, policy: PreparedPolicy, state:
     """
     slots = _slots(text, prepared, policy)
     return ", ".join(
-        f"{signal.name} = {_value(signal, state)}"
+        f"{signal.name} = {value_in_words(signal, state)}"
         for signal in policy.policy.signals
         if slots.intersection(signal.slots)
     )
@@ -41,7 +41,8 @@ def _clauses(prepared: PreparedInvocation, policy: Policy) -> Iterator[tuple[str
             yield rule.text, rule.when
 
 
-def _value(signal: Signal, state: State) -> str:
+def value_in_words(signal: Signal, state: State) -> str:
+    """A signal's value as a source would write it; `unknown` where nothing valid was received."""
     values = [state.values[slot] for slot in signal.slots]
     first = values[0]
     if first is None or None in values:

@@ -205,6 +205,9 @@ def test_a_socket_that_cannot_be_made_leaves_no_other_behind(tmp_path: Path) -> 
     [
         (["--agent-socket", "s", "--operator-socket", "s"], "a socket each"),
         (["--agent-group", "root"], "goes with `--agent-socket`"),
+        (["--wait"], "`--wait` needs `--agent-socket`"),
+        (["--wait-for", "5s"], "goes with `--wait`"),
+        (["--wait", "--agent-socket", "s", "--dry-run"], "does not go with `--dry-run`"),
         (["--agent-socket", "s", "--agent-group", "no-such-group"], "no group `no-such-group`"),
     ],
 )

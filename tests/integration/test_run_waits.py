@@ -1,0 +1,51 @@
+"""`rtshcua run --wait`: nothing flies until a bundle is handed in, which is admitted by what `run` asks of any."""
+
+import signal
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.agent_socket import hand_in
+from virtual import case
+
+
+@pytest.fixture
+def place() -> Iterator[Path]:
+    """Where sockets lie: their paths are short."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        yield Path(name) / "s"
+
+
+def test_what_is_handed_in_flies_once(ground: Any, place: Path) -> None:
+    words = ("--wait", "--agent-socket", str(place))
+    base, other = ground.bundle(), ground.bundle(name="other", return_mm=case.LOW + 5 * case.M)
+    handed = ground.bundle(name="handed")
+    run = ground.run(base, *words, "--wait-for", "4min")
+    run.until("waiting")
+    assert not (ground.folder / "runs").exists(), "nothing is recorded before something flies"
+    assert hand_in(place, (ground.folder / other).read_bytes()).slug == "other-policy"
+    damaged = bytearray((ground.folder / handed).read_bytes())
+    damaged[-1] ^= 1
+    assert hand_in(place, bytes(damaged)).slug == "bad-signature"
+    assert hand_in(place, (ground.folder / handed).read_bytes()).slug == "accepted"
+    run.until("admitted")
+    assert run.end().code == 0, run.stderr
+    assert run.dispatched()[0] == "takeoff"
+    assert (run.folder / "mission.bundle").read_bytes() == (ground.folder / handed).read_bytes()
+
+    again = ground.run(base, *words, "--wait-for", "8s")
+    again.until("waiting")
+    said = hand_in(place, (ground.folder / handed).read_bytes())
+    assert said.slug == "replayed", said
+    assert again.end().code == 5, again.stderr
+
+
+def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:
+    run = ground.run(ground.bundle(), "--wait", "--agent-socket", str(place))
+    run.until("waiting")
+    run.signal(signal.SIGINT)
+    assert run.end().code == 130, run.stderr
+    assert not place.exists()

@@ -1,0 +1,315 @@
+"""What is wrong with a proposal, so that a program can put it right: where, the limit, what stands there, the nearest.
+
+The compiler says what is wrong. Of what it finds, the schema that its policy narrows says the limit and the nearest
+value that fits; where that says nothing, a fix of the finding does, or its help in words.
+"""
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from fractions import Fraction
+from typing import Any, Final, NamedTuple
+
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source
+from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.agent.patterns import unit_of, written
+from rtshcua.ground.agent.permitted import Permitted
+from rtshcua.model.flat.contract import QUANTITY
+from rtshcua.model.quantity import UNITS, Dimension
+
+#: the limit of what does not belong there: it is to be left out
+ABSENT: Final[Mapping[str, Any]] = {"absent": True}
+_QUANTITY = re.compile(r"\s*(-?[0-9]{1,12}(?:\.[0-9]{1,9})?)\s*([a-zA-Z%/]*)\s*", re.ASCII)
+_NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
+_MOST = 40
+_NAMES = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer"}
+
+
+class Range(NamedTuple):
+    """The least and the most of an argument that some permit leaves, in the canonical unit of its dimension."""
+
+    low: int
+    high: int
+    dimension: Dimension
+
+
+class Frame(NamedTuple):
+    """What a policy leaves an agent: the narrowed schema, the ranges of quantities by skill and argument, and the
+    phases that a skill is bound to.
+    """
+
+    schema: Mapping[str, Any]
+    ranges: Mapping[tuple[str, str], Range]
+    phases: Mapping[str, tuple[str, ...]]
+
+
+class Misfit(NamedTuple):
+    """A place that does not fit. `near` is None where the limit is `ABSENT`; `of` is what it is found by, where that
+    is another place.
+    """
+
+    pointer: str
+    limit: Mapping[str, Any]
+    near: Any
+    of: str = ""
+
+
+def frame_of(schema: Mapping[str, Any], skills: Iterable[Permitted]) -> Frame:
+    """What a policy leaves an agent: `schema` is narrowed by it, `skills` are those that it permits."""
+    known = tuple(skills)
+    phases = {each.contract.name: tuple(each.contract.phases) for each in known if each.contract.phases}
+    return Frame(schema, _ranges(known), phases)
+
+
+def _ranges(skills: Iterable[Permitted]) -> dict[tuple[str, str], Range]:
+    return {
+        (skill.contract.name, each.parameter.name): Range(each.low, each.high, Dimension(each.parameter.dimension))
+        for skill in skills
+        for each in skill.allowed
+        if each.parameter.kind == QUANTITY
+    }
+
+
+def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: Frame) -> list[dict[str, Any]]:
+    """One rejection for each error of the compiler on the specification `value`, whose text is `source`."""
+    misfits = [*_Fit(frame).misfits(frame.schema, value, "", ("", "")), *_Whole(frame, value).misfits()]
+    told: dict[str, dict[str, Any]] = {}
+    for each in found:
+        if each.severity is Severity.ERROR:
+            for one in _rejections(each, value, source, misfits):
+                told.setdefault(json.dumps([one["field"], one["limit"] or one["code"]]), one)
+    return list(told.values())[:_MOST]
+
+
+def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Misfit]) -> Iterator[dict[str, Any]]:
+    pointer = found.pointer or ""
+    own = [each for each in misfits if pointer in (each.pointer, each.of)]
+    below = [each for each in misfits if not each.of and each.pointer.startswith(f"{pointer}/")]
+    above = [each for each in misfits if not each.of and pointer.startswith(f"{each.pointer}/")]
+    for misfit in own or below or above:
+        yield _told(found, misfit.pointer, value, misfit.limit, misfit.near)
+    if not (own or below or above):
+        near = _fixed(found, source)
+        yield _told(found, pointer, value, None if near is None else {"one_of": [near]}, near)
+
+
+def _told(found: Diagnostic, pointer: str, value: Any, limit: Mapping[str, Any] | None, near: Any) -> dict[str, Any]:
+    there, observed = _at(value, pointer)
+    if limit == ABSENT:
+        how = f"leave `{pointer}` out"
+    elif near is not None:
+        how = f"write {json.dumps(near, ensure_ascii=False)} at `{pointer}`"
+    else:
+        how = found.help or found.message
+    return {
+        "code": found.code.id,
+        "field": pointer,
+        "message": found.message,
+        "limit": None if limit is None else dict(limit),
+        "observed": observed if there else None,
+        "age_us": None,
+        "nearest": near,
+        "repair": how,
+    }
+
+
+def _at(value: Any, pointer: str) -> tuple[bool, Any]:
+    """What stands at a pointer; objects and arrays are told by their size alone."""
+    for part in pointer.split("/")[1:]:
+        key = part.replace("~1", "/").replace("~0", "~")
+        try:
+            value = value[int(key)] if isinstance(value, list) else value[key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            return False, None
+    if isinstance(value, dict | list):
+        return True, f"{_NAMES[type(value)]} of {len(value)}"
+    return True, value[:200] if isinstance(value, str) else value
+
+
+def _fixed(found: Diagnostic, source: Source) -> Any:
+    """The value that the first fix writes there, where it writes a whole one."""
+    for fix in found.fixes:
+        if fix.span.file == source.file:
+            try:
+                return json.loads(fix.replacement)
+            except ValueError:
+                return fix.replacement if source.text[fix.span.start - 1 : fix.span.start] == '"' else None
+    return None
+
+
+class _Whole:
+    """Holds the steps of a specification against each other: in which phase each may stand, and that each begins where
+    the one before it ended.
+    """
+
+    def __init__(self, frame: Frame, value: Any) -> None:
+        self._frame = frame
+        self._phases = value.get("phases") if isinstance(value, dict) else None
+
+    def misfits(self) -> Iterator[Misfit]:
+        """What does not fit beside the rest."""
+        before: tuple[str, Any] | None = None
+        names: list[Any] = []
+        for number, phase in enumerate(self._phases if isinstance(self._phases, list) else ()):
+            if not isinstance(phase, dict) or not isinstance(phase.get("steps"), list):
+                continue
+            name, at = phase.get("name"), f"/phases/{number}"
+            if name in names:
+                yield Misfit(f"{at}/name", {"none_of": list(names)}, f"phase_{number + 1}")
+            names.append(name)
+            for index, step in enumerate(phase["steps"]):
+                here = f"{at}/steps/{index}"
+                bound = self._frame.phases.get(_skill(step), ())
+                if bound and name not in bound:
+                    yield Misfit(f"{at}/name", {"one_of": list(bound)}, bound[0], f"{here}/skill")
+                if before is not None and isinstance(step, dict):
+                    yield from self._continued(before, step, here)
+                before = (here, step)
+
+    def _continued(self, before: tuple[str, Any], step: Mapping[str, Any], here: str) -> Iterator[Misfit]:
+        """What the step before would have to say for this one to begin where that one ends."""
+        at, earlier = before
+        old, new = (each.get("arguments") if isinstance(each, dict) else None for each in (earlier, step))
+        schema = self._frame.schema["$defs"].get(_skill(earlier))
+        if not isinstance(old, dict) or not isinstance(new, dict) or schema is None:
+            return
+        for name, wanted in new.items():
+            if name in old and old[name] != wanted and (_skill(step), name) in self._frame.ranges:
+                yield Misfit(f"{at}/arguments/{name}", {"one_of": [wanted]}, wanted, here)
+        entries = [f"{each}.entry" for each in new.values() if isinstance(each, str)]
+        for name, each in schema["properties"]["arguments"]["properties"].items():
+            fits = [entry for entry in entries if "pattern" in each and _fits(each, entry)]
+            if fits and old.get(name) not in fits:
+                yield Misfit(f"{at}/arguments/{name}", {"one_of": fits}, fits[0], here)
+
+
+class _Fit:
+    """Holds a value against the narrowed schema: the keywords that it uses, and no others."""
+
+    def __init__(self, frame: Frame) -> None:
+        self._frame = frame
+        self._defs: Mapping[str, Any] = frame.schema["$defs"]
+
+    def misfits(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[Misfit]:
+        """What of `value`, which stands `at` a pointer, does not fit; `of` names the skill and the argument."""
+        if "anyOf" in schema:
+            yield from self._step(value, at)
+        elif _NAMES.get(type(value)) != schema["type"]:
+            yield Misfit(at, {"type": schema["type"]}, self._near(schema, value, of))
+        elif schema["type"] == "object":
+            yield from self._object(schema, value, at, of)
+        elif schema["type"] == "array":
+            for number, each in enumerate(value):
+                if number >= schema.get("maxItems", len(value)):
+                    yield Misfit(f"{at}/{number}", ABSENT, None)
+                else:
+                    yield from self.misfits(schema["items"], each, f"{at}/{number}", of)
+        elif not _fits(schema, value):
+            yield Misfit(at, self._limit(schema, of), self._near(schema, value, of))
+
+    def _step(self, value: Any, at: str) -> Iterator[Misfit]:
+        """A step: the skill that it names says what else it has."""
+        named = _skill(value)
+        if named in self._defs:
+            yield from self.misfits(self._defs[named], value, at, (named, ""))
+            return
+        near = nearest(named, self._defs)
+        given = value.get("arguments") if isinstance(value, dict) else None
+        yield Misfit(f"{at}/skill", {"one_of": list(self._defs)}, near or self._alike(given))
+
+    def _alike(self, given: Any) -> str:
+        """The skill whose arguments are most like those that are given."""
+        named = frozenset(given) if isinstance(given, dict) else frozenset()
+
+        def differs(skill: str) -> int:
+            own = self._defs[skill]["properties"]["arguments"]
+            return len(named - set(own["properties"])) * 2 + len(set(own["required"]) - named)
+
+        return min(self._defs, key=differs)
+
+    def _object(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[Misfit]:
+        skill, _ = of
+        for name in value:
+            if name not in schema["properties"]:
+                yield Misfit(f"{at}/{_part(name)}", ABSENT, None)
+        for name, each in schema["properties"].items():
+            here = (skill, name)
+            if name in value:
+                yield from self.misfits(each, value[name], f"{at}/{name}", here)
+            elif name in schema["required"]:
+                limit = {"required": True, **self._limit(each, here)}
+                yield Misfit(f"{at}/{name}", limit, self._near(each, None, here))
+
+    def _limit(self, schema: Mapping[str, Any], of: tuple[str, str]) -> dict[str, Any]:
+        span = self._frame.ranges.get(of)
+        if "const" in schema or "enum" in schema:
+            return {"one_of": schema.get("enum", [schema.get("const")])}
+        if span is not None:
+            return {"least": written(span.low, span.dimension), "most": written(span.high, span.dimension)}
+        return {key: schema[key] for key in ("type", "pattern", "maxLength") if key in schema}
+
+    def _near(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> Any:
+        """The value that fits, nearest to `value` as far as that can be told."""
+        span = self._frame.ranges.get(of)
+        if "const" in schema:
+            return schema["const"]
+        if "enum" in schema:
+            return (nearest(value, schema["enum"]) if isinstance(value, str) else None) or schema["enum"][0]
+        if span is not None:
+            return written(_clamped(str(value), span), span.dimension)
+        match schema.get("type"):
+            case "object":
+                names = schema["required"]
+                return {name: self._near(schema["properties"][name], None, (of[0], name)) for name in names}
+            case "array":
+                return []
+            case "string":
+                return _name(schema, value)
+            case _:
+                return None
+
+
+def _skill(step: Any) -> str:
+    """The skill that a step names; empty where it names none."""
+    named = step.get("skill") if isinstance(step, dict) else None
+    return named if isinstance(named, str) else ""
+
+
+def _fits(schema: Mapping[str, Any], value: Any) -> bool:
+    if "const" in schema:
+        return bool(value == schema["const"])
+    if "enum" in schema:
+        return value in schema["enum"]
+    if not isinstance(value, str):
+        return True
+    long = schema.get("maxLength", len(value)) < len(value)
+    return not long and ("pattern" not in schema or re.fullmatch(schema["pattern"], value) is not None)
+
+
+def _clamped(text: str, span: Range) -> int:
+    """The quantity that a text says, or else zero, within the range; without a unit it is in the schema's."""
+    said = _QUANTITY.fullmatch(text)
+    if said is None:
+        return span.low
+    unit = UNITS.get(said[2] or unit_of(span.dimension))
+    scale = Fraction(1) if unit is None else Fraction(unit.numerator, unit.denominator)
+    return min(max(round(Fraction(said[1]) * scale), span.low), span.high)
+
+
+def _name(schema: Mapping[str, Any], value: Any) -> str:
+    """A text that fits a pattern of names or the first place that one has, made of what was written."""
+    words = str(value or "")[: schema.get("maxLength", 200)]
+    pattern = schema.get("pattern")
+    named = re.findall(r"\w+\\\.entry", pattern or "")
+    places = [each.replace("\\", "") for each in named]
+    close = nearest(words, places) if places else None
+    for text in (close, words, _NO_NAME.sub("_", words), f"m_{_NO_NAME.sub('_', words)}", *places, "a"):
+        if text is not None and _fits(schema, text):
+            return text
+    return words
+
+
+def _part(name: str) -> str:
+    return name.replace("~", "~0").replace("/", "~1")

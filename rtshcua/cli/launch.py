@@ -242,8 +242,9 @@ def _agents(order: Launch, loaded: Loaded, stack: ExitStack, *, waits: bool = Fa
     """Who may follow the flight and hand in, until the stack is closed. Raises OSError."""
     if order.agent_socket is None and order.operator_socket is None:
         return None
-    agents = Agents(order.agent_socket, loaded, waits=waits, operators=order.operator_socket, group=order.agent_group)
-    return stack.enter_context(agents)
+    return stack.enter_context(
+        Agents(order.agent_socket, loaded, operators=order.operator_socket, group=order.agent_group, waits=waits)
+    )
 
 
 def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transport, Agents]:

@@ -67,13 +67,17 @@ def policy_digest(payload: bytes) -> bytes:
 
 def seal(policy: bytes, mission: bytes, *, policy_key: SigningKey, mission_key: SigningKey) -> bytes:
     """Sign both payloads and nest them. Raises `WrongDuty` for a key of another duty."""
-    return artefact.wrap(
-        names.BUNDLE,
-        (
-            cose.sign1(policy, key=policy_key, duty=Duty.POLICY, content_type=names.POLICY.content_type),
-            cose.sign1(mission, key=mission_key, duty=Duty.MISSION, content_type=names.MISSION.content_type),
-        ),
-    )
+    envelope = cose.sign1(policy, key=policy_key, duty=Duty.POLICY, content_type=names.POLICY.content_type)
+    return seal_under(envelope, mission, mission_key=mission_key)
+
+
+def seal_under(envelope: bytes, mission: bytes, *, mission_key: SigningKey) -> bytes:
+    """Sign a mission's payload, and nest it beside the envelope of a policy that was signed before.
+
+    Raises `WrongDuty` for a key of another duty.
+    """
+    signed = cose.sign1(mission, key=mission_key, duty=Duty.MISSION, content_type=names.MISSION.content_type)
+    return artefact.wrap(names.BUNDLE, (envelope, signed))
 
 
 def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: int) -> Bundle:

@@ -85,7 +85,7 @@ def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: F
 
 def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Misfit]) -> Iterator[dict[str, Any]]:
     pointer = found.pointer or ""
-    own = [each for each in misfits if pointer in (each.pointer, each.of)]
+    own = [each for each in misfits if pointer == (each.of or each.pointer)]
     below = [each for each in misfits if not each.of and each.pointer.startswith(f"{pointer}/")]
     above = [each for each in misfits if not each.of and pointer.startswith(f"{each.pointer}/")]
     for misfit in own or below or above:
@@ -300,9 +300,9 @@ def _clamped(text: str, span: Range) -> int:
 
 def _name(schema: Mapping[str, Any], value: Any) -> str:
     """A text that fits a pattern of names or the first place that one has, made of what was written."""
-    words = str(value or "")[: schema.get("maxLength", 200)]
+    words: str = str(value or "")[: schema.get("maxLength", 200)]
     pattern = schema.get("pattern")
-    named = re.findall(r"\w+\\\.entry", pattern or "")
+    named: list[str] = re.findall(r"\w+\\\.entry", pattern or "")
     places = [each.replace("\\", "") for each in named]
     close = nearest(words, places) if places else None
     for text in (close, words, _NO_NAME.sub("_", words), f"m_{_NO_NAME.sub('_', words)}", *places, "a"):

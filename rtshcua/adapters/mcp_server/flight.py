@@ -1,0 +1,94 @@
+"""The vehicle as its agent socket tells of it: followed in a thread, so that nobody who asks ever waits for it."""
+
+import json
+import socket
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Any, Final
+
+#: how long until it is tried again to follow, in seconds
+AGAIN_S: Final = 0.3
+#: how many lines are kept, the oldest let go first
+MOST_LINES: Final = 5_000
+#: a line that is longer is none of a flight's
+LONGEST: Final = 8 << 20
+
+
+class Following:
+    """What was told since the connection that stands, or the last one that did. Every field is replaced, never changed.
+
+    `turn` counts the lines, and wakes whoever waits.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.turn = threading.Condition()
+        self.heard = 0
+        self.connected = False
+        self.hello: dict[str, Any] = {}
+        self.waiting: dict[str, Any] = {}
+        self.vehicle: dict[str, Any] = {}
+        self.mission: dict[str, Any] = {}
+        self.close: dict[str, Any] = {}
+        self.records: deque[dict[str, Any]] = deque(maxlen=MOST_LINES)
+        self._ended = threading.Event()
+        self._link: socket.socket | None = None
+        threading.Thread(target=self._follow, daemon=True).start()
+
+    @property
+    def stage(self) -> str:
+        """Where it stands, in a word."""
+        if self.close:
+            return "ended"
+        if not self.connected:
+            return "unreachable"
+        return "flying" if self.mission else "waiting"
+
+    def end(self) -> None:
+        """Follow no more."""
+        self._ended.set()
+        if self._link is not None:
+            self._link.close()
+
+    def _follow(self) -> None:
+        while not self._ended.is_set():
+            try:
+                with socket.socket(socket.AF_UNIX) as link:
+                    link.connect(str(self._path))
+                    self._link = link
+                    self._read(link)
+            except (OSError, ValueError):
+                pass
+            with self.turn:
+                self.connected = False
+                self.turn.notify_all()
+            self._ended.wait(AGAIN_S)
+
+    def _read(self, link: socket.socket) -> None:
+        with link.makefile("rb") as lines:
+            while line := lines.readline(LONGEST):
+                told = json.loads(line)
+                with self.turn:
+                    self._take(told if isinstance(told, dict) else {})
+                    self.turn.notify_all()
+
+    def _take(self, told: dict[str, Any]) -> None:
+        self.heard += 1
+        match told.get("type"):
+            case "hello":
+                if told.get("flight") != self.hello.get("flight"):
+                    self.mission, self.close, self.vehicle = {}, {}, {}
+                    self.records = deque(maxlen=MOST_LINES)
+                self.hello, self.connected = told, True
+            case "waiting":
+                self.waiting = told
+            case "vehicle":
+                self.vehicle = told
+            case "mission":
+                self.mission = told
+            case "close":
+                self.close = told
+                self.records.append(told)
+            case "decision" | "effect" | "seal" | "recover":
+                self.records.append(told)

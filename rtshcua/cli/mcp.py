@@ -1,0 +1,81 @@
+"""`rtshcua mcp`: an agent proposes missions to a vehicle that waits, over the Model Context Protocol."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.cli.faults import distrust, fail
+from rtshcua.cli.unlock import check_trusted, unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire import cose
+from rtshcua.wire.bundle import MAX_BUNDLE, envelopes, policy_digest
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import open_root
+from rtshcua.wire.untrusted import Untrusted
+
+if TYPE_CHECKING:
+    from rtshcua.adapters.mcp_server.desk import Desk
+
+app = typer.Typer(add_completion=False)
+_AGENT = "agent"
+
+
+@app.command()
+def mcp(
+    bundle: Annotated[Path, typer.Argument(help="the bundle that `rtshcua run --wait` has: its policy is in force")],
+    to: Annotated[Path, typer.Option(metavar="SOCKET", help="the agent socket of the vehicle that waits")],
+    with_: Annotated[list[Path], typer.Option("--with", help="the sources of that policy (repeatable)")],
+    mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+) -> ExitCode:
+    """Serve an agent's host over the standard streams (MCP): check and propose missions, follow them, replan.
+
+    It signs with one key, the agent's mission key, and has no other. It reaches nothing but SOCKET, and no tool arms,
+    sets a parameter, opens a link or takes a key. Needs the extra `mcp`. docs/agents.md says how to set hosts up.
+
+    Ends with 0 with the host, 2 where the command line is wrong or the extra is missing, 3 where a file cannot be read,
+    4 for a key that is not an agent's.
+    """
+    try:
+        from rtshcua.adapters.mcp_server.server import serve
+    except ModuleNotFoundError as missing:
+        if (missing.name or "").partition(".")[0] not in ("mcp", "anyio"):
+            raise
+        return fail(ExitCode.USAGE, "the MCP server is not installed", 'in the checkout: `pip install ".[mcp]"`')
+    store = KeyStore(data_folder())
+    try:
+        envelope, _ = envelopes(read_regular(bundle, MAX_BUNDLE))
+        digest = policy_digest(cose.unverified(envelope, limit=MAX_BUNDLE).payload)
+        key = unlock(store, Duty.MISSION, path=mission_key, passphrase_file=passphrase_file, whose=_AGENT)
+        sources = _sources(store, key)
+    except Untrusted as error:
+        return distrust(error)
+    if set(sources) - {_AGENT}:
+        text = f"key {key.kid.hex()} may speak for {', '.join(sources)}, and an agent's host gets an agent's key alone"
+        return fail(ExitCode.UNTRUSTED, text, "`--mission-key mission-agent.key`")
+    for path in with_:
+        read_regular(path, 1)
+
+    def make() -> "Desk":
+        from rtshcua import library
+        from rtshcua.adapters.mcp_server.desk import Desk, Signer
+        from rtshcua.adapters.mcp_server.flight import Following
+        from rtshcua.adapters.mcp_server.missions import Missions
+
+        signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
+        return Desk(Missions(with_, str(library.root())), signer, to, Following(to))
+
+    serve(make)
+    return ExitCode.OK
+
+
+def _sources(store: KeyStore, key: SigningKey) -> tuple[str, ...]:
+    """For whom the key may speak, by the key store's trust root; nothing where that does not name it."""
+    if not store.exists():
+        return ()
+    named = open_root(store.root(), pinned=store.pin(), now_us=0).keys_for(Duty.MISSION).get(key.kid)
+    return () if named is None else named.sources

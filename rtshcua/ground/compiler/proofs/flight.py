@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs import chaining, charge, last_link, path, starting
+from rtshcua.ground.compiler.proofs.period import Period
 from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after, may_be_skipped
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.ways import Ways
@@ -16,6 +17,7 @@ def prove(
     mission: MissionDecl,
     steps: Sequence[Step],
     invocations: Sequence[PreparedInvocation],
+    comes: Sequence[Period],
     permitted: Sequence[bool],
 ) -> None:
     """Report what is wrong with the way of a mission, up to the first step that cannot be flown.
@@ -26,16 +28,16 @@ def prove(
     starts: list[tuple[Place, ...]] = []
     places: tuple[Place, ...] = (AT_HOME,)
     decided = True
-    for number, (step, one) in enumerate(zip(steps, invocations, strict=True)):
+    for number, (step, one, period) in enumerate(zip(steps, invocations, comes, strict=True)):
         able = places if permitted[number] and one.invocation.skill not in ground.impossible else ()
         if (able and not may_be_skipped(one)) or not any(place.aloft for place in places):
             able = chaining.aloft(ground, step, one, able, steps[:number])
-        able = path.prove(ground, step, one, able, steps[:number]) if able else ()
+        able = path.prove(ground, step, one, period, able, steps[:number]) if able else ()
         able = chaining.aloft(ground, step, one, able, steps[:number])
         able = chaining.prove(ground, step, one, able, steps[:number]) if able else ()
-        if not able or not (number or starting.prove(ground, step)):
+        if not able or not (number or starting.prove(ground, step, comes)):
             return
-        ways.prove(step, one, able)
+        ways.prove(step, one, period, able)
         starts.append(able)
         places = after(one, places, able)
         if len(places) > MOST_PLACES:

@@ -11,25 +11,19 @@ from rtshcua.decision.values import point
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.words import clock
 from rtshcua.ground.compiler.proofs.hopeful import refused
+from rtshcua.ground.compiler.proofs.period import Period
 from rtshcua.ground.compiler.proofs.ruleset import timed
 from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US, approval
 from rtshcua.model.ir.missions import Step
 
 
-def prove(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
+def prove(
+    ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation], comes: Sequence[Period]
+) -> None:
     """Report the first step that may come at such a time."""
-    earliest, latest = 0, START_WINDOW_US
-    for step, invocation in zip(steps, invocations, strict=True):
-        flat = invocation.invocation
-        if not flat.issued_at_us:
+    for step, invocation, period in zip(steps, invocations, comes, strict=True):
+        if not period.issued_at_us or _refused(ground, step, invocation, period.utc(0)[0]):
             return
-        latest += approval(ground, invocation) + flat.contract.deadline_us
-        if _refused(ground, step, invocation, (flat.issued_at_us + earliest, flat.issued_at_us + latest)):
-            return
-        latest += flat.contract.duration_us
-        time = flat.contract.motion.time
-        earliest += flat.arguments[time] if time >= 0 else 0
 
 
 def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, window: tuple[int, int]) -> bool:
@@ -40,7 +34,7 @@ def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, window:
     space = ground.questions.space(flat.skill)._replace(
         arguments=tuple(map(point, flat.arguments)), utc=(window,), phases=frozenset((invocation.phase,))
     )
-    for witness, forbid in refused(ground, invocation, space):
+    for witness, forbid in refused(ground, invocation, space, dated=True):
         offset = ground.prepared.policy.vehicle.utc_offset_us
         at, first, last = (clock(moment, offset) for moment in (witness.at.utc[0][0], *window))
         told = [each.rule for each in invocation.candidates.permits] if forbid is None else [forbid]

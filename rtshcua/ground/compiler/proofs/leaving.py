@@ -22,8 +22,8 @@ _NO_BOX: Box = (0, 0, 0, 0)
 
 
 def breach(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg], low: int, high: int) -> str:
-    """What a vehicle would do on these legs, at heights in mm, that the airspace does not allow; to stand after
-    "would".
+    """What a vehicle would do on these legs, at heights in mm, that the airspace does not allow, as if all its zones
+    existed; to stand after "would".
     """
     error = policy.vehicle.position_error
     box = (-error, -error, error, error)
@@ -36,7 +36,7 @@ def breach(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg], low:
             exact = zone.along(place, _NO_BOX) == TRUE
             return (f"come within {_length(error)} of the edge of" if exact else "leave") + _at(policy, zone, place)
     for zone in airspace.outside:
-        if zone.times is not None or zone.between(low, high) == FALSE:
+        if zone.between(low, high) == FALSE:
             continue
         near = [each for each in _places(legs) if zone.along(each, box) != FALSE]
         if near:

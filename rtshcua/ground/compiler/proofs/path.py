@@ -1,28 +1,30 @@
 """E0508, E0614, E0616, E0804: where a step goes from where its predecessor ended, it may go, and can in time.
 
-The leg to a step's path is part of it, from wherever the vehicle may be then (`places`). Zones that exist at some times
-only are left for on board, where the time is known.
+The leg to a step's path is part of it, from wherever the vehicle may be then (`places`), and whenever it may come
+(`period`).
 """
 
 from collections.abc import Sequence
+from functools import partial
 
-from rtshcua.decision.contracts import Energy, longest
-from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.contracts import Energy
+from rtshcua.decision.evaluate import Condition, Environment
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.safety import ranging
-from rtshcua.decision.tree import monitored, slots_read, where
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
+from rtshcua.decision.values import Span as Utc
 from rtshcua.decision.volume import Volume
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.analysis.words import clock
 from rtshcua.ground.compiler.mission import argument_span
-from rtshcua.ground.compiler.proofs.anytime import may_keep
 from rtshcua.ground.compiler.proofs.leaving import breach, path_legs
+from rtshcua.ground.compiler.proofs.period import Period, at_moment, keeps, zone_span
 from rtshcua.ground.compiler.proofs.places import Place, end, from_home, from_where, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.shapes import Point
 from rtshcua.ground.compiler.ways import path_length
-from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.missions import Step
@@ -33,7 +35,12 @@ MILLISECOND_US = 1_000
 
 
 def prove(
-    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], before: Sequence[Step]
+    ground: Ground,
+    step: Step,
+    invocation: PreparedInvocation,
+    period: Period,
+    starts: Sequence[Place],
+    before: Sequence[Step],
 ) -> tuple[Place, ...]:
     """Report what no state makes possible about a step that may come at any of `starts`; where of these it may begin,
     nowhere after a finding.
@@ -48,7 +55,7 @@ def prove(
 
     def flies(start: Place) -> None:
         skipped = [] if start is starts[0] else [each for each in before if each.on_inadmissible == "skip"]
-        _volume(ground, step, invocation, start, skipped)
+        _volume(ground, step, invocation, period, start, skipped)
 
     able = from_where(ground, invocation, starts, flies)
     for start in able:
@@ -76,27 +83,22 @@ def _speed(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
     )
 
 
-def _volume(ground: Ground, step: Step, invocation: PreparedInvocation, start: Place, skipped: Sequence[Step]) -> None:
+def _volume(
+    ground: Ground,
+    step: Step,
+    invocation: PreparedInvocation,
+    period: Period,
+    start: Place,
+    skipped: Sequence[Step],
+) -> None:
     """The planned volume keeps the airspace and what the contract maintains; charge and clauses can suffice."""
     at, volume = planned(ground, invocation, start)
-    airspace, policy = ground.prepared.airspace, ground.prepared.policy
     labels = [(each.span, "this step may be skipped") for each in skipped[-1:]]
-    if airspace is not None and EVERYWHERE[may_keep(volume.place, airspace)] == FALSE:
-        path = invocation.invocation.plan.path
-        legs = path_legs([(start.x, start.y), *zip(path[::2], path[1::2], strict=True)])
-        ground.context.report.add(
-            codes.PATH_OUTSIDE,
-            step.span,
-            f"on its way, which {'may begin' if skipped else 'begins'} {from_home(start.x, start.y)}, the vehicle "
-            f"would {breach(policy, airspace, legs, *volume.height[:2])}",
-            help="the leg to where the step begins counts, widened by the vehicle's position error; "
-            "go around by further steps",
-            labels=[(ground.span(airspace.airspace), "the airspace"), *labels],
-        )
+    if not _airspace(ground, step, invocation, period, start, volume, labels):
         return
-    clause = _broken(ground, invocation, at, volume)
-    if clause is not None:
-        _never(ground, step, clause, labels)
+    broken = _broken(ground, invocation, period, at, volume)
+    if broken is not None:
+        _never(ground, step, *broken, labels)
         return
     needed = Energy(invocation.invocation.contract, ground.prepared.policy.vehicle).needed(volume.farthest[1])
     if needed > FULL:
@@ -108,42 +110,90 @@ def _volume(ground: Ground, step: Step, invocation: PreparedInvocation, start: P
         )
 
 
-def _broken(ground: Ground, invocation: PreparedInvocation, at: Environment, volume: Volume) -> Clause | None:
-    """A clause of the contract that cannot hold: over the planned volume, if it reads nothing else, or at all."""
-    vehicle = ground.prepared.policy.vehicle
-    through = longest(invocation.invocation.contract, vehicle)
-    over = ranging(at, volume, ground.prepared.tables.known.height, through)
-    fixed = set(where(vehicle))
+def _airspace(
+    ground: Ground,
+    step: Step,
+    invocation: PreparedInvocation,
+    period: Period,
+    start: Place,
+    volume: Volume,
+    labels: list[tuple[Span, str]],
+) -> bool:
+    """Whether the planned volume keeps the airspace whenever the step may come."""
+    airspace, policy, lasts = ground.prepared.airspace, ground.prepared.policy, invocation.lasts_us
+    if airspace is None:
+        return True
+    present = period.present(airspace, lasts)
+    begins = f"on its way, which {'may begin' if labels else 'begins'} {from_home(start.x, start.y)}, the vehicle would"
+    written = (ground.span(airspace.airspace), "the airspace")
+    if EVERYWHERE[keeps(volume.place, present)] == FALSE:
+        path = invocation.invocation.plan.path
+        legs = path_legs([(start.x, start.y), *zip(path[::2], path[1::2], strict=True)])
+        ground.context.report.add(
+            codes.PATH_OUTSIDE,
+            step.span,
+            f"{begins} {breach(policy, present, legs, *volume.height[:2])}",
+            help="the leg to where the step begins counts, widened by the vehicle's position error; "
+            "go around by further steps",
+            labels=[written, *period.labels(present, volume.place, lasts), *labels],
+        )
+        return False
+    missing = period.missing(airspace, lasts)
+    if missing is not None:
+        name = policy.zones[missing.number].name
+        ground.context.report.add(
+            codes.PATH_OUTSIDE,
+            step.span,
+            f"{begins} be in `{name}`, which does not always exist {period.from_to(lasts)}, when this step may fly",
+            help="issue the mission at another time, or let the steps before this one take less",
+            labels=[written, (zone_span(ground, missing), "declared here")],
+        )
+        return False
+    for zone in period.avoidable(airspace, lasts):
+        if volume.place.inside(zone) != FALSE:
+            period.avoid(zone, lasts)
+    for zone in airspace.inside:
+        period.stay(zone, lasts)
+    return True
+
+
+def _broken(
+    ground: Ground, invocation: PreparedInvocation, period: Period, at: Environment, volume: Volume
+) -> tuple[Clause, int | None] | None:
+    """A clause of the contract that cannot hold, over the planned volume or at the start, and the moment of UTC at
+    which it cannot, where that matters.
+    """
+    over = ranging(at, volume, ground.prepared.tables.known.height, invocation.lasts_us)
+    arguments, contract = invocation.invocation.arguments, invocation.invocation.contract
+    anywhere = ground.case(invocation).at
+
+    def can(condition: Condition, best: Condition | None, there: Environment, utc: Utc) -> bool:
+        """Whether a clause can be true at a moment, and in the best case is nowhere false."""
+        then = at_moment(there, utc)
+        return bool(condition(then) & TRUE) and (best is None or EVERYWHERE[best(then)] != FALSE)
+
     for clause, condition in invocation.maintain:
-        truth = condition(over)
-        timeless = not monitored((clause,)) and not _timed(ground, clause)
-        if timeless and set(slots_read((clause,), vehicle)) <= fixed:
-            truth = EVERYWHERE[truth]
-        if truth == FALSE:
-            return clause
-    case = ground.case(invocation)
+        maintained = partial(can, condition, ground.best(clause, contract), over)
+        fails, moment = period.fails(clause, arguments, invocation.lasts_us, maintained)
+        if fails:
+            return clause, moment
     for clause, condition in (*invocation.require, *invocation.assume):
-        if not condition(case.at) & TRUE:
-            return clause
+        # where the step begins, only if the time matters too: else E0619 says so
+        for there in (anywhere, at) if period.timed(clause, arguments) else (anywhere,):
+            fails, moment = period.fails(clause, arguments, 0, partial(can, condition, None, there))
+            if fails:
+                return clause, moment
     return None
 
 
-def _timed(ground: Ground, clause: Clause) -> bool:
-    """Whether a clause reads the time, or a zone that exists at some times only."""
-    code, tables = clause.code, ground.prepared.tables
-    for at in range(0, len(code), 3):
-        op, a, b = code[at : at + 3]
-        zones = (a,) if op == Op.POSITION_IN else tables.tables[b] if op == Op.POSITION_IN_ARGUMENT else ()
-        if op == Op.TIME_IN or any(tables.zones[zone].times is not None for zone in zones):
-            return True
-    return False
-
-
-def _never(ground: Ground, step: Step, clause: Clause, labels: list[tuple[Span, str]]) -> None:
+def _never(ground: Ground, step: Step, clause: Clause, moment: int | None, labels: list[tuple[Span, str]]) -> None:
+    at = ""
+    if moment is not None:
+        at = f" at {clock(moment, ground.prepared.policy.vehicle.utc_offset_us)}, local time, when it may begin"
     ground.context.report.add(
         codes.NEVER_HOLDS,
         step.span,
-        f"`{clause.text}` cannot hold all along this step",
+        f"`{clause.text}` cannot hold all along this step{at}",
         help="change the step's arguments, or where it begins"
         + (": a step before it may be skipped, and then it begins elsewhere" if labels else ""),
         labels=[(ground.span(clause), "the contract asks for this"), *labels],

@@ -24,6 +24,7 @@ from rtshcua.ground.compiler.proofs import (
     some_time,
     timing,
 )
+from rtshcua.ground.compiler.proofs.period import periods
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -64,7 +65,8 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     steps = [step for phase in declared.phases for step in phase.steps]
     permitted = [authority.prove(ground, declared, step, one) for step, one in zip(steps, prepared, strict=True)]
     before = len(ground.context.report.found)
-    flight.prove(ground, declared, steps, prepared, permitted)
+    comes = periods(ground, prepared)
+    flight.prove(ground, declared, steps, prepared, comes, permitted)
     if len(ground.context.report.found) == before:
         for step, one, good in zip(steps, prepared, permitted, strict=True):
             if good:
@@ -72,9 +74,9 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
     if all(permitted):
         between.prove(ground, declared, steps, prepared)
         if mission.issued_at_us:
-            hours.prove(ground, steps, prepared)
+            hours.prove(ground, steps, prepared, comes)
         else:
-            some_time.prove(ground, steps, prepared)
+            some_time.prove(ground, steps, prepared, comes)
     for step, one in zip(steps, prepared, strict=True):
         deferral.prove_step(ground, step, one)
         observation.prove_step(ground, step, one)

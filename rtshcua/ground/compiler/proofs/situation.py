@@ -1,20 +1,22 @@
 """What is known before the flight: all of a step's arguments, and nothing of the vehicle's state."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Final
 
 from rtshcua.decision.case import Case
 from rtshcua.decision.evaluate import Condition, Environment, build
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
-from rtshcua.decision.tree import AtMost, Node
+from rtshcua.decision.tree import Node, where
 from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.span import Span as Where
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.compiler.proofs.best import ALWAYS as ALWAYS
+from rtshcua.ground.compiler.proofs.best import hopeful
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Airspace, Rule
@@ -22,8 +24,6 @@ from rtshcua.model.flat.situation import Context as Standing
 
 #: us since the epoch: later than any flight
 EVER = 1 << 53
-#: the condition of a rule without one
-ALWAYS: Final = AtMost((), 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,7 @@ class Ground:
     `steps` are those that were prepared, `hopes` the conditions of rules as `hopeful` has them: the choices of a
     mission's parameters share many.
     `nodes` and `conditions` are those of its rules, by their code.
+    `bests` are the clauses of contracts in the best of all states.
     `impossible` are the skills whose contracts were reported to contradict themselves: no step of one is looked at.
     """
 
@@ -44,7 +45,8 @@ class Ground:
     questions: Questions
     kept: set[tuple[object, ...]] = field(default_factory=set)
     steps: dict[tuple[Invocation, tuple[str, ...]], PreparedInvocation | Refusal] = field(default_factory=dict)
-    hopes: dict[tuple[int, bool], Node | None] = field(default_factory=dict)
+    hopes: dict[Hashable, Node | None] = field(default_factory=dict)
+    bests: dict[tuple[int, ...], Condition] = field(default_factory=dict)
     impossible: set[int] = field(default_factory=set)
     nodes: dict[tuple[int, ...], Node] = field(default_factory=dict)
     conditions: dict[tuple[int, ...], Condition] = field(default_factory=dict)
@@ -64,6 +66,15 @@ class Ground:
         found = self.conditions.get(code)
         if found is None:
             found = self.conditions[code] = build(self.node(rule), self.prepared.tables)
+        return found
+
+    def best(self, clause: Clause, contract: Contract) -> Condition:
+        """A clause, in the best of all states that the place, the height, the time and the arguments leave open."""
+        found = self.bests.get(clause.code)
+        if found is None:
+            fixed = frozenset(where(self.prepared.policy.vehicle))
+            node = hopeful(self.prepared.compiler.node(clause, contract), True, fixed)
+            found = self.bests[clause.code] = build(node, self.prepared.tables)
         return found
 
     def sets(self, at_us: int = 0) -> Sets:
@@ -89,6 +100,6 @@ class Ground:
         sets = self.sets()
         return Environment((*sets.values, MISSING), arguments, sets.utc_us, sets.utc_error_us, phase=phase)
 
-    def span(self, part: Clause | Rule | Link | Airspace) -> Span:
+    def span(self, part: Clause | Rule | Link | Airspace) -> Where:
         """Where a part of the policy is written."""
         return self.lowered.files.span(part.source, part.start, part.end)

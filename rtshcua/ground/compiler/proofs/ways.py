@@ -6,17 +6,19 @@ airspace is not flown, and the vehicle lands where it is: better than nothing, b
 """
 
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from rtshcua.decision.contracts import first_cell
+from rtshcua.decision.contracts import first_cell, longest
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation, PreparedLink
 from rtshcua.decision.values import TRUE
 from rtshcua.decision.zones import Place as Places
-from rtshcua.decision.zones import Sweep
+from rtshcua.decision.zones import PreparedZone, Sweep
 from rtshcua.diagnostics import codes
-from rtshcua.ground.compiler.proofs.anytime import may_keep
 from rtshcua.ground.compiler.proofs.fan import Fan, Landmarks, Point, disc
 from rtshcua.ground.compiler.proofs.leaving import breach, path_legs
+from rtshcua.ground.compiler.proofs.period import Period, keeps, zone_span
 from rtshcua.ground.compiler.proofs.places import Place, from_home, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.contract import PLACE, MotionKind
@@ -36,6 +38,21 @@ class Flown(NamedTuple):
     after: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Then:
+    """When a link may fly: until `further` us after the latest begin of a step. The airspace, and what of it may be
+    present then.
+    """
+
+    period: Period
+    further: int
+    airspace: PreparedAirspace
+    present: PreparedAirspace = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "present", self.period.present(self.airspace, self.further))
+
+
 class Ways:
     """The ways that lead from the steps of one mission."""
 
@@ -48,7 +65,7 @@ class Ways:
         self._told: set[Point] = set()
         self._nowhere: set[PreparedLink] = set()
 
-    def prove(self, step: Step, invocation: PreparedInvocation, starts: Sequence[Place]) -> None:
+    def prove(self, step: Step, invocation: PreparedInvocation, period: Period, starts: Sequence[Place]) -> None:
         """Report the first way from a step that leaves the airspace; the step itself was found to keep it."""
         airspace = self._ground.prepared.airspace
         if airspace is None or invocation.invocation.plan.kind in (MotionKind.HOME, MotionKind.LAND):
@@ -59,22 +76,34 @@ class Ways:
             path = invocation.invocation.plan.path
             points = ((start.x, start.y), *zip(path[::2], path[1::2], strict=True))
             flown = Flown(points, *volume.height[:2])
-            for link in links:
+            for link, lasts in links:
                 if link in self._nowhere:
                     continue
-                if not self._link(step, link, flown, airspace):
+                there = Then(period, invocation.lasts_us + lasts, airspace)
+                if not self._link(step, link, flown, there):
                     return
                 if link.motion == MotionKind.FLY:
                     flown = self._beyond(link, flown)
 
-    def _links(self, invocation: PreparedInvocation) -> Iterator[PreparedLink]:
-        """What may be flown instead of a step, or in the midst of it; holding and landing lead nowhere."""
-        degrades = (rule.target for rule in invocation.candidates.degrades)
-        for link in (*degrades, *invocation.chain, *self._ground.prepared.contingency):
-            if link.motion in (MotionKind.HOME, MotionKind.FLY, MotionKind.CLIMB):
-                yield link
+    def _links(self, invocation: PreparedInvocation) -> Iterator[tuple[PreparedLink, int]]:
+        """What may be flown instead of a step, or in the midst of it, and when it has ended, us after the step; holding
+        and landing lead nowhere.
+        """
+        degrades = [[rule.target] for rule in invocation.candidates.degrades]
+        before = 0  # the contingency flies when the step's own chain has failed
+        for chain in (*degrades, invocation.chain, self._ground.prepared.contingency):
+            lasts = before if chain is self._ground.prepared.contingency else 0
+            for link in chain:
+                lasts += self._lasts(link)
+                if link.motion in (MotionKind.HOME, MotionKind.FLY, MotionKind.CLIMB):
+                    yield link, lasts
+            before = max(before, lasts)
 
-    def _link(self, step: Step, link: PreparedLink, flown: Flown, airspace: PreparedAirspace) -> bool:
+    def _lasts(self, link: PreparedLink) -> int:
+        policy = self._ground.prepared.policy
+        return longest(policy.contracts[link.link.skill], policy.vehicle, link.link.limit_us)
+
+    def _link(self, step: Step, link: PreparedLink, flown: Flown, then: Then) -> bool:
         """Whether a link keeps the airspace; reports the place from where it does not."""
         if link.motion == MotionKind.HOME:
             to: Sequence[Point] = self._homes
@@ -83,36 +112,48 @@ class Ways:
             to = [self._target(link)] if link.motion == MotionKind.FLY else []
             altitude = self._altitude(link)
             flown = flown._replace(low=min(flown.low, altitude), high=max(flown.high, altitude))
-            if to and not self._keeps(to, altitude, altitude, airspace):
+            if to and not self._keeps(to, altitude, altitude, then.present):
                 self._nowhere.add(link)  # said once: it is the same from everywhere
-                self._report(step, link, flown._replace(low=altitude, high=altitude), to[0], to, airspace)
+                self._report(step, link, flown._replace(low=altitude, high=altitude), to[0], to, then)
                 return False
-        place = self._leaving(flown, to, airspace)
+        place = self._leaving(flown, to, then.present, self._told)
         if place is not None:
-            self._report(step, link, flown, place, to, airspace)
-        return place is None
+            self._told.add(place)
+            self._report(step, link, flown, place, to, then)
+            return False
+        missing = then.period.missing(then.airspace, then.further)
+        if missing is not None:
+            self._missing(step, link, missing, then)
+            return False
+        for zone in then.period.avoidable(then.airspace, then.further):
+            alone = then.airspace._replace(inside=(), outside=(zone,))
+            if self._leaving(flown, to, alone) is not None:
+                then.period.avoid(zone, then.further)
+        for zone in then.airspace.inside:
+            then.period.stay(zone, then.further)
+        return True
 
-    def _leaving(self, flown: Flown, to: Sequence[Point], airspace: PreparedAirspace) -> Point | None:
-        """A place of the path from where the straight way leaves the airspace; `to` is all that it may lead to, and
-        empty where the link leads up and nowhere else.
+    def _leaving(
+        self, flown: Flown, to: Sequence[Point], airspace: PreparedAirspace, told: AbstractSet[Point] = frozenset()
+    ) -> Point | None:
+        """A place of the path from where the straight way leaves the airspace, but not of a leg from one that was
+        `told`; `to` is all that it may lead to, and empty where the link leads up and nowhere else.
         """
-        key = (flown.points, flown.low, flown.high, tuple(to))
+        zones = tuple(tuple(zone.number for zone in each) for each in (airspace.inside, airspace.outside))
+        key = (flown.points, flown.low, flown.high, tuple(to), zones)
         if key in self._ground.kept:
             return None
         # nearly always all of it lies in one hull that keeps the airspace
         if not self._keeps([*flown.points, *to], flown.low, flown.high, airspace):
             for leg in path_legs(flown.points):
-                if leg[0] in self._told:
-                    continue
-                if not self._keeps([*leg, *to], flown.low, flown.high, airspace):
-                    self._told.add(leg[1])
+                if leg[0] not in told and not self._keeps([*leg, *to], flown.low, flown.high, airspace):
                     return leg[1]
         self._ground.kept.add(key)
         return None
 
     def _keeps(self, points: Sequence[Point], low: int, high: int, airspace: PreparedAirspace) -> bool:
         """Whether the hull of some places keeps the airspace."""
-        return may_keep(self._space(points, low, high), airspace) == TRUE
+        return keeps(self._space(points, low, high), airspace) == TRUE
 
     def _space(self, points: Sequence[Point], low: int, high: int) -> Places:
         sweep: Sweep = Fan(points, self._box, self._landmarks)
@@ -133,6 +174,22 @@ class Ways:
         x, y = link.link.arguments[cell : cell + 2]
         return x, y
 
+    def _missing(self, step: Step, link: PreparedLink, zone: PreparedZone, then: Then) -> None:
+        ground, policy = self._ground, self._ground.prepared.policy
+        name = policy.contracts[link.link.skill].name
+        ground.context.report.add(
+            codes.RETURN_OUTSIDE if link.motion == MotionKind.HOME else codes.LOITER_OUTSIDE,
+            step.span,
+            f"the way of the link `{name}` from this step would be in `{policy.zones[zone.number].name}`, which does "
+            f"not exist at all times {then.period.from_to(then.further)}: it may be flown then",
+            help="issue the mission at another time, or let its steps take less",
+            labels=[
+                (ground.span(then.airspace.airspace), "the airspace"),
+                (ground.span(link.link), "this link would fly there"),
+                (zone_span(ground, zone), "declared here"),
+            ],
+        )
+
     def _report(
         self,
         step: Step,
@@ -140,8 +197,9 @@ class Ways:
         flown: Flown,
         place: Point,
         to: Sequence[Point],
-        airspace: PreparedAirspace,
+        then: Then,
     ) -> None:
+        airspace = then.present
         ground, policy = self._ground, self._ground.prepared.policy
         name = policy.contracts[link.link.skill].name
         home = link.motion == MotionKind.HOME
@@ -158,6 +216,7 @@ class Ways:
             (ground.span(airspace.airspace), "the airspace"),
             (ground.span(link.link), "this link would fly there"),
         ]
+        labels += then.period.labels(airspace, self._space([place, *to], flown.low, flown.high), then.further)
         if home and not sure and policy.vehicle.home_within:
             labels.append((ground.lowered.vehicle.within.span, "home may lie so far from where it is declared"))
         ground.context.report.add(

@@ -1,0 +1,263 @@
+"""When a step may come, and what of zones and of conditions changes then.
+
+A step comes no sooner after the mission's issue than those before it take at least, and no later than they take at
+most. A zone to stay out of counts as present if it may exist at some moment between, or while the step lasts; a zone to
+stay inside of must exist at all of them. Without a time of issue there must be some one that will do: what a step asks
+of the time of day is collected here (`Period.asked`), and all of a mission is asked together (`some_time`). Dates are
+left for the time of issue.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
+from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Span, Truth
+from rtshcua.decision.zones import Place, PreparedZone
+from rtshcua.diagnostics.span import Span as Where
+from rtshcua.ground.analysis.words import clock
+from rtshcua.ground.compiler.proofs.situation import EVER, Ground
+from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US, approval
+from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.limits import DAY
+
+_EXACT = (0, 0)
+
+
+class Arc(NamedTuple):
+    """Moments of the day, in us of UTC: from `start` on, `length` of them."""
+
+    start: int
+    length: int
+
+
+class Found(NamedTuple):
+    """Whether a condition fails, and at which moment of UTC, where one is known."""
+
+    fails: bool
+    moment: int | None = None
+
+
+class Asked(NamedTuple):
+    """One of these arcs must hold all from `low` to `high` us after the issue; where that is written."""
+
+    arcs: tuple[Arc, ...]
+    low: int
+    high: int
+    labels: tuple[tuple[Where, str], ...]
+
+    def met(self, issue: int) -> bool:
+        """Whether that is so for a time of issue."""
+        return any(
+            arc.length >= DAY or (issue + self.low - arc.start) % DAY + self.high - self.low < arc.length
+            for arc in self.arcs
+        )
+
+
+@dataclass(slots=True)
+class Period:
+    """A step may begin from `low` to `high` us after the issue, which is 0 where it is not known, and lasts at most
+    `lasts_us`. `asked` is what it asks of a time of issue, once it is looked at.
+    """
+
+    ground: Ground
+    issued_at_us: int
+    low: int
+    high: int
+    lasts_us: int
+    asked: list[Asked] = field(default_factory=list)
+
+    def utc(self, further: int) -> tuple[Span, ...]:
+        """All moments from its earliest begin to `further` us after its latest, as far as they are known."""
+        if not self.issued_at_us:
+            return ((0, EVER),)
+        return ((self.issued_at_us + self.low, self.issued_at_us + self.high + further),)
+
+    def present(self, airspace: PreparedAirspace, further: int) -> PreparedAirspace:
+        """The airspace with those of the zones to stay out of that may exist in that time."""
+        return airspace._replace(outside=tuple(each for each in airspace.outside if self._present(each, further)))
+
+    def _present(self, zone: PreparedZone, further: int) -> bool:
+        if zone.times is None:
+            return True
+        truth = zone.times.truth(self.utc(further), _EXACT, 0)
+        return bool(truth & TRUE) if self.issued_at_us else truth == TRUE
+
+    def avoidable(self, airspace: PreparedAirspace, further: int) -> Iterator[PreparedZone]:
+        """The zones to stay out of that some time of issue avoids, where none is known."""
+        if not self.issued_at_us:
+            yield from (each for each in airspace.outside if not self._present(each, further))
+
+    def labels(self, airspace: PreparedAirspace, place: Place, further: int) -> list[tuple[Where, str]]:
+        """Which of the zones to stay out of that a place is not clear of exist at some times only."""
+        zones = (each for each in airspace.outside if each.times is not None and place.inside(each) != FALSE)
+        return [
+            (zone_span(self.ground, zone), f"this may exist then: the step may fly {self.from_to(further)}")
+            for zone in zones
+            if self.issued_at_us
+        ]
+
+    def avoid(self, zone: PreparedZone, further: int) -> None:
+        """Ask for a time of issue with which a zone does not exist in that time; of one with dates, its issue tells."""
+        self._ask_zone(zone, further, exists=False)
+
+    def stay(self, zone: PreparedZone, further: int) -> None:
+        """Ask for a time of issue with which a zone to stay inside of exists all that time."""
+        self._ask_zone(zone, further, exists=True)
+
+    def _ask_zone(self, zone: PreparedZone, further: int, *, exists: bool) -> None:
+        flat = self.ground.prepared.policy.zones[zone.number]
+        if not flat.daily or flat.dates or self.issued_at_us:
+            return
+        start, end = day_edges(self.ground, *flat.daily)
+        length = (end - start) % DAY or DAY
+        arc = Arc(start, length) if exists else Arc(end, DAY - length)
+        label = (zone_span(self.ground, zone), f"`{flat.name}` exists at some times of the day only")
+        self._ask(Asked((arc,), self.low, self.high + further, (label,)))
+
+    def missing(self, airspace: PreparedAirspace, further: int) -> PreparedZone | None:
+        """A zone to stay inside of that may not exist all that time; for a time of issue that is known."""
+        if self.issued_at_us:
+            for zone in airspace.inside:
+                if zone.times is not None and zone.times.truth(self.utc(further), _EXACT, 0) != TRUE:
+                    return zone
+        return None
+
+    def from_to(self, further: int) -> str:
+        """That time in words; it is known."""
+        offset = self.ground.prepared.policy.vehicle.utc_offset_us
+        ((low, high),) = self.utc(further)
+        return f"from {clock(low, offset)} to {clock(high, offset)}, local time"
+
+    def fails(
+        self,
+        clause: Clause,
+        arguments: Sequence[int],
+        through: int,
+        holds: Callable[[Span], bool],
+    ) -> Found:
+        """Whether a condition fails at some moment at which the step may begin, or whatever the time of issue: what
+        `holds` says of a moment. `through` is how far after it the zones count. What it asks of a time of issue that
+        is not known is collected.
+        """
+        daily, dates = changes(self.ground, clause, arguments)
+        if self.issued_at_us:
+            ((low, high),) = self.utc(0)
+            for moment in sorted({low, high, *_moments(daily, dates, low, high, through)}):
+                if not holds((moment, moment)):
+                    return Found(True, moment)
+            return Found(False)
+        if not daily and not dates:
+            return Found(not holds((0, EVER)))
+        if dates:  # on some date it must hold, at some time of the day
+            days = {day for date in dates for day in (date - DAY, date, date + DAY)}
+            moments = {moment for day in days for moment in _moments(daily, dates, day, day + DAY, through)}
+            return Found(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
+        arcs = arcs_where({each - back for each in daily for back in (0, through)}, lambda at: holds((at, at)))
+        if arcs and arcs[0].length < DAY:
+            label = (self.ground.span(clause), "the contract asks for this")
+            self._ask(Asked(arcs, self.low, self.high, (label,)))
+        return Found(not arcs)
+
+    def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
+        """Whether what a condition says depends on the time."""
+        return any(changes(self.ground, clause, arguments))
+
+    def _ask(self, asked: Asked) -> None:
+        if asked not in self.asked:
+            self.asked.append(asked)
+
+
+def zone_span(ground: Ground, zone: PreparedZone) -> Where:
+    """Where a zone of the airspace is declared."""
+    return ground.context.symbols.zones[ground.prepared.policy.zones[zone.number].name].name.span
+
+
+def periods(ground: Ground, invocations: Sequence[PreparedInvocation]) -> list[Period]:
+    """When each step of a mission may begin."""
+    earliest, latest = 0, START_WINDOW_US
+    found: list[Period] = []
+    for invocation in invocations:
+        flat = invocation.invocation
+        latest += approval(ground, invocation) + flat.contract.deadline_us
+        found.append(Period(ground, flat.issued_at_us, earliest, latest, invocation.lasts_us))
+        latest += flat.contract.duration_us
+        time = flat.contract.motion.time
+        earliest += flat.arguments[time] if time >= 0 else 0
+    return found
+
+
+def keeps(place: Place, airspace: PreparedAirspace) -> Truth:
+    """Whether a place is in the airspace, as if all its zones existed."""
+    truth = TRUE
+    for zone in airspace.inside:
+        truth = AND[truth][place.inside(zone)]
+    for zone in airspace.outside:
+        truth = AND[truth][NOT[place.inside(zone)]]
+    return truth
+
+
+def at_moment(at: Environment, utc: Span) -> Environment:
+    """The same at some moment."""
+    return Environment(at.slots, at.arguments, (utc,), (0, 0), at.place, at.monitors, at.phase, at.through)
+
+
+def arcs_where(edges: Iterable[int], holds: Callable[[int], bool]) -> tuple[Arc, ...]:
+    """When in a day something holds that changes at some moments of it only."""
+    ordered = sorted({edge % DAY for edge in edges})
+    if not ordered:
+        return (Arc(0, DAY),) if holds(0) else ()
+    arcs: list[Arc] = []
+    for start, end in pairwise((*ordered, ordered[0] + DAY)):
+        if not holds(start):
+            continue
+        if arcs and arcs[-1].start + arcs[-1].length == start:
+            arcs[-1] = Arc(arcs[-1].start, arcs[-1].length + end - start)
+        else:
+            arcs.append(Arc(start, end - start))
+    if len(arcs) > 1 and arcs[-1].start + arcs[-1].length == arcs[0].start + DAY:
+        arcs[0] = Arc(arcs[-1].start, arcs[-1].length + arcs[0].length)
+        del arcs[-1]
+    return tuple(arcs)
+
+
+def day_edges(ground: Ground, start: int, end: int) -> tuple[int, int]:
+    """Where a window of the local day begins, and where it has just ended, in us of UTC."""
+    offset = ground.prepared.policy.vehicle.utc_offset_us
+    return (start - offset) % DAY, (min(end, DAY - 1) + 1 - offset) % DAY
+
+
+def zones_read(ground: Ground, clause: Clause, arguments: Sequence[int]) -> Iterator[int]:
+    """The zones that a condition asks about, given the arguments."""
+    tables = ground.prepared.tables.tables
+    for op, a, b in zip(clause.code[::3], clause.code[1::3], clause.code[2::3], strict=True):
+        match op:
+            case Op.POSITION_IN:
+                yield a
+            case Op.ARGUMENT_POINT_IN:
+                yield b
+            case Op.POSITION_IN_ARGUMENT:
+                yield tables[b][arguments[a]]
+
+
+def changes(ground: Ground, clause: Clause, arguments: Sequence[int]) -> tuple[list[int], list[int]]:
+    """The moments of the day, in us of UTC, and the dates at which something changes that a condition reads."""
+    zones = ground.prepared.policy.zones
+    read = [zones[number] for number in zones_read(ground, clause, arguments)]
+    code = clause.code
+    windows = [
+        *((a, b) for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True) if op == Op.TIME_IN),
+        *((zone.daily[0], zone.daily[1]) for zone in read if zone.daily),
+    ]
+    daily = [edge for window in windows for edge in day_edges(ground, *window)]
+    return daily, [date for zone in read if zone.dates for date in (zone.dates[0], zone.dates[1] + 1)]
+
+
+def _moments(daily: Sequence[int], dates: Sequence[int], low: int, high: int, through: int) -> Iterator[int]:
+    """The moments of a time at which something changes, for zones count until `through` us after it."""
+    for back in {0, through}:
+        for edge in daily:
+            yield from range(low + (edge - back - low) % DAY, high + 1, DAY)
+        yield from (date - back for date in dates if low <= date - back <= high)

@@ -1,0 +1,58 @@
+"""The compiler's proofs against an oracle by dense sampling: no false "no errors", no false refusal (ADR 55)."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from reference import flown_densely
+from reference.flown_densely import Drawn, draw, judged
+from reference.sources import LIBRARY
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.ground.compiler.program import check_program, compile_program
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+
+
+def errors(program: Drawn) -> list[str]:
+    """The errors that compiling it for its time of issue finds, or checking it without one."""
+
+    def read(path: str) -> bytes:
+        return program.text.encode() if path == "probe.rts" else Path(path).read_bytes()
+
+    loaded = load(["probe.rts"], read, LIBRARY)
+    if program.issued:
+        issued = program.issued * 1_000_000
+        found = compile_program(loaded, dialect.load(), mission=None, issued_at_us=issued).diagnostics
+    else:
+        found = check_program(loaded, dialect.load())
+    return [f"{each.code.id} {each.message}" for each in found if each.code.severity is Severity.ERROR]
+
+
+def differs(seed: int) -> str | None:
+    """What is wrong about the program of a seed."""
+    program = draw(seed)
+    good, found = judged(program), errors(program)
+    if good is None or good != bool(found):
+        return None
+    return f"seed {seed}: " + (f"false refusal, {found}" if good else "false `no errors`")
+
+
+def test_some_programs_are_judged_as_dense_sampling_judges_them() -> None:
+    judgements = [judged(draw(seed)) for seed in range(25)]
+    assert judgements.count(True) > 5
+    assert judgements.count(False) > 5
+    assert [wrong for seed in range(25) if (wrong := differs(seed)) is not None] == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("hundred", range(50))
+def test_5000_programs_are_judged_as_dense_sampling_judges_them(hundred: int) -> None:
+    assert [wrong for seed in range(100 * hundred, 100 * hundred + 100) if (wrong := differs(seed)) is not None] == []
+
+
+def test_the_oracle_shares_nothing_with_the_proofs() -> None:
+    tree = ast.parse(Path(flown_densely.__file__).read_text())
+    imported = [each for each in ast.walk(tree) if isinstance(each, ast.Import | ast.ImportFrom)]
+    names = {each.module if isinstance(each, ast.ImportFrom) else each.names[0].name for each in imported}
+    assert names == {"collections.abc", "math", "random", "typing", "numpy"}

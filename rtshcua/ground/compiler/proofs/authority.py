@@ -11,7 +11,7 @@ from rtshcua.decision.case import PASS, Case
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.nearest import Changes, Offer, offer
 from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
-from rtshcua.decision.values import TRUE
+from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
@@ -40,18 +40,20 @@ def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: Prepared
     found = authority(case)
     if PASS in found or not found:
         return True
-    verdict = found[0]
-    match verdict.reason:
+    # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
+    forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(case.at) & FALSE)
+    forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
+    if forbid is not None:
+        ground.context.report.add(
+            codes.FORBIDDEN,
+            step.span,
+            f"the policy `{ground.prepared.policy.name}` forbids this step",
+            labels=[(ground.span(forbid), "by this rule")],
+        )
+        return False
+    match found[-1].reason:
         case Reason.CLASS_NOT_PERMITTED:
             _class(ground, mission, step, invocation)
-        case Reason.FORBIDDEN:
-            assert isinstance(verdict.clause, Rule)
-            ground.context.report.add(
-                codes.FORBIDDEN,
-                step.span,
-                f"the policy `{ground.prepared.policy.name}` forbids this step",
-                labels=[(ground.span(verdict.clause), "by this rule")],
-            )
         case Reason.NOT_PERMITTED:
             _not_permitted(ground, mission, step, invocation)
         case _:

@@ -19,7 +19,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.rates import arrives, best, interval, report_intervals
 from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US, approval
+from rtshcua.ground.compiler.proofs.timing import approval
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
@@ -91,10 +91,13 @@ def _hasty(ground: Ground) -> None:
 
 
 def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
-    """Report the first step that needs to have observed something for longer than the whole flight up to it."""
+    """Report the first step that needs to have observed something for longer than the whole flight up to it.
+
+    Observation begins with the run, with which the first step begins to wait: the time since the issue does not count.
+    """
     if not ground.prepared.policy.monitors:
         return
-    latest = START_WINDOW_US
+    latest = 0
     for step, invocation in zip(steps, invocations, strict=True):
         contract = invocation.invocation.contract
         latest += approval(ground, invocation) + contract.deadline_us
@@ -106,14 +109,34 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
                     codes.NO_RESOLVER,
                     step.span,
                     f"`{clause.text}` is unknown until {_time(window)} were observed, and this step waits no longer "
-                    f"than {_time(latest)} after the mission was issued",
+                    f"than {_time(latest)} after the run began, with which observation begins",
                     help="take a shorter window, or ask for it in a later step",
                     labels=[(ground.span(clause), "the contract asks for this")],
                 )
                 return
-        if _unpermitted(ground, step, invocation, latest):
+        if _unpermitted(ground, step, invocation, latest) or _forbidden(ground, step, invocation, latest):
             return
         latest += contract.duration_us
+
+
+def _forbidden(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
+    """Whether a rule that defers while it is unknown must observe longer than the flight up to a step; reports it."""
+    at, compiler = ground.case(invocation).at, ground.prepared.compiler
+    candidates = invocation.candidates
+    for rule in (*(each.rule for each in candidates.forbids), *(each.rule for each in candidates.degrades)):
+        node = compiler.when(rule)
+        window = 0 if node is None else _needed(ground, at, node, False)
+        if latest < window < NEVER:
+            ground.context.report.add(
+                codes.NO_RESOLVER,
+                step.span,
+                f"a rule defers this step until {_time(window)} were observed, and it waits no longer than "
+                f"{_time(latest)} after the run began, with which observation begins",
+                help="take a shorter window, let the step wait for longer, or ask for it in a later step",
+                labels=[(ground.span(rule), "this is unknown until then")],
+            )
+            return True
+    return False
 
 
 def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
@@ -129,7 +152,7 @@ def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, lat
         codes.NO_RESOLVER,
         step.span,
         f"nothing permits this step before {_time(least)} were observed, and it begins no later than {_time(latest)} "
-        "after the mission was issued",
+        "after the run began, with which observation begins",
         help="take a shorter window, or ask for it in a later step",
         labels=[(ground.span(rule), f"this permits it after {_time(window)}") for rule, window in needed],
     )

@@ -35,3 +35,23 @@ def test_what_forbids_in_every_state_is_told_before_what_does_in_some(forbid: st
     found = only("permit takeoff by role operator through agent", forbid, "forbid takeoff by any when altitude > 19 m")
     assert found.code.id == "E0704"
     assert [each.text for each in found.labels] == ["by this rule"]
+
+
+@rows(
+    ("rule", "window", "expected"),
+    [
+        ("forbid takeoff by any when wind.speed > 9 m/s within the last", 30, ["E0717"]),
+        ("forbid takeoff by any when wind.speed > 9 m/s within the last", 8, []),
+        ("forbid return_home by any when wind.speed > 9 m/s within the last", 30, []),  # by then it was observed
+        ("forbid takeoff by any when wind.speed > 9 m/s for the last", 30, []),  # a calm moment makes it false
+        ("degrade takeoff when wind.speed > 9 m/s within the last", 30, ["E0717"]),
+    ],
+)
+def test_observation_begins_with_the_run(rule: str, window: int, expected: list[str]) -> None:
+    permit = "permit takeoff by role operator through agent"
+    rules = [permit, "permit return_home, emergency_land, hover by any", f"{rule} {window} s"]
+    if rule.startswith("degrade"):
+        rules[-1] += " to return_home"
+    text = "policy rules version 1 {\n" + "\n".join((*rules, "contingency return_home, emergency_land")) + "\n}\n"
+    found = findings(program(text, mission("takeoff(altitude = 20 m)", "return_home()")))
+    assert [each.code.id for each in found if each.code.id == "E0717"] == expected

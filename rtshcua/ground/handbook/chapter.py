@@ -11,6 +11,7 @@ from rtshcua.ground.handbook.model import (
     FileDigest,
     MissionTold,
     ParameterTold,
+    PatternTold,
     RuleTold,
     ScenarioTold,
     SignalTold,
@@ -29,6 +30,7 @@ from rtshcua.ground.handbook.words.skills import (
     told_left_out,
     told_motion,
     told_parameter,
+    told_patterns,
     told_record,
     told_timing,
 )
@@ -122,6 +124,7 @@ def _skill(subject: Subject, skill: SkillDecl, changed: bool) -> SkillTold:
         name=skill.name.text,
         note=subject.note(skill),
         motion=told_motion(skill.motion),
+        patterns=tuple(PatternTold(*each) for each in told_patterns(skill)),
         parameters=tuple(
             ParameterTold(each.name.text, *told_parameter(each, subject.names)) for each in skill.parameters
         ),

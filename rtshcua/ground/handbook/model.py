@@ -83,15 +83,25 @@ class ParameterTold:
 
 
 @dataclass(frozen=True, slots=True)
+class PatternTold:
+    """What a survey may fly: the pattern's name, and its spacing or radius, start and direction."""
+
+    name: str
+    told: str
+
+
+@dataclass(frozen=True, slots=True)
 class SkillTold:
     """A contract; `as_link` is what is otherwise where a chain ends in it, empty for any other skill.
 
-    `left_out` are the clauses that do not count, for the vehicle is without a sensor.
+    `patterns` are those that a survey may be flown in, none of any other skill. `left_out` are the clauses that do not
+    count, for the vehicle is without a sensor.
     """
 
     name: str
     note: str
     motion: str
+    patterns: tuple[PatternTold, ...]
     parameters: tuple[ParameterTold, ...]
     timing: tuple[str, ...]
     require: tuple[str, ...]

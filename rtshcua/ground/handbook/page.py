@@ -16,6 +16,7 @@ from markupsafe import Markup, escape
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.editor.meanings import REASONS
 from rtshcua.ground.handbook.drawing.canvas import number
+from rtshcua.ground.handbook.drawing.patterns import drawn
 from rtshcua.ground.handbook.drawing.plan import mission_plan, plans
 from rtshcua.ground.handbook.drawing.profile import profiles
 from rtshcua.ground.handbook.glossary import GLOSSARY
@@ -26,6 +27,7 @@ _TEMPLATES = (
     "chapter.html",
     "rights.html",
     "skills.html",
+    "patterns.html",
     "sign.html",
     "map.svg",
     "profile.svg",
@@ -55,6 +57,7 @@ def page(handbook: Handbook) -> str:
         plans=plans,
         mission_plan=mission_plan,
         profiles=profiles,
+        pattern=drawn,
         anchors=_anchors,
         chunks=_chunks,
     )

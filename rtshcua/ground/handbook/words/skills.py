@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
+from rtshcua.ground.compiler.plan import DEFAULT_PATTERN
 from rtshcua.ground.handbook.words.conditions import told_condition
 from rtshcua.ground.handbook.words.values import between, told_value
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, listed, name, named, sentence
@@ -39,6 +40,16 @@ _PARTS: Final = {
     "assume": "before it begins, and all the while it runs",
     "maintain": "for the whole planned path, and all the while it runs",
 }
+#: what a survey flies (ground/compiler/survey.py)
+PATTERNS: Final = {
+    "grid": "back and forth on parallel lines along the longest edge, evenly spaced and no further apart than it flies "
+    "high, or 5 m where it flies lower, in at most 256 lines; the first and the last are half a spacing inside. It "
+    "begins at the end that is nearer to the entry of the area, where it has one, and goes around holes",
+    "perimeter": "once around along the outer edge, counter-clockwise, from its westernmost corner; of a round area on "
+    "16 straight legs, from the east. Holes are not gone around",
+    "orbit": "once around the middle of the area, counter-clockwise, on 16 straight legs from the east, on the largest "
+    "circle that lies in it and keeps clear of its edge; an area with a hole in the way has none",
+}
 #: docs/log-format.md, section 4
 _DURABLE: Final = {
     "buffered": "its record is handed to the writer before it begins",
@@ -73,6 +84,17 @@ def told_motion(motion: Motion | None) -> str:
     if motion.time is not None:
         words += f" for {_given(motion.time)}"
     return f"The vehicle {words}."
+
+
+def told_patterns(skill: SkillDecl) -> Iterator[tuple[str, str]]:
+    """The patterns that a survey may be flown in, each with what it flies; none where the skill flies no survey."""
+    motion = skill.motion
+    if motion is None or motion.kind != "cover":
+        return
+    wanted = None if motion.pattern is None else motion.pattern.text
+    choices = [choice.text for each in skill.parameters if each.name.text == wanted for choice in each.choices]
+    for pattern in choices or [DEFAULT_PATTERN]:
+        yield pattern, PATTERNS[pattern]
 
 
 def _given(parameter: object) -> str:

@@ -23,18 +23,23 @@ def check(
     with_: Annotated[
         list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
     ] = None,
+    map_: Annotated[
+        Path | None, typer.Option("--map", metavar="FILE.html", help="draw the missions: zones, way, where it fails")
+    ] = None,
     deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors; notes are not")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
-    """Report everything that is wrong with sources and what they import. Needs no keys, and writes nothing.
+    """Report everything that is wrong with sources and what they import. Needs no keys, and writes nothing but --map.
 
     Each source is a program of its own with what it imports; one that another of them imports is checked with that. A
     mission specification takes all other sources as its policy's. What is worth a second look besides, and how to
     ignore, fix and report it in CI: `rtshcua lint`.
 
+    With --map the missions are drawn as one HTML page, whether or not they are refused, as far as their way is planned.
+
     Ends with 0 where there are no errors, 1 where there are, 2 where the command line is wrong, 3 where a file cannot
     be read, 4 where --since names a bundle of a version that is not known here.
     """
     return check_sources(
-        paths or [Path()], since=since, with_=with_ or (), deny_warnings=deny_warnings, as_json=as_json
+        paths or [Path()], since=since, with_=with_ or (), map_=map_, deny_warnings=deny_warnings, as_json=as_json
     )

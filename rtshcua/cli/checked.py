@@ -9,8 +9,10 @@ from rtshcua.cli.checking import Mission, check_all
 from rtshcua.cli.earlier import Earlier, earlier_policies
 from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
-from rtshcua.cli.programs import programs
+from rtshcua.cli.overwriting import refusal
+from rtshcua.cli.programs import Asked, programs
 from rtshcua.cli.progress import watched
+from rtshcua.cli.sources import examine
 from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.codes import UNKNOWN_NAME
 from rtshcua.diagnostics.exits import ExitCode
@@ -22,6 +24,7 @@ def check_sources(
     *,
     since: Path | None = None,
     with_: Sequence[Path] = (),
+    map_: Path | None = None,
     deny_warnings: bool = False,
     as_json: bool = False,
 ) -> ExitCode:
@@ -30,10 +33,14 @@ def check_sources(
     files = unfolded(paths)
     if isinstance(files, Refusal):
         return findings.end(files)
+    unfit = None if map_ is None else _unfit(map_, files)
+    if unfit is not None:
+        return findings.end(unfit)
     earlier = Earlier("", ()) if since is None else earlier_policies(since)
     if isinstance(earlier, Refusal):
         return findings.end(earlier)
-    found = check_all(watched(programs(files, tuple(with_))), earlier)
+    asked = programs(files, tuple(with_))
+    found = check_all(watched(asked), earlier)
     code = exit_code(found.diagnostics) if findings.report(found.diagnostics, found.sources) else ExitCode.OK
     alone = len(files) == 1 and not with_ and files[0].suffix.lower() == SPECIFICATION
     if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
@@ -48,12 +55,40 @@ def check_sources(
             out(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
         if since is not None and not found.versions:
             out(f"nothing in {since} is an earlier version of a policy here")
+    if map_ is not None:
+        imported = refusal(map_, found.sources, "a page")
+        if imported is not None:
+            return findings.end(imported)
+        drawn = _draw(asked, map_)
+        if not as_json:
+            out(drawn)
     return findings.finish(
         code,
         missions=[{"mission": each.name, "file": each.file} | each.bounds._asdict() for each in found.missions],
         versions=[{"policy": each.name, "version": each.version, "earlier": each.earlier} for each in found.versions],
         left_out=[each._asdict() for each in found.left_out],
     )
+
+
+def _unfit(target: Path, files: Sequence[Path]) -> Refusal | None:
+    """Why no page can be written to a file."""
+    if not target.parent.is_dir():
+        return Refusal("output", f"there is no folder `{target.parent}` to write to")
+    if target.exists() and not target.is_file():
+        return Refusal("output", f"`{target}` is no regular file, and is not replaced by a page")
+    return refusal(target, files, "a page")
+
+
+def _draw(asked: Sequence[Asked], target: Path) -> str:
+    """Write the page of the programs that were asked for; what to say of it."""
+    from rtshcua.adapters.store.writing import replace
+    from rtshcua.ground.handbook.checked import Checking, checked_page
+
+    checked = [(each.reading.program, examine(each.reading)) for each in asked]
+    checkings = [Checking(program, one.planned, one.diagnostics) for program, one in checked]
+    replace(target, checked_page(checkings).encode("utf-8"))
+    missions = sum(len(one.planned) for _, one in checked)
+    return f"{missions} mission{'' if missions == 1 else 's'} drawn in {target}"
 
 
 def _named(mission: Mission, missions: tuple[Mission, ...]) -> str:

@@ -39,6 +39,7 @@ LINT: Mapping[str, tuple[str, Kind]] = {
 CHECK: Mapping[str, tuple[str, Kind]] = {
     "--since": ("since", "path"),
     "--with": ("with_", "paths"),
+    "--map": ("map_", "path"),
     "--deny-warnings": ("deny_warnings", "flag"),
     "--json": ("as_json", "flag"),
 }

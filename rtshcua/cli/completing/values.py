@@ -16,6 +16,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "paths": _SOURCES,
     "with_": _SOURCES,
     "check paths": ("*.rts", "*.json"),
+    "check map_": ("*.html",),
     "check since": ("*.bundle", "*.rts"),
     "compile source": ("*.rts", "*.json"),
     "compile replaces": _BUNDLE,

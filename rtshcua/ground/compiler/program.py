@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics import codes
@@ -54,16 +55,26 @@ class Compiled:
     sources: Mapping[str, Source] = field(default_factory=dict)
 
 
+class Planned(NamedTuple):
+    """A mission whose way is planned, whatever else is wrong with it, and the policy that it is under."""
+
+    under: LoweredPolicy
+    mission: Mission
+    declaration: MissionDecl
+
+
 @dataclass(frozen=True, slots=True)
 class Checked:
     """All findings on a program, and by name what each mission takes at most, with any values of its parameters;
-    without errors also its policies, for each vehicle that it has missions for.
+    without errors also its policies, for each vehicle that it has missions for. `planned` are the missions as they were
+    first lowered, with the defaults of their parameters, with errors too.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     bounds: Mapping[str, Bounds]
     policies: tuple[LoweredPolicy, ...] = ()
     grounds: tuple[Ground, ...] = ()  # the same, prepared as on board, with what was asked about them
+    planned: tuple[Planned, ...] = ()
 
 
 def compile_program(
@@ -115,9 +126,10 @@ def examine_program(program: Program, dialect: Dialect) -> Checked:
     run.cases()
     run.scenarios()
     if run.report.failed():
-        return Checked(run.diagnostics(), {})
+        return Checked(run.diagnostics(), {}, planned=tuple(run.planned.values()))
     grounds = tuple(run.grounds())
-    return Checked(run.diagnostics(), run.bounds, tuple(each.lowered for each in grounds), grounds)
+    lowered = tuple(each.lowered for each in grounds)
+    return Checked(run.diagnostics(), run.bounds, lowered, grounds, tuple(run.planned.values()))
 
 
 def _candidates(program: Program) -> list[MissionDecl]:
@@ -144,6 +156,7 @@ class Compilation:
         self.report = Report({**program.sources, **options}, program.data)
         self.report.found += program.diagnostics
         self.bounds: dict[str, Bounds] = {}
+        self.planned: dict[str, Planned] = {}
         self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], Ground | None] = {}
@@ -222,6 +235,7 @@ class Compilation:
             return None
         under = replace(under, lowered=replace(under.lowered, files=lowered.files))
         flat = lowered.mission
+        self.planned.setdefault(mission.name.text, Planned(under.lowered, flat, mission))
         prove_mission(under, mission, flat)
         bounds = bounds_of(under, mission, flat)
         self.bounds[mission.name.text] = most(bounds, self.bounds.get(mission.name.text))

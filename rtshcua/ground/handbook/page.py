@@ -31,6 +31,7 @@ _TEMPLATES = (
     "sign.html",
     "map.svg",
     "profile.svg",
+    "checked.html",
     "handbook.css",
 )
 #: what a reader does not see, or what turns around the text beside it: a comment or an intent may hold any of it
@@ -45,7 +46,7 @@ _UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|mV|V|%|s|ms|us|min|h|deg|
 
 def page(handbook: Handbook) -> str:
     """The page; the same bytes for the same handbook."""
-    environment, style = _environment()
+    environment, style = templates()
     style += _footer(handbook)
     text = environment.get_template("handbook.html").render(
         book=handbook,
@@ -61,6 +62,11 @@ def page(handbook: Handbook) -> str:
         anchors=_anchors,
         chunks=_chunks,
     )
+    return visibly(text)
+
+
+def visibly(text: str) -> str:
+    """A page with what a reader would not see shown as what it is."""
     return _HIDDEN.sub(lambda found: escape(visible(found[0])), text)
 
 
@@ -78,7 +84,7 @@ def _footer(handbook: Handbook) -> str:
 
 
 @cache
-def _environment() -> tuple[Environment, str]:
+def templates() -> tuple[Environment, str]:
     """The templates, which take a while to compile, and the style of the page."""
     folder = files("rtshcua.ground.handbook") / "templates"
     texts = {name: (folder / name).read_text(encoding="utf-8") for name in _TEMPLATES}

@@ -54,6 +54,11 @@ class Plan:
     bar: tuple[float, str]
     unlabelled: tuple[str, ...]
     around: tuple[str, ...]  # zones that the whole map lies in
+    on: Canvas  # how the plane lies on the page
+
+    def at(self, x: int, y: int) -> tuple[float, float]:
+        """Where a place lies on the page."""
+        return self.on.at(x, y)
 
 
 def plans(chapter: Chapter) -> tuple[Plan, ...]:
@@ -121,6 +126,7 @@ def _plan(
         bar=bar,
         unlabelled=unlabelled,
         around=tuple(zone.name for zone in zones if fills(on, zone.ground)),
+        on=on,
     )
 
 

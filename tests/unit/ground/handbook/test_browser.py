@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.cli.app import main
 from rtshcua.ground.handbook.model import Handbook
 from rtshcua.ground.handbook.page import page
 
@@ -63,6 +64,28 @@ def test_the_page_fits_and_no_label_lies_over_another(tmp_path: Path, everything
     assert measured["wide"] == []
     assert measured["thin"] == []
     assert measured["over"] == []
+
+
+@pytest.mark.parametrize("width", [500, 1200])
+def test_the_map_of_a_refused_mission_fits(tmp_path: Path, width: int) -> None:
+    mission = """import "lib:policies/bridge_inspection.rts"
+    mission past under bridge_inspection@7 on quad {
+      proposed by agent openclaw for role operator
+      phase departure { takeoff(altitude = 20 m) }
+      phase inspection { goto(47.39700 N, 8.54640 E, altitude = 20 m)  goto(47.39760 N, 8.54900 E, altitude = 20 m) }
+      phase recovery { return_home() }
+    }"""
+    (tmp_path / "past.rts").write_text(mission)
+    main(["check", str(tmp_path / "past.rts"), "--map", str(tmp_path / "map.html")])
+    made = (tmp_path / "map.html").read_text(encoding="utf-8")
+    text = re.sub(r"<meta http-equiv.*?>", "", made).replace("</body>", f"<script>{PROBE}</script></body>")
+    dom, _ = dumped(tmp_path, text, width)
+    found = re.search(r'data-found="(.*?)"', dom)
+    assert found is not None
+    measured = json.loads(found[1].replace("&quot;", '"'))
+    assert measured["scroll"] <= measured["inner"]
+    assert (measured["wide"], measured["thin"], measured["over"]) == ([], [], [])
+    assert "CONSOLE" not in dumped(tmp_path, made, width)[1]
 
 
 def test_the_browser_has_nothing_to_complain_of(tmp_path: Path, everything: Handbook) -> None:

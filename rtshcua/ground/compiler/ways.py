@@ -66,7 +66,9 @@ def _along(rings: Rings, start: Met, end: Met) -> list[Point]:
 
 
 def _straight(rings: Rings, start: Met, end: Met) -> bool:
-    """Whether the way between two points on the edge is inside: it meets no other edge, and its middle is inside."""
+    """Whether the way between two points on the edge is inside: it meets no other edge, and its middle is inside. Where
+    it begins or ends at a corner, both edges of that are its own.
+    """
     p, q = start[0], end[0]
     if start[1:] == end[1:]:
         return True
@@ -74,7 +76,9 @@ def _straight(rings: Rings, start: Met, end: Met) -> bool:
     if not contained(rings, middle):
         return False
     return not any(
-        meet(p, q, *edge) for ring, number, edge in numbered(rings) if (ring, number) not in (start[1:], end[1:])
+        meet(p, q, *edge)
+        for ring, number, edge in numbered(rings)
+        if (ring, number) not in (start[1:], end[1:]) and p not in edge and q not in edge
     )
 
 

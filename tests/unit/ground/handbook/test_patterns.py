@@ -43,6 +43,16 @@ def test_a_grid_is_no_wider_than_it_flies_high(height: int, apart: int) -> None:
     assert abs(lines[0] - 3 * M - max(spaces) / 2) < 10
 
 
+def test_a_line_of_a_grid_that_meets_a_corner_is_flown_like_any_other() -> None:
+    pointed = Outline(((0, 0), (120 * M, 0), (150 * M, 45 * M), (120 * M, 90 * M), (0, 90 * M)))
+    way = survey(pointed, "grid", 20 * M, 3 * M, (0, 0))
+    assert way is not None
+    lines = [(a, b) for (a, y), (b, then) in pairwise(way) if y == then]
+    assert len(way) == 10
+    assert len(lines) == 5
+    assert min(abs(b - a) for a, b in lines) > 110 * M
+
+
 def test_a_perimeter_goes_around_counter_clockwise_from_the_west() -> None:
     way = survey(HOUSE, "perimeter", 20 * M, 3 * M, (150 * M, 45 * M))
     assert way is not None

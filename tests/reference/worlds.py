@@ -249,7 +249,7 @@ def invocation(of: Random, policy: Policy) -> Invocation:
     if skill == flat.INSPECT:
         path = survey(of, policy.zones[values[0]]) if values[0] < policy.declared else flat.PATH
     altitude = 0 if motion.altitude == -1 else values[motion.altitude]
-    speed = of.choice([0] * 10 + [4 * M, 13 * M]) if motion.speed == -1 else values[motion.speed]
+    speed = 0 if motion.speed == -1 else values[motion.speed]
     return flat.invocation(
         of.randrange(4),
         0,

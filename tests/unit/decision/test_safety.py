@@ -78,13 +78,17 @@ def test_nothing_of_a_state_of_the_wrong_size_is_believed(values: tuple[int, ...
 # ------------------------------------------------------------------------------------------------ 7 envelope etc.
 
 
-def goto(x: int, y: int, altitude: int = 20 * M, speed: int = 0) -> Invocation:
-    return flat.invocation(1, 1, GOTO, Plan(MotionKind.FLY, (x, y), altitude, speed), x, y, altitude)
+def goto(x: int, y: int, altitude: int = 20 * M) -> Invocation:
+    return flat.invocation(1, 1, GOTO, Plan(MotionKind.FLY, (x, y), altitude, 0), x, y, altitude)
 
 
 def test_a_plan_faster_than_the_vehicle() -> None:
-    assert ask(goto(110 * M, 0, speed=12 * M)).outcome is ALLOW
-    decision = ask(goto(110 * M, 0, speed=12 * M + 1))
+    fast, slow = (
+        loaded(replace(flat.POLICY, vehicle=replace(flat.POLICY.vehicle, speed=speed))) for speed in (4 * M, 4 * M - 1)
+    )
+    inspects = flat.INVOCATIONS[2]  # at 4 m/s
+    assert ask(inspects, policy=fast).outcome is ALLOW
+    decision = ask(inspects, policy=slow)
     assert (decision.outcome, decision.reason, decision.clause) == (FALLBACK, Reason.ENVELOPE, None)
     assert decision.step == 7
 
@@ -374,6 +378,7 @@ def test_an_airspace_of_several_zones() -> None:
 
 
 def test_motion_without_an_altitude_of_its_own_stays_at_the_present_height() -> None:
-    policy = loaded(replace(flat.POLICY, zones=(replace(flat.ZONES[0], ceiling=30 * M), *flat.ZONES[1:])))
-    home = replace(flat.INVOCATIONS[3], plan=Plan(MotionKind.HOME, (), 100 * M, 0))
-    assert ask(home, policy=policy).outcome is ALLOW
+    hover = flat.invocation(3, 1, flat.HOVER, Plan(MotionKind.HOLD, (), 0, 0))
+    for floor, reason in ((10 * M, Reason.ADMITTED), (30 * M, Reason.AIRSPACE)):
+        policy = loaded(replace(flat.POLICY, zones=(replace(flat.ZONES[0], floor=floor), *flat.ZONES[1:])))
+        assert ask(hover, policy=policy).reason is reason

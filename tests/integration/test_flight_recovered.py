@@ -71,7 +71,7 @@ def test_a_run_whose_root_expired_while_it_was_in_the_air_comes_down_too(ground:
     ground.vehicle(port, SPEED)
     bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
     first = ground.run(bundle, *words, speed=SPEED)
-    first.until("dispatched", step=0)
+    first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)
     assert first.process.wait() == -signal.SIGKILL
     store, root = ground.store, opened(ground.store.root())

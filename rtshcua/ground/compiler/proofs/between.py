@@ -1,31 +1,38 @@
-"""E0703, E0704: a mission's parameters may have values between those that it is checked with, and no step is refused
-for any of them.
+"""E0703, E0704, E0718: a mission's parameters may have values between those that it is checked with, and no step is
+refused for any of them.
 
-Arguments are sums of parameters, so between two instances of a mission that differ in numbers alone, each step's
-arguments lie on the straight line from the one's to the other's.
+With a value that is refused whatever the time, the step is out of scope, or forbidden. Of one that is refused at times
+only, the same is asked as of every instance: whether the time of issue suits it, or some time would.
 """
 
-from collections.abc import Sequence
-from itertools import pairwise
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, TypeAlias
 
-from rtshcua.decision import tree
 from rtshcua.decision.prepare import PreparedInvocation
-from rtshcua.decision.values import TRUE, interval
 from rtshcua.diagnostics import codes
-from rtshcua.ground.analysis.solve import Goal
 from rtshcua.ground.analysis.words import words
-from rtshcua.ground.compiler.proofs.hopeful import refused
+from rtshcua.ground.compiler.proofs.hopeful import Known, refused
+from rtshcua.ground.compiler.proofs.line import Line, lines
+from rtshcua.ground.compiler.proofs.period import Period
 from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.model.flat.contract import QUANTITY
 from rtshcua.model.ir.missions import MissionDecl, Step
 
 #: to how many earlier instances of a mission one is compared
 _COMPARED: Final = 8
 
+#: the proof about the time: whether the steps may come at a time at which they are refused, which it then reports
+Timely: TypeAlias = Callable[
+    [Ground, Sequence[Step], Sequence[PreparedInvocation], Sequence[Period], Sequence[Line | None]], bool
+]
+
 
 def prove(
-    ground: Ground, mission: MissionDecl, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]
+    ground: Ground,
+    mission: MissionDecl,
+    steps: Sequence[Step],
+    invocations: Sequence[PreparedInvocation],
+    comes: Sequence[Period],
+    timely: Timely,
 ) -> None:
     """Report the first value between this instance and an earlier one with which a step is refused."""
     now = tuple((one.invocation.skill, one.invocation.arguments) for one in invocations)
@@ -33,33 +40,23 @@ def prove(
     for before in earlier[:_COMPARED]:
         if len(before) != len(now):
             continue
-        for step, invocation, (skill, low), (other, high) in zip(steps, invocations, before, now, strict=True):
-            if skill == other and low != high and _refused(ground, step, invocation, low, high):
+        between = list(lines(before, invocations))
+        for step, invocation, line in zip(steps, invocations, between, strict=True):
+            if line is not None and line.moving and _refused(ground, step, invocation, line):
                 return
+        moving = any(line is not None and line.moving for line in between)
+        if moving and timely(ground, steps, invocations, comes, between):
+            return
     earlier.append(now)
 
 
-def _refused(
-    ground: Ground, step: Step, invocation: PreparedInvocation, low: tuple[int, ...], high: tuple[int, ...]
-) -> bool:
-    contract = invocation.invocation.contract
-    numbers = {parameter.cell for parameter in contract.parameters if parameter.kind == QUANTITY}
-    moving = [cell for cell, (a, b) in enumerate(zip(low, high, strict=True)) if a != b]
-    if not numbers.issuperset(moving):
-        return False
+def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, line: Line) -> bool:
     space = ground.questions.space(invocation.invocation.skill)._replace(
-        arguments=tuple(interval(min(ends), max(ends)) for ends in zip(low, high, strict=True)),
-        phases=frozenset((invocation.phase,)),
+        arguments=line.values, phases=frozenset((invocation.phase,))
     )
-    given: list[Goal] = []
-    for one, other in pairwise(moving):
-        # the two points of the line, and any third one, are on it together
-        rise, run = high[other] - low[other], high[one] - low[one]
-        terms = (tree.Term(True, one, rise), tree.Term(True, other, -run))
-        given.append((tree.Equal(terms, rise * low[one] - run * low[other]), TRUE))
-    for witness, forbid in refused(ground, invocation, space, tuple(given)):
+    for witness, forbid in refused(ground, invocation, space, Known.NOTHING, line.given):
         policy = ground.prepared.policy
-        situation = words(witness, policy, contract)
+        situation = words(witness, policy, invocation.invocation.contract)
         rules = [each.rule for each in invocation.candidates.permits] if forbid is None else [forbid]
         ground.context.report.add(
             codes.OUT_OF_SCOPE if forbid is None else codes.FORBIDDEN,

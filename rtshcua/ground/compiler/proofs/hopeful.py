@@ -1,11 +1,11 @@
 """Whether a step can be permitted at all: what only the state of the vehicle decides is taken to go the step's way.
 
 Arguments, the time and the phase are known, or known to be in a set; a permit that no state makes true does not permit,
-a forbid that every state makes true forbids. That a zone exists on dates is known where the time of issue is; where it
-is not, that too is taken to go the step's way.
+a forbid that every state makes true forbids. What is not known of the time (`Known`) is taken to go the step's way too.
 """
 
 from collections.abc import Iterator
+from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -23,43 +23,51 @@ from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.zone import Zone
 
 
+class Known(Enum):
+    """What is known of the time: all of it, so zones exist on their dates; the time of day, and no date; nothing."""
+
+    ALL = "all"
+    DAYTIME = "daytime"
+    NOTHING = "nothing"
+
+
 def refused(
-    ground: Ground,
-    invocation: PreparedInvocation,
-    space: Space,
-    given: tuple[Goal, ...] = (),
-    *,
-    dated: bool | None = None,
+    ground: Ground, invocation: PreparedInvocation, space: Space, known: Known, given: tuple[Goal, ...] = ()
 ) -> Iterator[tuple[Witness, Rule | None]]:
     """Situations of a space in which a step is surely refused: by a forbid, or (None) for want of a permit.
 
-    At most one of each, and time between two dates. `given` must hold in them. `dated`: the time of issue is known, and
-    zones exist on their dates; it is not (False), and the arguments are those of the invocation.
+    At most one of each, and time between two dates. `given` must hold in them. Where not all of the time is known, the
+    places in the space are those of the invocation.
     """
-    for span in _between_dates(ground, space.utc) if dated else (None,):
+    candidates = invocation.candidates
+    for span in _between_dates(ground, space.utc) if known is Known.ALL else (None,):
         moments = space if span is None else space._replace(utc=(span,))
-        candidates = invocation.candidates
-        at = None if dated is None else Dates(span, () if dated else invocation.invocation.arguments)
-        permits = [_hoped(ground, permit, True, at) for permit in candidates.permits]
+        time = Time(known, span, () if span else invocation.invocation.arguments)
+        permits = [_hoped(ground, permit, True, time) for permit in candidates.permits]
         if None not in permits:
             wanting: list[Goal] = [(node, FALSE | UNKNOWN) for node in permits if node is not None]
             answer = satisfiable([*given, *wanting], moments)
             if isinstance(answer, Yes):
                 yield answer.witness, None
         for forbid in candidates.forbids:
-            node = _hoped(ground, forbid, False, at)
+            node = _hoped(ground, forbid, False, time)
             answer = satisfiable([*given, (ALWAYS if node is None else node, TRUE)], moments)
             if isinstance(answer, Yes):
                 yield answer.witness, forbid.rule
 
 
-class Dates(NamedTuple):
-    """A time in which no zone begins or ceases to exist on a date; without it the arguments of a step, for which the
-    dates go its way.
+class Time(NamedTuple):
+    """A time in which no zone begins or ceases to exist on a date, where all is known of it; else the arguments of a
+    step, for which what is not known goes its way.
     """
 
+    known: Known
     span: Span | None
     arguments: tuple[int, ...]
+
+    def leaves_open(self, zone: Zone) -> bool:
+        """Whether a zone may exist, or not, for all that is known."""
+        return self.span is None and bool(zone.dates or (zone.daily and self.known is Known.NOTHING))
 
 
 def _between_dates(ground: Ground, utc: tuple[Span, ...]) -> Iterator[Span]:
@@ -70,34 +78,35 @@ def _between_dates(ground: Ground, utc: tuple[Span, ...]) -> Iterator[Span]:
             yield start, end - 1
 
 
-def _hoped(ground: Ground, rule: PreparedRule, hope: bool, dates: Dates | None) -> tree.Node | None:
-    key = (rule.number, hope, dates)
+def _hoped(ground: Ground, rule: PreparedRule, hope: bool, time: Time) -> tree.Node | None:
+    key = (rule.number, hope, time)
     if key not in ground.hopes:
         node = ground.prepared.compiler.when(rule.rule)
-        if node is not None and dates is not None:
-            node = _on_dates(ground, node, hope, dates)
-        ground.hopes[key] = None if node is None else hopeful(node, hope)
+        ground.hopes[key] = None if node is None else hopeful(_at_time(ground, node, hope, time), hope)
     return ground.hopes[key]
 
 
-def _on_dates(ground: Ground, node: tree.Node, hope: bool, dates: Dates) -> tree.Node:
-    """A condition in which what dates decide is decided.
+def _at_time(ground: Ground, node: tree.Node, hope: bool, time: Time) -> tree.Node:
+    """A condition in which what dates decide is decided, and what is not known of the time is what brings it nearest to
+    `hope`: a place that is given is inside a zone, or not, while that exists.
 
     What says that a zone exists, of a zone that is an argument, is to be in a place that is everywhere on those dates.
     """
     policy = ground.prepared.policy
     match node:
         case tree.Both(left, right):
-            return tree.Both(_on_dates(ground, left, hope, dates), _on_dates(ground, right, hope, dates))
+            return tree.Both(_at_time(ground, left, hope, time), _at_time(ground, right, hope, time))
         case tree.Either(left, right):
-            return tree.Either(_on_dates(ground, left, hope, dates), _on_dates(ground, right, hope, dates))
+            return tree.Either(_at_time(ground, left, hope, time), _at_time(ground, right, hope, time))
         case tree.Not(operand):
-            return tree.Not(_on_dates(ground, operand, not hope, dates))
-        case tree.Inside(number) if dates.span is not None and _only_dates(policy.zones[number]):
+            return tree.Not(_at_time(ground, operand, not hope, time))
+        case tree.InWindow() if time.known is Known.NOTHING:
+            return ALWAYS if hope else NEVER
+        case tree.Inside(number) if time.span is not None and _only_dates(policy.zones[number]):
             zone = policy.zones[number]
-            return ALWAYS if zone.dates[0] <= dates.span[0] <= zone.dates[1] else NEVER
-        case tree.PointInside(cell, number) if dates.span is None and policy.zones[number].dates:
-            place = dates.arguments[cell : cell + 2]
+            return ALWAYS if zone.dates[0] <= time.span[0] <= zone.dates[1] else NEVER
+        case tree.PointInside(cell, number) if time.leaves_open(policy.zones[number]):
+            place = time.arguments[cell : cell + 2]
             inside = ground.prepared.tables.zones[number].along(place, NO_BOX) == TRUE
             return ALWAYS if inside and hope else NEVER
         case _:

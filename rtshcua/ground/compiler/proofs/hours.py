@@ -7,41 +7,48 @@ most. Without a time of issue nothing is said: authority itself asks whether the
 from collections.abc import Sequence
 
 from rtshcua.decision.prepare import PreparedInvocation
-from rtshcua.decision.values import point
 from rtshcua.diagnostics import codes
-from rtshcua.ground.analysis.words import clock
-from rtshcua.ground.compiler.proofs.hopeful import refused
-from rtshcua.ground.compiler.proofs.period import Period
+from rtshcua.ground.analysis.words import clock, words
+from rtshcua.ground.compiler.proofs.hopeful import Known, refused
+from rtshcua.ground.compiler.proofs.line import Line
+from rtshcua.ground.compiler.proofs.period import Period, along
 from rtshcua.ground.compiler.proofs.ruleset import timed
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.ir.missions import Step
 
 
 def prove(
-    ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation], comes: Sequence[Period]
-) -> None:
-    """Report the first step that may come at such a time."""
-    for step, invocation, period in zip(steps, invocations, comes, strict=True):
-        if not period.issued_at_us or _refused(ground, step, invocation, period.utc(0)[0]):
-            return
+    ground: Ground,
+    steps: Sequence[Step],
+    invocations: Sequence[PreparedInvocation],
+    comes: Sequence[Period],
+    lines: Sequence[Line | None],
+) -> bool:
+    """Report the first step that may come at such a time, with arguments on its line; whether there is one."""
+    periods = along(comes, invocations, lines)
+    return any(
+        line is not None and _refused(ground, step, invocation, line, period.utc(0)[0])
+        for step, invocation, line, period in zip(steps, invocations, lines, periods, strict=True)
+    )
 
 
-def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, window: tuple[int, int]) -> bool:
+def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, line: Line, window: tuple[int, int]) -> bool:
     flat, zones = invocation.invocation, ground.prepared.policy.zones
     rules = (each.rule for each in (*invocation.candidates.permits, *invocation.candidates.forbids))
     if not any(rule.when is not None and timed(rule.when.code, zones) for rule in rules):
         return False
     space = ground.questions.space(flat.skill)._replace(
-        arguments=tuple(map(point, flat.arguments)), utc=(window,), phases=frozenset((invocation.phase,))
+        arguments=line.values, utc=(window,), phases=frozenset((invocation.phase,))
     )
-    for witness, forbid in refused(ground, invocation, space, dated=True):
+    for witness, forbid in refused(ground, invocation, space, Known.ALL, line.given):
         offset = ground.prepared.policy.vehicle.utc_offset_us
         at, first, last = (clock(moment, offset) for moment in (witness.at.utc[0][0], *window))
         told = [each.rule for each in invocation.candidates.permits] if forbid is None else [forbid]
+        moved = f" with {words(witness, ground.prepared.policy, flat.contract)}" if line.moving else ""
         ground.context.report.add(
             codes.NOT_ALWAYS_PERMITTED,
             step.span,
-            f"at {at} this step is not permitted, and it may come from {first} to {last}, local time",
+            f"at {at} this step is not permitted{moved}, and it may come from {first} to {last}, local time",
             help="issue the mission at another time, or move the step",
             labels=[
                 (ground.span(rule), "this does not permit it then" if forbid is None else "this forbids it then")

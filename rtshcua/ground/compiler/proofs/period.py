@@ -8,7 +8,7 @@ left for the time of issue.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Span, Truth
 from rtshcua.decision.zones import Place, PreparedZone
 from rtshcua.diagnostics.span import Span as Where
 from rtshcua.ground.analysis.words import clock
+from rtshcua.ground.compiler.proofs.line import Line
 from rtshcua.ground.compiler.proofs.situation import EVER, Ground
 from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US, approval
 from rtshcua.model.flat.code import Clause, Op
@@ -187,6 +188,20 @@ def periods(ground: Ground, invocations: Sequence[PreparedInvocation]) -> list[P
         time = flat.contract.motion.time
         earliest += flat.arguments[time] if time >= 0 else 0
     return found
+
+
+def along(
+    comes: Sequence[Period], invocations: Sequence[PreparedInvocation], lines: Sequence[Line | None]
+) -> Iterator[Period]:
+    """The periods for all arguments on lines: a step comes no sooner than those before it take at least with any of
+    them, and asks what it asks with those that it has.
+    """
+    earliest = 0
+    for period, invocation, line in zip(comes, invocations, lines, strict=True):
+        yield replace(period, low=earliest, asked=[each._replace(low=earliest) for each in period.asked])
+        flat = invocation.invocation
+        time = flat.contract.motion.time
+        earliest += 0 if time < 0 else flat.arguments[time] if line is None else line.least(time)
 
 
 def keeps(place: Place, airspace: PreparedAirspace) -> Truth:

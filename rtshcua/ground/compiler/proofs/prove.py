@@ -24,6 +24,7 @@ from rtshcua.ground.compiler.proofs import (
     some_time,
     timing,
 )
+from rtshcua.ground.compiler.proofs.line import still
 from rtshcua.ground.compiler.proofs.period import periods
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.mission import Mission
@@ -72,11 +73,9 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
             if good:
                 contradiction.prove_step(ground, step, one)
     if all(permitted):
-        between.prove(ground, declared, steps, prepared)
-        if mission.issued_at_us:
-            hours.prove(ground, steps, prepared, comes)
-        else:
-            some_time.prove(ground, steps, prepared, comes)
+        timely = hours.prove if mission.issued_at_us else some_time.prove
+        if not timely(ground, steps, prepared, comes, still(prepared)):
+            between.prove(ground, declared, steps, prepared, comes, timely)
     for step, one in zip(steps, prepared, strict=True):
         deferral.prove_step(ground, step, one)
         observation.prove_step(ground, step, one)

@@ -274,3 +274,75 @@ def test_a_parameter_has_values_that_are_not_permitted_between_those_that_are() 
     rules = "permit takeoff by role operator when altitude < 15 m or altitude > 25 m"
     assert [each.code.id for each in read(POLICY.format(rules) + mission)] == ["E0703"]
     assert [each.code.id for each in read(POLICY.format(rules.replace("25", "14")) + mission)] == []
+
+
+RANGE = HOURS.replace("mission m", "mission m(height: altitude in 5 m .. 40 m = 5 m)").replace("10 m", "height")
+DAY_SHIFT, NIGHT_SHIFT = "local time in 07:00 .. 19:00", "local time in 19:00 .. 07:00"
+
+
+@rows(
+    ("rules", "codes"),
+    [
+        # a shift says nothing about the parameter, and the parameter nothing about the shift
+        (f"permit takeoff by role operator when {DAY_SHIFT}", []),
+        (f"permit takeoff by role operator when altitude <= 40 m and {DAY_SHIFT}", []),
+        (f"permit takeoff by role operator\nforbid takeoff by any when {NIGHT_SHIFT}", []),
+        # each altitude has a time of its own, though none suits all
+        (
+            "permit takeoff by role operator "
+            f"when altitude < 20 m and {DAY_SHIFT} or altitude >= 20 m and {NIGHT_SHIFT}",
+            [],
+        ),
+        # between the ends are altitudes that are permitted at no time, or not for long enough to start
+        (f"permit takeoff by role operator when {DAY_SHIFT} and (altitude < 15 m or altitude > 25 m)", ["E0703"]),
+        (
+            f"permit takeoff by role operator\nforbid takeoff by any when altitude in 15 m .. 25 m or {NIGHT_SHIFT}",
+            ["E0704"],
+        ),
+        (
+            "permit takeoff by role operator when altitude < 15 m or altitude > 25 m or local time in 12:00 .. 12:02",
+            ["E0718"],
+        ),
+        (
+            "permit takeoff by role operator\n"
+            "forbid takeoff by any when altitude in 15 m .. 25 m and local time in 00:03 .. 23:59",
+            ["E0718"],
+        ),
+    ],
+)
+def test_shifts_and_the_range_of_a_parameter_go_together(rules: str, codes: list[str]) -> None:
+    assert [each.code.id for each in read(POLICY.format(rules) + RANGE)] == codes
+
+
+def test_the_time_of_a_zone_and_the_range_of_a_parameter_go_together() -> None:
+    leg = "goto(47.39779 N, 8.54559 E, altitude = height)"
+    mission = RANGE.replace("takeoff(altitude = height)", f"takeoff(altitude = 10 m) {leg}")
+    permit = "permit takeoff by role operator permit goto by role operator"
+    rules = (
+        f"{permit}\nforbid goto by any when target inside by_day",
+        f"{permit} when target inside by_day and altitude < 60 m",
+    )
+    for each in rules:
+        assert [found.code.id for found in read(POLICY.format(each) + mission)] == []
+    refused = f"{permit} when target inside by_day and (altitude < 15 m or altitude > 25 m)"
+    assert [found.code.id for found in read(POLICY.format(refused) + mission)] == ["E0703"]
+
+
+def test_a_value_between_is_told_that_no_time_of_issue_suits() -> None:
+    rules = "permit takeoff by role operator when altitude < 15 m or altitude > 25 m or local time in 12:00 .. 12:02"
+    (finding,) = read(POLICY.format(rules) + RANGE)
+    assert "with `altitude = 15" in finding.message, finding.message
+
+
+def test_a_value_between_is_told_that_the_time_of_issue_does_not_suit() -> None:
+    other = """
+mission n under rules@1 on quad {
+  proposed by operator x for role operator
+  phase departure { takeoff(altitude = 10 m) return_home() }
+}
+"""
+    rules = "permit takeoff by role operator when altitude < 15 m or altitude > 25 m or local time in 08:00 .. 09:00"
+    text = program(POLICY.format(rules) + RANGE + other)
+    for minutes, codes in ((0, []), (56, ["E0718"])):
+        compiled = compile_program(text, dialect.load(), mission="n", issued_at_us=EIGHT + minutes * 60_000_000)
+        assert [each.code.id for each in compiled.diagnostics] == codes

@@ -121,6 +121,56 @@ def test_permits_read_the_times_of_zones(rule: str, active: str, issued: int, ex
     assert codes(program(zone(active=active), rules, FLIGHT), issued) == expected
 
 
+def ranging(*steps: str) -> str:
+    """A mission with a height from 5 m to 40 m."""
+    return mission(*steps).replace("mission flight", "mission flight(height: altitude in 5 m .. 40 m = 5 m)")
+
+
+@rows(
+    ("airspace", "active", "expected"),
+    [
+        # by night all heights are permitted, by day not those between: the airspace asks for one of the two
+        ("inside works", "active 18:00 .. 08:00", []),
+        ("inside works", "active 08:00 .. 18:00", ["E0718"]),
+        ("inside city outside works", "active 08:00 .. 18:00", []),
+        ("inside city outside works", "active 18:00 .. 08:00", ["E0718"]),
+        ("inside works", ALL_DATES, []),
+    ],
+)
+def test_one_time_of_issue_suits_the_range_of_a_parameter_and_the_airspace(
+    airspace: str, active: str, expected: list[str]
+) -> None:
+    rules = f"""policy rules version 1 {{
+  permit takeoff by any when altitude < 15 m or altitude > 25 m or local time in 19:00 .. 07:00
+  permit goto, hover, return_home, emergency_land by any
+  contingency return_home, emergency_land
+  airspace {airspace}
+}}
+"""
+    flight = ranging("takeoff(height)", f"goto({TO}, 20 m)", "return_home()")
+    assert codes(program(zone(radius=300, active=active), rules, flight)) == expected
+
+
+@rows(
+    ("active", "expected"),
+    [
+        (ALL_DATES, []),
+        (OLD_DATES, []),  # the dates are left for the time of issue
+        ("active 07:00 .. 16:00", []),
+        ("active 08:00 .. 08:02", ["E0718"]),
+    ],
+)
+def test_the_times_of_a_zone_are_asked_for_the_values_between(active: str, expected: list[str]) -> None:
+    rules = """policy rules version 1 {
+  permit takeoff, hover, return_home, emergency_land by any
+  permit goto by any when altitude < 15 m or altitude > 25 m or target inside works
+  contingency return_home, emergency_land
+}
+"""
+    flight = ranging("takeoff(20 m)", f"goto({TO}, height)", "return_home()")
+    assert codes(program(zone(active=active), rules, flight)) == expected
+
+
 PROBE = """
 skill probe(over: zone, up: altitude in 5 m .. 50 m) {
   motion   climb to up

@@ -118,7 +118,9 @@ def doctor(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
                 unheard=signing.unheard, named=system is not None,
-                qualified=None if root is None else partial(standing, record_of(policy.vehicle.identity, root)),
+                qualified=None if root is None else partial(
+                    standing, record_of(policy.vehicle.identity, root, clock.now().utc_us)
+                ),
             )
         )  # fmt: skip
     if mission is not None:

@@ -173,7 +173,9 @@ def launch(order: Launch) -> ExitCode:
             if order.sortie is not None:
                 events += order.sortie.before(vehicle, clock)
             elif order.link is not None:
-                note, meanwhile = unqualified(record_of(loaded.vehicle, root, order.data), vehicle, clock)
+                note, meanwhile = unqualified(
+                    record_of(loaded.vehicle, root, clock.now().utc_us, order.data), vehicle, clock
+                )
                 events += meanwhile
                 signing.notes += [note] if note is not None else []
             if order.dry_run:
@@ -278,7 +280,9 @@ def _wait(
         events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
         notes = list(signing.notes)
         if order.link is not None:
-            note, meanwhile = unqualified(record_of(base.vehicle, trusted.root, order.data), vehicle, clock)
+            note, meanwhile = unqualified(
+                record_of(base.vehicle, trusted.root, clock.now().utc_us, order.data), vehicle, clock
+            )
             events += meanwhile
             notes += [note] if note is not None else []
 

@@ -21,11 +21,11 @@ _POLL_S: Final = 0.05
 _HELP: Final = "`rtshcua qualify` flies a short test of it"
 
 
-def record_of(vehicle: str, root: TrustRoot, data: Path | None = None) -> Qualification | str | None:
+def record_of(vehicle: str, root: TrustRoot, now_us: int, data: Path | None = None) -> Qualification | str | None:
     """The record of the vehicle of this identity; None where it has none, a text where it is not to be trusted."""
     try:
         signed = read_record(data_folder() if data is None else data, vehicle)
-        return None if signed is None else open_qualification(signed, root=root, vehicle=vehicle)
+        return None if signed is None else open_qualification(signed, root=root, vehicle=vehicle, now_us=now_us)
     except Untrusted as error:
         return str(error)
     except OSError as error:

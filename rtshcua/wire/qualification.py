@@ -119,8 +119,10 @@ def sign_qualification(record: Qualification, key: SigningKey) -> bytes:
     return cose.sign1(payload, key=key, duty=Duty.LOG, content_type=names.QUALIFICATION.content_type)
 
 
-def open_qualification(document: bytes, *, root: TrustRoot, vehicle: str) -> Qualification:
-    """A record of this vehicle that a log key of the root signed, which could speak for it when it did.
+def open_qualification(document: bytes, *, root: TrustRoot, vehicle: str, now_us: int) -> Qualification:
+    """A record of this vehicle that a log key of the root signed, which could speak for it when it did and can now.
+
+    `now_us` is UTC. Whoever has a key that expired may write any time of issue, so nothing that it signed counts now.
 
     Raises `QualificationError`, `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
@@ -130,9 +132,10 @@ def open_qualification(document: bytes, *, root: TrustRoot, vehicle: str) -> Qua
     record = read_qualification(opened.payload)
     if record.vehicle != vehicle:
         raise QualificationError("wrong-vehicle", f"it is about `{record.vehicle[:80]}`, this vehicle is `{vehicle}`")
-    refusal = key_refusal(opened.key, vehicle=vehicle, now_us=record.issued_at_us)
-    if refusal is not None:
-        raise QualificationError(refusal, f"key {opened.key.kid.hex()} could not speak for `{vehicle}` then")
+    for when, at_us in (("could not speak", record.issued_at_us), ("may not speak any more", now_us)):
+        refusal = key_refusal(opened.key, vehicle=vehicle, now_us=at_us)
+        if refusal is not None:
+            raise QualificationError(refusal, f"key {opened.key.kid.hex()} {when} for `{vehicle}`")
     return record
 
 

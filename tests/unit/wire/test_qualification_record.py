@@ -38,14 +38,15 @@ def root(**about: Any) -> TrustRoot:
     return TrustRoot(1, True, 0, 1 << 60, (log, POLICY.verification(vehicles=(ANY,))))
 
 
-def slug(document: bytes, trusted: TrustRoot | None = None, vehicle: str = "quad-07") -> str:
+def slug(document: bytes, trusted: TrustRoot | None = None, vehicle: str = "quad-07", now_us: int = 1_000) -> str:
     with pytest.raises(Untrusted) as refused:
-        open_qualification(document, root=trusted or root(), vehicle=vehicle)
+        open_qualification(document, root=trusted or root(), vehicle=vehicle, now_us=now_us)
     return refused.value.slug
 
 
 def test_what_was_signed_is_opened() -> None:
-    assert open_qualification(sign_qualification(RECORD, LOG), root=root(), vehicle="quad-07") == RECORD
+    signed = sign_qualification(RECORD, LOG)
+    assert open_qualification(signed, root=root(), vehicle="quad-07", now_us=1_000) == RECORD
 
 
 def test_the_log_key_signs_it_and_no_other() -> None:
@@ -60,7 +61,11 @@ def test_it_is_of_one_vehicle_and_its_key_could_speak_for_that() -> None:
     assert slug(signed, vehicle="quad-08") == "wrong-vehicle"
     assert slug(signed, root(vehicles=("quad-08",))) == "wrong-vehicle"
     assert slug(signed, root(expires_us=1_000)) == "key-expired"
-    assert open_qualification(signed, root=root(expires_us=1_001), vehicle="quad-07") == RECORD
+    assert open_qualification(signed, root=root(expires_us=1_001), vehicle="quad-07", now_us=1_000) == RECORD
+
+
+def test_a_key_that_has_expired_may_not_write_an_earlier_time() -> None:
+    assert slug(sign_qualification(RECORD, LOG), root(expires_us=1_001), now_us=1_001) == "key-expired"
 
 
 def test_another_artefact_of_the_log_key_is_none() -> None:

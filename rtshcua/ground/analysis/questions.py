@@ -1,16 +1,26 @@
 """What is asked about one policy: answers are remembered, how its zones lie, and what its missions were given."""
 
 from collections.abc import Callable, Hashable, Sequence
+from typing import NamedTuple
 
 from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.ground.analysis.daytime import Asked
 from rtshcua.ground.analysis.plane import Plane
 from rtshcua.ground.analysis.solve import Answer, Goal, search
 from rtshcua.ground.analysis.space import Space, space_of
 
 
+class Tried(NamedTuple):
+    """A step of an instance of a mission; `asked` is what its way and its contract ask of the time of issue."""
+
+    skill: int
+    arguments: tuple[int, ...]
+    asked: tuple[Asked, ...]
+
+
 class Questions:
-    """Questions about a prepared policy. `instances` are, of each mission by name, the skill and the arguments of each
-    step, for each choice of the mission's parameters so far.
+    """Questions about a prepared policy. `instances` are, of each mission by name, its steps for each choice of its
+    parameters so far.
     """
 
     def __init__(self, prepared: PreparedPolicy) -> None:
@@ -18,7 +28,7 @@ class Questions:
         self._plane: Plane | None = None
         self._spaces: dict[int, Space] = {}
         self._answers: dict[Hashable, tuple[Answer, int]] = {}
-        self.instances: dict[str, list[tuple[tuple[int, tuple[int, ...]], ...]]] = {}
+        self.instances: dict[str, list[tuple[Tried, ...]]] = {}
 
     def space(self, skill: int) -> Space:
         """Any situation in which a skill, by its number, may be asked for."""

@@ -2,14 +2,17 @@
 refused for any of them.
 
 With a value that is refused whatever the time, the step is out of scope, or forbidden. Of one that is refused at times
-only, the same is asked as of every instance: whether the time of issue suits it, or some time would.
+only, the same is asked as of every instance: whether the time of issue suits it, or some time would. What the ways of
+the two instances ask of that time, either of them, is asked of all values between.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final, TypeAlias
 
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.questions import Tried
 from rtshcua.ground.analysis.words import words
 from rtshcua.ground.compiler.proofs.hopeful import Known, refused
 from rtshcua.ground.compiler.proofs.line import Line, lines
@@ -35,7 +38,10 @@ def prove(
     timely: Timely,
 ) -> None:
     """Report the first value between this instance and an earlier one with which a step is refused."""
-    now = tuple((one.invocation.skill, one.invocation.arguments) for one in invocations)
+    now = tuple(
+        Tried(one.invocation.skill, one.invocation.arguments, tuple(period.asked))
+        for one, period in zip(invocations, comes, strict=True)
+    )
     earlier = ground.questions.instances.setdefault(mission.name.text, [])
     for before in earlier[:_COMPARED]:
         if len(before) != len(now):
@@ -44,9 +50,10 @@ def prove(
         for step, invocation, line in zip(steps, invocations, between, strict=True):
             if line is not None and line.moving and _refused(ground, step, invocation, line):
                 return
-        moving = any(line is not None and line.moving for line in between)
-        if moving and timely(ground, steps, invocations, comes, between):
-            return
+        if any(line is not None and line.moving for line in between):
+            both = [replace(one, asked=[*one.asked, *two.asked]) for one, two in zip(comes, before, strict=True)]
+            if timely(ground, steps, invocations, both, between):
+                return
     earlier.append(now)
 
 

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 from rtshcua.decision import tree
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, Span, Value, interval
+from rtshcua.ground.analysis.questions import Tried
 from rtshcua.ground.analysis.solve import Goal
 from rtshcua.model.flat.contract import QUANTITY, Contract
 from rtshcua.model.quantity import Dimension, display
@@ -93,14 +94,10 @@ def still(invocations: Sequence[PreparedInvocation]) -> list[Line]:
     return [Line(each.invocation.arguments, each.invocation.arguments) for each in invocations]
 
 
-def lines(
-    one: Sequence[tuple[int, tuple[int, ...]]], invocations: Sequence[PreparedInvocation]
-) -> Iterator[Line | None]:
-    """For each step the line from an earlier instance, of which the skill and arguments of each step are known; None
-    where the two differ in more than numbers.
-    """
-    for (skill, earlier), each in zip(one, invocations, strict=True):
+def lines(before: Sequence[Tried], invocations: Sequence[PreparedInvocation]) -> Iterator[Line | None]:
+    """For each step the line from an earlier instance; None where the two differ in more than numbers."""
+    for earlier, each in zip(before, invocations, strict=True):
         now = each.invocation
-        line = Line(earlier, now.arguments) if skill == now.skill else None
+        line = Line(earlier.arguments, now.arguments) if earlier.skill == now.skill else None
         numbers = {parameter.cell for parameter in now.contract.parameters if parameter.kind == QUANTITY}
         yield line if line is not None and numbers.issuperset(line.moving) else None

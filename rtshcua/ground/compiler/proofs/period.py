@@ -7,9 +7,8 @@ of the time of day is collected here (`Period.asked`), and all of a mission is a
 left for the time of issue.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Environment
@@ -17,6 +16,7 @@ from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Span, Truth
 from rtshcua.decision.zones import Place, PreparedZone
 from rtshcua.diagnostics.span import Span as Where
+from rtshcua.ground.analysis.daytime import Arc, Asked, arcs_where
 from rtshcua.ground.analysis.words import clock
 from rtshcua.ground.compiler.proofs.line import Line
 from rtshcua.ground.compiler.proofs.situation import EVER, Ground
@@ -27,34 +27,11 @@ from rtshcua.model.flat.limits import DAY
 _EXACT = (0, 0)
 
 
-class Arc(NamedTuple):
-    """Moments of the day, in us of UTC: from `start` on, `length` of them."""
-
-    start: int
-    length: int
-
-
 class Found(NamedTuple):
     """Whether a condition fails, and at which moment of UTC, where one is known."""
 
     fails: bool
     moment: int | None = None
-
-
-class Asked(NamedTuple):
-    """One of these arcs must hold all from `low` to `high` us after the issue; where that is written."""
-
-    arcs: tuple[Arc, ...]
-    low: int
-    high: int
-    labels: tuple[tuple[Where, str], ...]
-
-    def met(self, issue: int) -> bool:
-        """Whether that is so for a time of issue."""
-        return any(
-            arc.length >= DAY or (issue + self.low - arc.start) % DAY + self.high - self.low < arc.length
-            for arc in self.arcs
-        )
 
 
 @dataclass(slots=True)
@@ -194,7 +171,7 @@ def along(
     comes: Sequence[Period], invocations: Sequence[PreparedInvocation], lines: Sequence[Line | None]
 ) -> Iterator[Period]:
     """The periods for all arguments on lines: a step comes no sooner than those before it take at least with any of
-    them, and asks what it asks with those that it has.
+    them, and asks for all of them what its period says.
     """
     earliest = 0
     for period, invocation, line in zip(comes, invocations, lines, strict=True):
@@ -217,25 +194,6 @@ def keeps(place: Place, airspace: PreparedAirspace) -> Truth:
 def at_moment(at: Environment, utc: Span) -> Environment:
     """The same at some moment."""
     return Environment(at.slots, at.arguments, (utc,), (0, 0), at.place, at.monitors, at.phase, at.through)
-
-
-def arcs_where(edges: Iterable[int], holds: Callable[[int], bool]) -> tuple[Arc, ...]:
-    """When in a day something holds that changes at some moments of it only."""
-    ordered = sorted({edge % DAY for edge in edges})
-    if not ordered:
-        return (Arc(0, DAY),) if holds(0) else ()
-    arcs: list[Arc] = []
-    for start, end in pairwise((*ordered, ordered[0] + DAY)):
-        if not holds(start):
-            continue
-        if arcs and arcs[-1].start + arcs[-1].length == start:
-            arcs[-1] = Arc(arcs[-1].start, arcs[-1].length + end - start)
-        else:
-            arcs.append(Arc(start, end - start))
-    if len(arcs) > 1 and arcs[-1].start + arcs[-1].length == arcs[0].start + DAY:
-        arcs[0] = Arc(arcs[-1].start, arcs[-1].length + arcs[0].length)
-        del arcs[-1]
-    return tuple(arcs)
 
 
 def day_edges(ground: Ground, start: int, end: int) -> tuple[int, int]:

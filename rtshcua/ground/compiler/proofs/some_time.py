@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.daytime import Arc, Asked, arcs_where, met_by_some
 from rtshcua.ground.compiler.proofs.hopeful import Known, refused
 from rtshcua.ground.compiler.proofs.line import Line
-from rtshcua.ground.compiler.proofs.period import Arc, Asked, Period, along, arcs_where, changes
+from rtshcua.ground.compiler.proofs.period import Period, along, changes
 from rtshcua.ground.compiler.proofs.places import may_be_skipped
 from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.model.flat.limits import DAY
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
@@ -68,15 +68,9 @@ def _failed(
             continue
         found = [*period.asked, *_asked(ground, invocation, line, period)]
         asked += found
-        if found and not _some_time(asked):
+        if found and not met_by_some(asked):
             return Failed(number, period.low, found)
     return None
-
-
-def _some_time(asked: Sequence[Asked]) -> bool:
-    """What is asked of the time of issue is met by it from some moments on, each; so one of these, or none."""
-    issues = {0, *((arc.start - one.low) % DAY for one in asked for arc in one.arcs)}
-    return any(all(one.met(issue) for one in asked) for issue in issues)
 
 
 def _asked(ground: Ground, invocation: PreparedInvocation, line: Line, period: Period) -> Iterator[Asked]:

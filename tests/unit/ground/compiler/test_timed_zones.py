@@ -171,6 +171,22 @@ def test_the_times_of_a_zone_are_asked_for_the_values_between(active: str, expec
     assert codes(program(zone(active=active), rules, flight)) == expected
 
 
+@rows("band", ["ceiling 25 m", "floor 30 m ceiling 60 m"])
+@rows("hours", ["19:00 .. 07:00", "09:00 .. 17:00"])
+def test_a_zone_on_the_way_of_one_value_counts_for_those_between(band: str, hours: str) -> None:
+    # the lowest or the greatest height is in the zone; those between need the night, or the day
+    rules = f"""policy rules version 1 {{
+  permit takeoff, hover, return_home, emergency_land by any
+  permit goto by any when altitude < 6 m or altitude > 39 m or local time in {hours}
+  contingency return_home, emergency_land
+  airspace outside works
+}}
+"""
+    flight = ranging("takeoff(height)", f"goto({TO}, height)", "return_home()")
+    found = codes(program(zone(active=f"{band} active 08:00 .. 18:00"), rules, flight))
+    assert found == ([] if hours.startswith("19") else ["E0718"])
+
+
 PROBE = """
 skill probe(over: zone, up: altitude in 5 m .. 50 m) {
   motion   climb to up

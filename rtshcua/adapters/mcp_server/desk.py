@@ -96,6 +96,7 @@ class Desk:
     def describe_vehicle(self) -> dict[str, Any]:
         """Whether it waits, flies or ended, and what it says of itself."""
         seen = self.following
+        seen.await_first()
         told = {key: seen.hello.get(key) for key in ("vehicle", "flight", "mode")}
         state = {key: seen.vehicle.get(key) for key in ("ready", "unready", "armed", "airborne", "signals")}
         return {"stage": seen.stage, "untrusted": {"note": UNTRUSTED, **told, "state": state if seen.vehicle else None}}

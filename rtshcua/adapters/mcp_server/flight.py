@@ -1,4 +1,4 @@
-"""The vehicle as its agent socket tells of it: followed in a thread, so that nobody who asks ever waits for it."""
+"""The vehicle as its agent socket tells of it, followed in a thread: only its first word is waited for."""
 
 import json
 import socket
@@ -9,6 +9,8 @@ from typing import Any, Final
 
 #: how long until it is tried again to follow, in seconds
 AGAIN_S: Final = 0.3
+#: how long the first answer about it waits for its first word, in seconds
+FIRST_S: Final = 1.0
 #: how many lines are kept, the oldest let go first
 MOST_LINES: Final = 5_000
 #: a line that is longer is none of a flight's
@@ -26,6 +28,7 @@ class Following:
         self.turn = threading.Condition()
         self.heard = 0
         self.connected = False
+        self._tried = False
         self.hello: dict[str, Any] = {}
         self.waiting: dict[str, Any] = {}
         self.vehicle: dict[str, Any] = {}
@@ -45,6 +48,11 @@ class Following:
             return "unreachable"
         return "flying" if self.mission else "waiting"
 
+    def await_first(self) -> None:
+        """Wait until it told who it is, or cannot be reached, for a short time."""
+        with self.turn:
+            self.turn.wait_for(lambda: self.connected or self._tried, FIRST_S)
+
     def end(self) -> None:
         """Follow no more."""
         self._ended.set()
@@ -61,7 +69,7 @@ class Following:
             except (OSError, ValueError):
                 pass
             with self.turn:
-                self.connected = False
+                self.connected, self._tried = False, True
                 self.turn.notify_all()
             self._ended.wait(AGAIN_S)
 

@@ -60,7 +60,7 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "airspace-unchecked": (of("px4", at(15, faults.GpsGlitch(0, 100_000, 0, 20 * S))), "derive"),
     "clock-moves-times": (of("px4", at(12, faults.ClockStep(0, 600 * S))), "needless"),
     "landing-by-word": (of("px4", at(12, faults.MessageSilence(0, "GPS_RAW_INT"))), "untrue"),
-    "mode-not-asked": (of("px4", at(17.75, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
+    "mode-not-asked": (of("px4", at(17.6, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
     "denied-trusts-step": (of("px4", battery=8_000), "chain"),
     "crash-ignored": (of("px4", at(12, faults.Kill(0))), "untrue"),
     "judged-before-fresh": (of("px4", at(12, faults.LinkSilence(0, 4 * S))), "chain"),

@@ -54,9 +54,11 @@ def mcp(
         sources = _sources(store, key)
     except Untrusted as error:
         return distrust(error)
-    if set(sources) - {_AGENT}:
-        text = f"key {key.kid.hex()} may speak for {', '.join(sources)}, and an agent's host gets an agent's key alone"
-        return fail(ExitCode.UNTRUSTED, text, "`--mission-key mission-agent.key`")
+    if sources != (_AGENT,):
+        speaks = f"may speak for {', '.join(sources)}" if sources else "is no mission key of the key store's trust root"
+        text = f"key {key.kid.hex()} {speaks}, and an agent's host gets an agent's key alone"
+        help = "`--mission-key mission-agent.key`; the trust root, which is no secret, lies in the key store beside it"
+        return fail(ExitCode.UNTRUSTED, text, help)
     for path in with_:
         read_regular(path, 1)
 
@@ -74,8 +76,9 @@ def mcp(
 
 
 def _sources(store: KeyStore, key: SigningKey) -> tuple[str, ...]:
-    """For whom the key may speak, by the key store's trust root; nothing where that does not name it."""
-    if not store.exists():
-        return ()
+    """For whom the key may speak, by the key store's trust root; nothing where that does not name it.
+
+    Raises `KeyStoreError` where there is no root: then nobody can tell.
+    """
     named = open_root(store.root(), pinned=store.pin(), now_us=0).keys_for(Duty.MISSION).get(key.kid)
     return () if named is None else named.sources

@@ -17,6 +17,8 @@ pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup
 from mcp import ClientSession, StdioServerParameters
 from mcp.client.stdio import stdio_client
 
+from rtshcua.wire.request import STEP
+
 CHECKOUT = Path(__file__).resolve().parents[2]
 POLICY = CHECKOUT / "policies/bridge_inspection.rts"
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
@@ -65,6 +67,17 @@ async def call(session: ClientSession, name: str, /, **arguments: Any) -> dict[s
     found = await session.call_tool(name, arguments)
     told: dict[str, Any] = found.structuredContent or {"text": found.content[0].text}  # type: ignore[union-attr]
     return told | {"wrong": found.isError}
+
+
+async def evidence(session: ClientSession) -> list[dict[str, Any]]:
+    """All records of the flight, in their order."""
+    found: list[dict[str, Any]] = []
+    first: int | None = 0
+    while first is not None:
+        told = await call(session, "read_evidence", first=first)
+        found += told["untrusted"]["records"]
+        first = told["next"]
+    return found
 
 
 def test_tools_without_a_vehicle(ground: Any, base: str, place: Path) -> None:
@@ -207,6 +220,19 @@ def test_a_key_that_may_speak_for_others_is_refused(ground: Any, base: str, plac
     assert b"an agent's key alone" in err
 
 
+def test_a_key_of_which_nobody_can_tell_whose_it_is_is_refused(ground: Any, base: str, place: Path) -> None:
+    """Without a trust root it was taken for an agent's."""
+    (key,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("mission-operator.key")
+    lone = ground.folder / "lone.key"
+    lone.write_bytes(key.read_bytes())
+    lone.chmod(0o600)
+    key.parent.rename(ground.folder / "elsewhere")
+    run = ground.start("mcp", base, "--to", str(place), "--with", str(POLICY), "--mission-key", str(lone))
+    _, err = run.process.communicate()
+    assert run.process.returncode == 4, err
+    assert b"there are no keys in" in err
+
+
 @pytest.mark.clients
 def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
@@ -246,8 +272,14 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
         assert (status["state"], status["ending"]) == ("admitted", "completed"), status
         assert progress
         assert (await call(session, "mission_status", ticket=replaced["ticket"]))["state"] == "admitted"
-        why = await call(session, "explain_decision")
-        assert why["outcome"] == "allow"
+        decided = [each for each in await evidence(session) if each.get("type") == "decision"]
+        steps = [each for each in decided if each["kind"] == STEP]
+        refused = [each["seq"] for each in steps if each["outcome"] != "allow"]
+        latest = await call(session, "explain_decision")
+        assert latest["seq"] == (refused or [steps[-1]["seq"]])[-1], "the latest that was refused, if one was"
+        allowed = await call(session, "explain_decision", record=steps[-1]["seq"])
+        assert (allowed["outcome"], allowed["limit"]) == ("allow", steps[-1]["clause"])
+        assert "observed" in allowed["untrusted"], "explained by the mission that it is of: its replacement"
         records = await call(session, "read_evidence", first=0, count=5)
         assert len(records["untrusted"]["records"]) == 5
         print(f"proposed in {took_s * 1000:.0f} ms")

@@ -54,7 +54,6 @@ class Missions:
         self._readable = Readable(shipped, sources)
         self._names = [str(path) for path in sources]
         self._texts: dict[str, bytes] = {}
-        self._proposal = b""
         program = load(self._names, self._read, shipped, self._readable.listing, packs=self._readable.pack)
         checked = examine_program(program, dialect.load())
         if has_errors(checked.diagnostics):
@@ -77,9 +76,13 @@ class Missions:
 
     def check(self, specification: Any, issued_at_us: int) -> Answer:
         """What the compiler says of a specification; the same as `rtshcua compile --policy` does."""
-        self._proposal = json.dumps(specification, ensure_ascii=False).encode("utf-8", "surrogatepass")
+        proposal = json.dumps(specification, ensure_ascii=False).encode("utf-8", "surrogatepass")
+
+        def readable(name: str) -> bytes:  # of this proposal alone: several are checked at a time
+            return proposal if name == PROPOSAL else self._read(name)
+
         program, read = load_specification(
-            PROPOSAL, self._names, self._read, self._shipped, self._readable.listing, self._readable.pack, self._pins
+            PROPOSAL, self._names, readable, self._shipped, self._readable.listing, self._readable.pack, self._pins
         )
         compiled = compile_program(program, dialect.load(), mission=None, issued_at_us=issued_at_us, pins=self._pins)
         if compiled.mission is None or compiled.policy is None:
@@ -90,8 +93,6 @@ class Missions:
         return Answer(compiled.policy, compiled.mission, [], bounds)
 
     def _read(self, name: str) -> bytes:
-        if name == PROPOSAL:
-            return self._proposal
         if name not in self._texts:
             self._texts[name] = self._readable.read(name)
         return self._texts[name]

@@ -1,0 +1,144 @@
+"""The tools of the MCP server, without its protocol: several calls at a time, and whose decision is explained."""
+
+import json
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua import library
+from rtshcua.adapters.mcp_server import desk as desks
+from rtshcua.adapters.mcp_server.desk import Desk, Misused, Signer
+from rtshcua.adapters.mcp_server.flight import Following
+from rtshcua.adapters.mcp_server.missions import Answer, Missions
+from rtshcua.ground.agent.specification import load_specification
+from rtshcua.wire import cose, names
+from rtshcua.wire.binding import bind
+from rtshcua.wire.bundle import policy_digest, policy_payload
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.request import STEP
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
+HIGH = deepcopy(PROPOSAL)
+HIGH["phases"][0]["steps"][0]["arguments"]["altitude"] = "4000 m"
+POLICY = SigningKey.from_seed(bytes([2]) * 32, duty=Duty.POLICY, development=True)
+AGENT = SigningKey.from_seed(bytes([3]) * 32, duty=Duty.MISSION, development=True)
+
+
+#: what a decision on a step says beside the step; of the state, that everything reads 0
+RECORDED = {
+    "_prev": "00" * 32, "at_us": 1_000_000, "utc_us": 2_000_000, "utc_error_us": 0, "valid_until_us": 0,
+    "clause": "told", "clause_at": None, "rule_step": 8, "reason": "a rule", "target": None, "target_link": -1,
+    "link": -1, "mode": "software", "durability": 2, "seq": 7, "type": "decision", "kind": STEP, "step": 0,
+    "outcome": "deny", "context": {
+        "approvals": [], "consumed": 0, "phase": 0, "policy_version": 7, "released_us": 1_000_000,
+        "remaining_us": 60_000, "vehicle": "quad-07",
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def missions() -> Missions:
+    return Missions([CHECKOUT / "policies/bridge_inspection.rts"], str(library.root()))
+
+
+@pytest.fixture
+def handed(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """What was handed to the vehicle, which takes all of it."""
+    found: list[bytes] = []
+
+    def hand_in(socket: Path, document: bytes) -> tuple[str, str]:
+        found.append(document)
+        return "accepted", "it flies"
+
+    monkeypatch.setattr(desks, "hand_in", hand_in)
+    return found
+
+
+@pytest.fixture
+def desk(missions: Missions, tmp_path: Path) -> Desk:
+    payload = policy_payload(missions.policy)
+    envelope = cose.sign1(payload, key=POLICY, duty=Duty.POLICY, content_type=names.POLICY.content_type)
+    following = Following(tmp_path / "none.sock")
+    following.end()
+    signer = Signer(AGENT, envelope, policy_digest(payload), lambda policy, mission: None)
+    return Desk(missions, signer, tmp_path / "none.sock", following)
+
+
+def status(desk: Desk, ticket: str) -> str:
+    """How a proposal stands once the vehicle answered."""
+    until_s = time.monotonic() + 5
+    while desk.mission_status(ticket)["state"] == "submitted" and time.monotonic() < until_s:
+        time.sleep(0.001)
+    return str(desk.mission_status(ticket)["state"])
+
+
+def test_each_of_two_checks_at_a_time_is_of_its_own_mission(
+    missions: Missions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second was read in the place of the first, which was then signed for it."""
+    others: list[Answer | None] = []
+
+    def load_late(*about: Any) -> Any:
+        if not others:
+            others.append(None)
+            others[0] = missions.check(PROPOSAL, 1_000_000)
+        return load_specification(*about)
+
+    monkeypatch.setattr("rtshcua.adapters.mcp_server.missions.load_specification", load_late)
+    assert not missions.check(HIGH, 1_000_000).accepted
+    assert others[0] is not None
+    assert others[0].accepted
+
+
+def test_two_calls_with_one_key_are_one_proposal(desk: Desk, handed: list[bytes]) -> None:
+    begin = threading.Barrier(2)
+
+    def propose(_: int) -> Any:
+        begin.wait()
+        return desk.propose_mission(PROPOSAL, "one")
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(propose, range(2))
+    assert first["ticket"] == second["ticket"]
+    assert status(desk, first["ticket"]) == "admitted"
+    assert len(handed) == 1
+
+
+def test_proposals_are_bounded(desk: Desk, handed: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(desks, "MOST_TICKETS", 1)
+    assert desk.propose_mission(PROPOSAL, "one")["accepted"]
+    with pytest.raises(Misused) as misused:
+        desk.propose_mission(PROPOSAL, "two")
+    assert misused.value.code == "too-many"
+    assert desk.propose_mission(PROPOSAL, "one")["accepted"], "what is known is answered as before"
+
+
+def test_a_decision_is_explained_by_the_mission_that_it_is_of_alone(
+    desk: Desk, handed: list[bytes], missions: Missions
+) -> None:
+    assert status(desk, desk.propose_mission(PROPOSAL, "one")["ticket"]) == "admitted"
+    other = missions.check(PROPOSAL, 1_000_000).mission  # issued at another time
+    assert other is not None
+    ((_, mission),) = desk._admitted
+    slots = 1 + max(slot for each in missions.policy.signals for slot in each.slots)
+    for flown, explained in ((mission, True), (other, False)):
+        step = bind(flown, desk._signer.digest, after=b"what it replaced").invocations[0]
+        named = {"invocation": step.invocation_id.hex(), "binding": step.binding.hex()}
+        desk.following.records.clear()
+        desk.following.records.append(
+            RECORDED
+            | named
+            | {"utc_us": mission.issued_at_us + 1, "state": {"values": [0] * slots, "ages": [0] * slots}}
+        )
+        told = desk.explain_decision()
+        assert told["seq"] == 7
+        assert ("limit" in told) is explained
+        if explained:
+            assert [each["name"] for each in told["untrusted"]["observed"]] == ["landed"]
+            assert told["nearest"], "it says what would have passed"

@@ -62,7 +62,7 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "landing-by-word": (of("px4", at(12, faults.MessageSilence(0, "GPS_RAW_INT"))), "untrue"),
     "mode-not-asked": (of("px4", at(17.6, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
     "denied-trusts-step": (of("px4", battery=8_000), "chain"),
-    "crash-ignored": (of("px4", at(12, faults.Kill(0))), "untrue"),
+    "crash-ignored": (of("ardupilot", at(12, faults.Kill(0))), "went-on"),
     "judged-before-fresh": (of("px4", at(12, faults.LinkSilence(0, 4 * S))), "chain"),
 }  # fmt: skip
 #: of which so many are flown at each `make test`

@@ -227,7 +227,13 @@ def _own_fallback(of: Any) -> Any:
 
 
 def _crash_is_nothing(of: Any) -> Any:
-    return lambda self, now, event: None if isinstance(event, Crashed) else of(self, now, event)
+    def ended(self: Any, now: Any, event: Any) -> None:
+        if isinstance(event, Crashed):
+            self._journal.effect(now, "crashed", detail=event.how)
+        else:
+            of(self, now, event)
+
+    return ended
 
 
 def _true(_: Any) -> Any:

@@ -65,6 +65,7 @@ class Agents:
         self._greeted: tuple[bytes, bytes] | None = None
         self._switch_s = sys.getswitchinterval()
         self._notes: list[str] = []
+        self._left: Sequence[Event] = ()
         self._sockets: list[_Door] = []
         numbers = count(1)
         try:
@@ -79,7 +80,8 @@ class Agents:
 
     def events(self, now: Now) -> Sequence[Event]:
         """The documents that came in, large ones after they were looked at ahead."""
-        found: list[Event] = []
+        found: list[Event] = [*self._left]
+        self._left = ()
         for door in self._sockets:
             event = door.socket.poll(now.monotonic_us)
             if event is not None:
@@ -98,9 +100,11 @@ class Agents:
             self._notes.append(ALIKE)
         return found
 
-    def fly(self, loaded: Loaded) -> None:
-        """What waited has a bundle that flies: its mission is told, and what comes in is for that flight."""
-        self._loaded, self._waits, self._greeted = loaded, False, None
+    def fly(self, loaded: Loaded, left: Sequence[Event] = ()) -> None:
+        """What waited has a bundle that flies: its mission is told, and what comes in is for that flight, first of all
+        what was `left` of what had come in with the bundle.
+        """
+        self._loaded, self._waits, self._greeted, self._left = loaded, False, None, left
         self._told = loaded.bundle.mission_digest
         self.tell(self._mission())
 

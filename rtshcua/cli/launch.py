@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.owed import OwedParameters
-from rtshcua.adapters.files.runs import LOG, RunFolder
+from rtshcua.adapters.files.runs import BUNDLE, LOG, RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
@@ -31,7 +31,7 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
-from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened
+from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, still_flies
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
 from rtshcua.cli.refused import Refused as Refused
@@ -148,7 +148,7 @@ def launch(order: Launch) -> ExitCode:
             transport, agents = None, None
             if order.wait_s is not None:
                 transport, agents = _stand_by(order, loaded, stack)
-                bundle, loaded = _wait(order, loaded, trust, clock, interrupts, slack, transport, agents)
+                bundle, loaded = _wait(order, loaded, trust, past, clock, interrupts, slack, transport, agents)
             loaded.preparation.owes(debts.left)
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
@@ -263,13 +263,13 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 
 
 def _wait(
-    order: Launch, base: Loaded, trusted: Trusted, clock: LinkClock, interrupts: Interrupts, slack: int,
-    transport: Transport, agents: Agents,
+    order: Launch, base: Loaded, trusted: Trusted, past: Past | None, clock: LinkClock, interrupts: Interrupts,
+    slack: int, transport: Transport, agents: Agents,
 ) -> Admitted:  # fmt: skip
-    """Wait, connected, for the bundle that flies. Raises `Refused`."""
+    """Wait, connected, for the bundle that flies; the one of a flight that broke off in the air is not waited for.
+    Raises `Refused`.
+    """
     assert order.wait_s is not None
-    if trusted.distrust is not None:  # that is for what broke off in the air, which nothing here did
-        raise trusted.distrust
     with ExitStack() as stack:
         signing = _sign(order, base, clock)
         stack.callback(signing.close)
@@ -278,6 +278,12 @@ def _wait(
         if driver.shortfall is not None:
             raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
         events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
+        broken_off = None if past is None else _broken_off(order, past, base, trusted, vehicle, clock, events)
+        if broken_off is not None:
+            agents.fly(broken_off.loaded)
+            return broken_off
+        if trusted.distrust is not None:  # what it is not enough for is to fly anything new
+            raise trusted.distrust
         notes = list(signing.notes)
         if order.link is not None:
             note, meanwhile = unqualified(
@@ -293,6 +299,21 @@ def _wait(
             base, admit, vehicle, clock, interrupts, agents,
             most_s=order.wait_s, as_json=order.style == "json", notes=notes,
         ).follow(events)  # fmt: skip
+
+
+def _broken_off(
+    order: Launch, past: Past, base: Loaded, trusted: Trusted, vehicle: ConnectedVehicle, clock: LinkClock,
+    events: list[Event],
+) -> Admitted | None:  # fmt: skip
+    """The bundle of the flight before this run, if that did not end, and the vehicle is in the air still: a restart
+    brings it down, as `run` does that is given the same bundle again. Raises `Refused`, and OSError for a bundle that
+    cannot be read.
+    """
+    if past.broken_off is None or not still_flies(vehicle, clock, events):
+        return None
+    data = read_regular(past.broken_off / BUNDLE, MAX_BUNDLE)
+    loaded = _load(order, data, trusted.root, clock.now(), base.in_force.flight)
+    return None if not_opened(order.state, loaded) is None else Admitted(data, loaded)
 
 
 def _admit(

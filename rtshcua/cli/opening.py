@@ -71,15 +71,20 @@ def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: Lin
         return False
     if opening is Opening.OLD_POLICY:
         raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
-    seen = vehicle.driver.seen
-    until_s = time.monotonic() + AIR_S
-    while not seen.landed_state and time.monotonic() < until_s:
-        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    if seen.airborne or seen.armed:
+    if still_flies(vehicle, clock, events):
         return True
     if unread is not None:
         raise unread
     raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
+
+
+def still_flies(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
+    """Whether the vehicle says, within `AIR_S`, that it is in the air, or armed. `events` get what came meanwhile."""
+    seen = vehicle.driver.seen
+    until_s = time.monotonic() + AIR_S
+    while not seen.landed_state and time.monotonic() < until_s:
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    return bool(seen.airborne or seen.armed)
 
 
 def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -> None:

@@ -34,6 +34,12 @@ class Past:
         """What there is to tell of it; empty where all is as it should be."""
         return self._earlier.note
 
+    @property
+    def broken_off(self) -> Path | None:
+        """The run folder of the flight before, if that did not end its log."""
+        log = self._earlier.broken_off
+        return None if log is None else log.parent
+
     def begin(self, log: Path, *, aloft: bool = False) -> None:
         """The next log was made, and nothing is in it yet; nobody recovers it before `end`. Raises OSError where that
         cannot be kept; not for a vehicle that is `aloft`, which comes down whatever the state folder says.

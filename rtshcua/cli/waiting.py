@@ -106,10 +106,11 @@ class Waiting:
         found = self._agents.events(self._clock.now())
         for text in self._agents.notes():
             say(f"note: {text}")
-        for event in found:
+        for number, event in enumerate(found):
             if isinstance(event, Presented):
                 admitted = self._take(event)
                 if admitted is not None:
+                    self._agents.fly(admitted.loaded, found[number + 1 :])
                     return admitted
         return None
 
@@ -129,7 +130,6 @@ class Waiting:
             self._refusal(outcome.slug, outcome.text)
             return None
         self._agents.answer(event.sender, "accepted", _ADMITTED)
-        self._agents.fly(outcome)
         mission = outcome.bundle.mission.name
         self._tell("admitted", f"`{mission}` was handed in and admitted", mission=mission)
         return Admitted(event.document, outcome)

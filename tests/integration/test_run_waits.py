@@ -11,6 +11,9 @@ import pytest
 from rtshcua.adapters.agent_socket import hand_in
 from virtual import case
 
+#: so slow that a busy machine's hold-ups stay below what a permit lasts
+SPEED = 3
+
 
 @pytest.fixture
 def place() -> Iterator[Path]:
@@ -49,3 +52,28 @@ def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:
     run.signal(signal.SIGINT)
     assert run.end().code == 130, run.stderr
     assert not place.exists()
+
+
+def test_a_flight_that_broke_off_is_brought_down_by_the_wait_that_is_begun_again(
+    ground: Any, place: Path, port: int
+) -> None:
+    """It waited, and the vehicle hung in the air."""
+    ground.vehicle(port, SPEED)
+    words = ("--wait", "--agent-socket", str(place), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
+    base, handed = ground.bundle(), ground.bundle(name="handed")
+    first = ground.run(base, *words, speed=SPEED)
+    first.until("waiting")
+    assert hand_in(place, (ground.folder / handed).read_bytes()).slug == "accepted"
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+
+    second = ground.run(base, *words, speed=SPEED).end()
+    assert second.code == 6, second.stderr
+    assert [event for event in second.events if event["event"] == "resumed"]
+    assert not [event for event in second.events if event["event"] == "dispatched" and event.get("step", -1) >= 0]
+
+    third = ground.run(base, *words, speed=SPEED)
+    third.until("waiting")
+    third.signal(signal.SIGINT)
+    assert third.end().code == 130

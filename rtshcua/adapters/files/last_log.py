@@ -34,12 +34,13 @@ class _Kept(msgspec.Struct):
 
 
 class Earlier(NamedTuple):
-    """The log before the next one: the hash of its last line, None where there is none or it is not known; and what
-    there is to tell of it, empty where all is as it should be.
+    """The log before the next one: the hash of its last line, None where there is none or it is not known; what there
+    is to tell of it, empty where all is as it should be; and where it lies, if its flight had not ended it.
     """
 
     last: str | None
     note: str = ""
+    broken_off: Path | None = None
 
 
 class LastLog:
@@ -60,9 +61,11 @@ class LastLog:
             return Earlier(known.last)
         log = Path(known.log)
         try:
-            return _told(log, known.before, recover(log))
+            return _told(log, known.before, recover(log))._replace(broken_off=log)
         except (OSError, InUse) as error:
-            return Earlier(None, f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}")
+            living = isinstance(error, InUse)  # its run flies on, and broke off nowhere
+            text = f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}"
+            return Earlier(None, text, None if living else log)
 
     def begin(self, log: Path, before: str | None) -> None:
         """A log was made that will name `before`. Raises OSError."""

@@ -25,7 +25,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Event, Readings
+from rtshcua.onboard.ports import Event, Presented, Readings
 
 BUNDLE = b"the bundle of a test"
 
@@ -141,6 +141,17 @@ def test_a_bundle_that_is_admitted_flies_as_the_flight_that_was_told_of(
     told = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
     assert [each["event"] for each in told if each["event"] != "vehicle"] == ["note", "waiting", "admitted"]
     assert world.vehicle.announced == [waiting.ANNOUNCED]
+
+
+def test_what_comes_in_with_the_bundle_that_flies_is_for_the_flight(
+    begin: Callable[..., World], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was dropped, a recall too, and never answered."""
+    world = begin()
+    beside: list[Event] = [Presented(0, BUNDLE, 1), Presented(0, recall(world.base), 2)]
+    monkeypatch.setattr(world.agents, "events", lambda now: [beside.pop(0) for _ in beside[:]])
+    assert world.end() == Admitted(BUNDLE, world.flies)
+    assert [cast("Presented", event).sender for event in Agents.events(world.agents, Clock().now())] == [2]
 
 
 def test_what_is_no_bundle_to_be_trusted_changes_nothing(

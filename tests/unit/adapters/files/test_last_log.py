@@ -46,13 +46,13 @@ def test_a_log_that_broke_off_is_recovered(last: LastLog, tmp_path: Path, more: 
     assert earlier.last == recover(path, signer(Random(2))).last
     assert told in earlier.note
     assert unverified(path, lines, len(lines)) == ""
-    assert last.settle(mend) == Earlier(earlier.last)
+    assert last.settle(mend) == Earlier(earlier.last, broken_off=path)
 
 
 def test_a_log_that_never_began_is_passed_over(last: LastLog, tmp_path: Path) -> None:
     (tmp_path / "log.jsonl").write_bytes(b'{"_prev":"000')
     last.begin(tmp_path / "log.jsonl", "cd" * 32)
-    assert last.settle(mend) == Earlier("cd" * 32)
+    assert last.settle(mend) == Earlier("cd" * 32, broken_off=tmp_path / "log.jsonl")
 
 
 def test_a_log_that_was_tampered_with_is_told_and_named_as_far_as_it_goes(last: LastLog, tmp_path: Path) -> None:
@@ -68,6 +68,7 @@ def test_a_log_that_is_not_there_any_more_is_told(last: LastLog, tmp_path: Path)
     last.begin(tmp_path / "gone", "cd" * 32)
     earlier = last.settle(mend)
     assert earlier.last is None
+    assert earlier.broken_off == tmp_path / "gone"
     assert earlier.note.endswith("nor can it be: no such file or directory")
 
 
@@ -76,7 +77,9 @@ def test_a_log_that_is_still_written_is_told(last: LastLog, tmp_path: Path) -> N
         raise InUse(f"`{path.name}` is still being written")
 
     last.begin(tmp_path / "log.jsonl", None)
-    assert last.settle(busy).note.endswith("`log.jsonl` is still being written")
+    earlier = last.settle(busy)
+    assert earlier.note.endswith("`log.jsonl` is still being written")
+    assert earlier.broken_off is None
 
 
 @pytest.mark.parametrize(

@@ -135,8 +135,7 @@ def launch(order: Launch) -> ExitCode:
     clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
     utc = _utc(order, clock)
     trust, log_key, loaded = _trusting(order, bundle, clock)
-    root, signed_root = trust.root, trust.signed
-    witnesses = Witnessing(order.witnesses, root.witnesses(loaded.vehicle, clock.now().utc_us))
+    witnesses = Witnessing(order.witnesses, trust.root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
@@ -148,7 +147,10 @@ def launch(order: Launch) -> ExitCode:
             transport, agents = None, None
             if order.wait_s is not None:
                 transport, agents = _stand_by(order, loaded, stack)
-                bundle, loaded = _wait(order, loaded, trust, past, clock, interrupts, slack, transport, agents)
+                (bundle, loaded), trust = _wait(
+                    order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents
+                )
+            root, signed_root = trust.root, trust.signed
             loaded.preparation.owes(debts.left)
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
@@ -263,11 +265,11 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 
 
 def _wait(
-    order: Launch, base: Loaded, trusted: Trusted, past: Past | None, clock: LinkClock, interrupts: Interrupts,
-    slack: int, transport: Transport, agents: Agents,
-) -> Admitted:  # fmt: skip
-    """Wait, connected, for the bundle that flies; the one of a flight that broke off in the air is not waited for.
-    Raises `Refused`.
+    order: Launch, base: Loaded, trusted: Trusted, log_key: SigningKey, past: Past | None, clock: LinkClock,
+    interrupts: Interrupts, slack: int, transport: Transport, agents: Agents,
+) -> tuple[Admitted, Trusted]:  # fmt: skip
+    """Wait, connected, for the bundle that flies, and under what it is trusted; the one of a flight that broke off in
+    the air is not waited for. Raises `Refused`.
     """
     assert order.wait_s is not None
     with ExitStack() as stack:
@@ -278,9 +280,9 @@ def _wait(
         if driver.shortfall is not None:
             raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
         events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
-        broken_off = None if past is None else _broken_off(order, past, base, trusted, vehicle, clock, events)
+        broken_off = None if past is None else _broken_off(order, past, base, vehicle, clock, events)
         if broken_off is not None:
-            agents.fly(broken_off.loaded)
+            agents.fly(broken_off[0].loaded)
             return broken_off
         if trusted.distrust is not None:  # what it is not enough for is to fly anything new
             raise trusted.distrust
@@ -293,31 +295,31 @@ def _wait(
             notes += [note] if note is not None else []
 
         def admit(data: bytes) -> Loaded | Refusal:
-            return _admit(order, data, base, trusted, signing, clock)
+            return _admit(order, data, base, trusted, log_key, signing, clock)
 
-        return Waiting(
+        waiting = Waiting(
             base, admit, vehicle, clock, interrupts, agents,
             most_s=order.wait_s, as_json=order.style == "json", notes=notes,
-        ).follow(events)  # fmt: skip
+        )  # fmt: skip
+        return waiting.follow(events), trusted
 
 
 def _broken_off(
-    order: Launch, past: Past, base: Loaded, trusted: Trusted, vehicle: ConnectedVehicle, clock: LinkClock,
-    events: list[Event],
-) -> Admitted | None:  # fmt: skip
-    """The bundle of the flight before this run, if that did not end, and the vehicle is in the air still: a restart
-    brings it down, as `run` does that is given the same bundle again. Raises `Refused`, and OSError for a bundle that
-    cannot be read.
+    order: Launch, past: Past, base: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]
+) -> tuple[Admitted, Trusted] | None:
+    """The bundle of the flight before this run, and under what it is trusted, if that did not end, and the vehicle is
+    in the air still: a restart brings it down, as `run` does that is given the same bundle again. Raises `Refused`, and
+    OSError for a bundle that cannot be read.
     """
     if past.broken_off is None or not still_flies(vehicle, clock, events):
         return None
     data = read_regular(past.broken_off / BUNDLE, MAX_BUNDLE)
-    loaded = _load(order, data, trusted.root, clock.now(), base.in_force.flight)
-    return None if not_opened(order.state, loaded) is None else Admitted(data, loaded)
+    trusted, _, loaded = _trusting(replace(order, wait_s=None), data, clock, base.in_force.flight)
+    return None if not_opened(order.state, loaded) is None else (Admitted(data, loaded), trusted)
 
 
 def _admit(
-    order: Launch, data: bytes, base: Loaded, trusted: Trusted, signing: Signing, clock: LinkClock
+    order: Launch, data: bytes, base: Loaded, trusted: Trusted, log_key: SigningKey, signing: Signing, clock: LinkClock
 ) -> Loaded | Refusal:
     """What `run` asks of a bundle before it connects, of one that was handed in; and that its policy is the one that is
     waited under. It flies as the flight that the sockets tell of.
@@ -331,6 +333,7 @@ def _admit(
             )
             return Refusal("other-policy", text, "the policy's envelope is that of the bundle that is waited with")
         _expect_current(_lapsed(data, trusted.signed, loaded, clock), resumed=False)
+        _expect_log_key_speaks(log_key, trusted.root, loaded, clock.now())
         _hear(order, loaded, signing)
     except Refused as refused:
         return Refusal(refused.slug, str(refused), refused.help or "")
@@ -370,8 +373,11 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, SigningKey, Loaded]:
-    """The trust root that counts, the key that will sign the log, and the bundle under that root. Raises `Refused`.
+def _trusting(
+    order: Launch, bundle: bytes, clock: LinkClock, flight: bytes | None = None
+) -> tuple[Trusted, SigningKey, Loaded]:
+    """The trust root that counts, the key that will sign the log, and the bundle under that root, as a flight of this
+    id, or else of a new one. Raises `Refused`.
 
     Where the root does not follow from the one that was accepted last, or has expired, or a key of the bundle or the
     log has, or is revoked, a run of this bundle may still have broken off in the air: then it is brought down under the
@@ -381,13 +387,13 @@ def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, 
     try:
         trusted = trust(order.roots, order.data, order.state, _vehicle(order, bundle), now_us)
         key = unlock(KeyStore(order.data), Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
-        loaded = _loading(order, bundle, trusted, key, clock)
+        loaded = _loading(order, bundle, trusted, key, clock, flight)
     except Untrusted as error:
         raise Refused(code_of(error.slug), *untrusted(error)) from None
     except Refused as refused:
         for each in trusted.before(refused):
             with suppress(Refused):
-                trusted, loaded = each, _loading(order, bundle, each, key, clock)
+                trusted, loaded = each, _loading(order, bundle, each, key, clock, flight)
                 break
         else:
             trusted.expect()
@@ -397,23 +403,32 @@ def _trusting(order: Launch, bundle: bytes, clock: LinkClock) -> tuple[Trusted, 
     return trusted, key, loaded
 
 
-def _loading(order: Launch, bundle: bytes, trusted: Trusted, key: SigningKey, clock: LinkClock) -> Loaded:
+def _loading(
+    order: Launch, bundle: bytes, trusted: Trusted, key: SigningKey, clock: LinkClock, flight: bytes | None
+) -> Loaded:
     """The bundle under a root; under one that is not to be trusted any more, whatever has expired since."""
     now = clock.now()
     if trusted.distrust is not None:
         now = Now(now.monotonic_us, 0, now.utc_error_us)
     _expect_log_key(key, trusted.root)
-    loaded = _load(order, bundle, trusted.root, now)
-    refusal = key_refusal(trusted.root.keys_for(Duty.LOG)[key.kid], vehicle=loaded.vehicle, now_us=now.utc_us)
+    loaded = _load(order, bundle, trusted.root, now, flight)
+    _expect_log_key_speaks(key, trusted.root, loaded, now)
+    return loaded
+
+
+def _expect_log_key_speaks(key: SigningKey, root: TrustRoot, loaded: Loaded, now: Now) -> None:
+    """Raises `Refused` for a log key that may not speak for the vehicle at that moment."""
+    refusal = key_refusal(root.keys_for(Duty.LOG)[key.kid], vehicle=loaded.vehicle, now_us=now.utc_us)
     if refusal is not None:
         text = f"the log key {key.kid.hex()} may not speak for `{loaded.vehicle}` now: nobody could verify the log"
         raise Refused(
             code_of(refusal), refusal, text, "`--log-key` gives one that may; `rtshcua keys replace` makes it"
         )
-    return loaded
 
 
 def _may_have_flown(order: Launch, loaded: Loaded) -> bool:
+    if order.wait_s is not None:
+        return True  # another bundle than this one, which is known once the vehicle is met (`_broken_off`)
     try:
         return flown_before(order.state, loaded) is not None
     except OSError:

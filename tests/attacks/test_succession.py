@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace as altered
 from pathlib import Path
+from typing import cast
 
 import pytest
 from msgspec.structs import replace
@@ -272,6 +273,15 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
         trusted.settle(resumed=False)
     with pytest.raises(Refused):
         launch._trusting(order(dry_run=True), bundle, Late())
+
+
+def test_no_bundle_is_admitted_once_the_log_key_has_expired_that_the_wait_began_with(fleet: KeyStore) -> None:
+    expiring(fleet, Duty.LOG)
+    bundle = Path("old.bundle").read_bytes()
+    trusted, key, base = launch._trusting(order(), bundle, SystemClock())
+    refusal = launch._admit(order(), bundle, base, trusted, key, cast("Signing", None), Late())
+    assert isinstance(refusal, Refusal)
+    assert (refusal.slug, "the log key" in refusal.text) == ("key-expired", True)
 
 
 @pytest.mark.parametrize("named", [False, True])

@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import hand_in
+from rtshcua.adapters.files.roots import opened
+from rtshcua.wire.keys import Duty
 from virtual import case
 
 #: so slow that a busy machine's hold-ups stay below what a permit lasts
@@ -57,7 +60,7 @@ def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:
 def test_a_flight_that_broke_off_is_brought_down_by_the_wait_that_is_begun_again(
     ground: Any, place: Path, port: int
 ) -> None:
-    """It waited, and the vehicle hung in the air."""
+    """It waited, and the vehicle hung in the air. It comes down whatever has expired since."""
     ground.vehicle(port, SPEED)
     words = ("--wait", "--agent-socket", str(place), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
     base, handed = ground.bundle(), ground.bundle(name="handed")
@@ -67,13 +70,13 @@ def test_a_flight_that_broke_off_is_brought_down_by_the_wait_that_is_begun_again
     first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)
     assert first.process.wait() == -signal.SIGKILL
+    store, root = ground.store, opened(ground.store.root())
+    store.root_path.write_bytes(replace(root, expires_at_us=root.issued_at_us + 1).sign(store.signing_key(Duty.ROOT)))
 
     second = ground.run(base, *words, speed=SPEED).end()
     assert second.code == 6, second.stderr
     assert [event for event in second.events if event["event"] == "resumed"]
     assert not [event for event in second.events if event["event"] == "dispatched" and event.get("step", -1) >= 0]
 
-    third = ground.run(base, *words, speed=SPEED)
-    third.until("waiting")
-    third.signal(signal.SIGINT)
-    assert third.end().code == 130
+    third = ground.run(base, *words, speed=SPEED).end()
+    assert third.code == 4, "an expired root is enough to come down, and no more"

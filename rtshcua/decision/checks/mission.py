@@ -8,6 +8,7 @@ from rtshcua.decision.checks.zones import place
 from rtshcua.decision.contracts import cells, first_cell
 from rtshcua.decision.tree import scope_of
 from rtshcua.decision.values import TRUE
+from rtshcua.decision.volume import HOME
 from rtshcua.decision.zones import NO_BOX, PreparedZone
 from rtshcua.model.flat.contract import PLACE, ZONE, Contract, MotionKind, SourceKind
 from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PATH, MAX_PHASES, MAX_SPEED, MAX_VALUE
@@ -97,6 +98,6 @@ def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...], dec
             cell = first_cell(contract, PLACE)
             return plan.path == arguments[cell : cell + 2]
         case MotionKind.HOME:
-            return plan.path in ((), (0, 0))
+            return plan.path == HOME
         case _:
             return not plan.path

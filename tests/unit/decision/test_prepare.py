@@ -330,6 +330,14 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
         replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=(0, 1))),
         "plan: the path does not fit the arguments",
     ),
+    (
+        replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=())),  # a return leads home
+        "plan: the path does not fit the arguments",
+    ),
+    (
+        replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=(0, 0, 0, 0))),
+        "plan: the path does not fit the arguments",
+    ),
 ]
 
 

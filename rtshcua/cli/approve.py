@@ -2,7 +2,7 @@
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -26,15 +26,20 @@ from rtshcua.cli.documents import (
 )
 from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
+from rtshcua.cli.subject import prepared
 from rtshcua.cli.unlock import terminal, unlock_person
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.compiler.surveyed import Planned, planned_otherwise
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
+
+OTHER: Final = "other-path"
+AGREE: Final = "`--refuse` says no; `--other-path` agrees to it; ask who signed it, or compile the mission again"
 
 
 @app.command()
@@ -55,13 +60,17 @@ def approve(
     person: Person = None,
     approval_key: ApprovalKey = None,
     passphrase_file: PassphraseFile = None,
+    other_path: Annotated[
+        bool, typer.Option("--other-path", help="agree also to a path that is not the planner's for what is asked")
+    ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="sign without asking, at a terminal too; for scripts")] = False,
     as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Answer the `confirm` rules that ask you about one step of one mission: yes, or no.
 
     What you answer is told first, from the step's skill and arguments, each zone with its size and its way from home;
-    at a terminal you are then asked whether to sign it. Without a terminal it is told and signed.
+    at a terminal you are then asked whether to sign it. Without a terminal it is told and signed. A path in a zone is
+    worked out again from zone and arguments: where another one is to be flown, a yes takes `--other-path`.
 
     The bundle is verified first, so that you sign what it says. The answer is good for that step of that mission alone,
     on its vehicle, and for a bounded time; a step that flies already is not recalled by it.
@@ -93,8 +102,16 @@ def approve(
             issued_at_us=now_us,
             expires_at_us=now_us + seconds * 1_000_000,
         )
+        if isinstance(sound := prepared(flying.policy, flying.mission), ExitCode):
+            return sound
         told = words.step(flying.policy, steps[step])
         say(f"step {step} of `{flying.mission.name}` on `{said.vehicle}`: `{told}`")
+        planned = planned_otherwise(flying.policy, steps[step])
+        if planned is not None:
+            told += ", a path that is not the planner's"
+            say(f"who signed the mission chose another path than the planner does: {_other(planned)}")
+            if not refused and not other_path:
+                return fail(ExitCode.REFUSED, "nothing was signed: the path is not the planner's", AGREE, slug=OTHER)
         question = visible(f"sign that {_answer(refused)} as {role}?")
         if not yes and terminal() and not typer.confirm(question, err=True):
             return fail(ExitCode.REFUSED, "nothing was signed", slug="not-signed")
@@ -105,6 +122,13 @@ def approve(
         return refuse(untrusted(error))
     what = f"{'refused' if refused else 'approved'} as {role} for {seconds} s: step {step}, `{told}`"
     return deliver(document, what, to=to, output=output, as_json=as_json)
+
+
+def _other(planned: Planned) -> str:
+    if not planned.points:
+        return "it finds none there"
+    apart = f"the two are up to {words.length(planned.apart)} apart"
+    return f"its has {planned.points} points, {words.length(planned.length)} in all, and {apart}"
 
 
 def _answer(refused: bool) -> str:

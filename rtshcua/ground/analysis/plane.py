@@ -1,13 +1,13 @@
 """How the zones of a policy lie in the plane, and places that show it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import accumulate
 from math import isqrt
 from typing import Protocol
 
+from rtshcua.decision.outline import rings as outline
 from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.compiler.shapes import Disc, Point, Region, Ring, bounds, cornered
-from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
+from rtshcua.ground.compiler.shapes import Point, Region, Ring, bounds, shape_of
+from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE, Zone
 
 #: how finely a zone is searched for a place before shapely is asked
 _GRID = 8
@@ -119,22 +119,13 @@ def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iter
 
 def _region(zone: Zone) -> Region | None:
     """The ground plan of a zone for the exact relations; None for a circle whose radius is no whole number."""
-    if zone.shape == CIRCLE:
-        x, y, square = zone.data
-        radius = isqrt(square)
-        return Region(Disc((x, y), radius), LOWEST, HIGHEST) if radius * radius == square else None
-    return Region(cornered(rings_of(zone)), LOWEST, HIGHEST)
+    shape = shape_of(zone)
+    return None if shape is None else Region(shape, LOWEST, HIGHEST)
 
 
 def rings_of(zone: Zone) -> tuple[Ring, ...]:
     """The rings of a zone that is no circle."""
-    counts: tuple[int, ...] = (len(zone.data) // 2,)
-    flat = zone.data
-    if zone.shape == AREA:
-        counts, flat = zone.data[1 : 1 + zone.data[0]], zone.data[1 + zone.data[0] :]
-    corners = list(zip(flat[::2], flat[1::2], strict=True))
-    ends = list(accumulate(counts))
-    return tuple(tuple(corners[end - count : end]) for count, end in zip(counts, ends, strict=True))
+    return tuple(outline(zone))
 
 
 def _bounds(zone: Zone) -> tuple[int, int, int, int]:

@@ -6,7 +6,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.ground.compiler.shapes import Area, parts
-from rtshcua.ground.compiler.survey import survey
+from rtshcua.ground.compiler.survey import DEFAULT_PATTERN, survey
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import MAX_PATH
 from rtshcua.model.flat.mission import Plan
@@ -14,7 +14,6 @@ from rtshcua.model.ir.missions import Step
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import SkillDecl
 
-DEFAULT_PATTERN = "grid"
 HOME = (0, 0)
 
 

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isqrt
 
+from rtshcua.decision.outline import rings as outline
 from rtshcua.ground.checker.polygons import contained, doubled_area
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 
@@ -87,6 +89,15 @@ def _flat(shape: Shape) -> tuple[int, tuple[int, ...]]:
     if isinstance(shape, Outline):
         return POLYGON, coordinates
     return AREA, (len(shape.rings), *map(len, shape.rings), *coordinates)
+
+
+def shape_of(zone: Zone) -> Shape | None:
+    """The shape of a zone as it is carried on board; None for a circle whose radius is no whole number of mm."""
+    if zone.shape != CIRCLE:
+        return cornered(tuple(outline(zone)))
+    x, y, square = zone.data
+    radius = isqrt(square)
+    return Disc((x, y), radius) if radius * radius == square else None
 
 
 def cornered(rings: tuple[Ring, ...]) -> Cornered:

@@ -18,6 +18,7 @@ from rtshcua.ground.compiler.ways import Met, Rings, length, numbered, part, sid
 LEAST_SPACING = 5_000  # mm
 LEAST_INSET = 1_000  # mm
 MOST_LINES = 256
+DEFAULT_PATTERN = "grid"
 
 #: corners of a regular 16-gon on a circle of radius 2**20, counter-clockwise from east
 CIRCLE_SCALE = 1 << 20
@@ -43,7 +44,7 @@ def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | N
         if len(found) > 1:
             return None
         rings = (found[0][0], *found[0][1])
-    points = _PATTERNS[pattern](rings, max(spacing, LEAST_SPACING))
+    points = PATTERNS[pattern](rings, max(spacing, LEAST_SPACING))
     if points is not None and start is not None and length(points[-1], start) < length(points[0], start):
         points.reverse()
     return None if points is None else tuple(points)
@@ -137,7 +138,7 @@ def _distinct(points: Sequence[Point]) -> list[Point]:
     return [point for number, point in enumerate(points) if number == 0 or points[number - 1] != point]
 
 
-_PATTERNS: Mapping[str, Callable[[Rings, int], list[Point] | None]] = {
+PATTERNS: Mapping[str, Callable[[Rings, int], list[Point] | None]] = {
     "grid": _grid,
     "perimeter": _perimeter,
     "orbit": _orbit,

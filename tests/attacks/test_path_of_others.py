@@ -1,0 +1,117 @@
+"""Threat: who holds a mission key signs another path in the zone than skill and arguments say, and has it approved."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.app import main
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire import cose, names
+from rtshcua.wire.binding import bind
+from rtshcua.wire.bundle import envelopes, mission_payload, parse, policy_digest, seal_under
+from rtshcua.wire.keys import Duty
+
+LOW = """import "lib:policies/bridge_inspection.rts"
+
+mission low under bridge_inspection@7 on quad {
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 9 m) }
+  phase inspection {
+    goto(bridge_a.entry, altitude = 9 m)
+    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)
+  }
+  phase recovery { return_home() }
+}
+"""
+APPROVE = ("approve", "low.bundle", "--step", "2", "-o", "yes", "--flight", bytes(16).hex())
+
+Sign = Callable[[Callable[[Invocation, Policy], Invocation]], None]
+
+
+@pytest.fixture
+def sign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Sign:
+    """Signs the mission with its inspection changed, by the agent's own key."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["keys", "init"]) == ExitCode.OK
+    assert main(["keys", "approver", "owner", "--role", "supervisor"]) == ExitCode.OK
+    Path("low.rts").write_text(LOW)
+    assert main(["compile", "low.rts"]) == ExitCode.OK
+    capsys.readouterr()
+
+    def signed(change: Callable[[Invocation, Policy], Invocation]) -> None:
+        envelope, given = envelopes(Path("low.bundle").read_bytes())
+        payload = cose.unverified(envelope).payload
+        policy = parse(names.POLICY, payload, Policy)
+        mission = parse(names.MISSION, cose.unverified(given).payload, Mission)
+        steps = list(mission.invocations)
+        steps[2] = change(steps[2], policy)
+        bound = bind(replace(mission, invocations=tuple(steps)), policy_digest(payload))
+        key = KeyStore(data_folder()).signing_key(Duty.MISSION, whose="agent")
+        Path("low.bundle").write_bytes(seal_under(envelope, mission_payload(bound), mission_key=key))
+
+    return signed
+
+
+def near_the_entry(one: Invocation, _: Policy) -> Invocation:
+    """It stays at one corner, for as long as the step lasts: in the zone, and nothing is inspected."""
+    return replace(one, plan=replace(one.plan, path=one.plan.path[:2] * 40))
+
+
+def test_another_path_is_not_approved_by_a_plain_yes(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+    sign(near_the_entry)
+    for words in ((), ("--yes",)):
+        assert main([*APPROVE, *words]) == ExitCode.REFUSED
+        err = capsys.readouterr().err
+        assert "along 40 points, 0.0 m in all" in err
+        assert "chose another path than the planner does: its has 5 points, " in err
+        assert "--other-path" in err
+    assert main([*APPROVE, "--json"]) == ExitCode.REFUSED
+    assert json.loads(capsys.readouterr().out)["error"]["slug"] == "other-path"
+    assert not Path("yes").exists()
+
+
+@pytest.mark.parametrize("words", ["--refuse", "--other-path"])
+def test_another_path_is_refused_or_agreed_to_in_words_of_its_own(
+    words: str, sign: Sign, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sign(near_the_entry)
+    assert main([*APPROVE, words]) == ExitCode.OK
+    said = capsys.readouterr()
+    assert "chose another path than the planner does" in said.err
+    assert "a path that is not the planner's" in said.out
+    assert Path("yes").exists()
+
+
+def test_the_planners_own_path_is_approved_without_a_word_of_it(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+    sign(lambda one, _: one)
+    assert main([*APPROVE]) == ExitCode.OK
+    said = capsys.readouterr()
+    assert "planner" not in said.out + said.err
+
+
+def test_where_the_planner_finds_none_any_path_is_another(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+    sign(lambda one, _: replace(one, arguments=(*one.arguments[:2], 7, *one.arguments[3:])))
+    assert main([*APPROVE]) == ExitCode.REFUSED
+    assert "it finds none there" in capsys.readouterr().err
+
+
+def unknown_skill(one: Invocation, policy: Policy) -> Invocation:
+    confirmed = next(rule.skills[0] for rule in policy.rules if rule.approver >= 0 and rule.skills)
+    assert confirmed == one.skill
+    return replace(one, arguments=one.arguments[:1])
+
+
+def test_what_the_vehicle_would_refuse_to_load_is_not_approved(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whoever signs what makes no sense gets no traceback out of it, and no yes."""
+    for change in (unknown_skill, lambda one, _: replace(one, plan=replace(one.plan, altitude=50_000))):
+        sign(change)
+        assert main([*APPROVE]) == ExitCode.INPUT
+        assert "would be refused on board" in capsys.readouterr().err
+    assert not Path("yes").exists()

@@ -188,6 +188,7 @@ EMPTY_DELEGATION = _code(
 VERSION_NOT_RAISED = _code("E0716", "version-not-raised", "a policy differs from an earlier one of the same version")
 NO_RESOLVER = _code("E0717", "no-resolver", "a step may be deferred, and nothing can resolve that in time")
 NOT_ALWAYS_PERMITTED = _code("E0718", "not-always-permitted", "a step may come at a time at which it is not permitted")
+DEGRADED = _code("E0719", "degraded", "a rule of the policy flies something else in place of a step")
 DEAD_RULE = _code("E0720", "dead-rule", "a rule can never match", Severity.WARNING)
 SHADOWED_RULE = _code(
     "E0721", "shadowed-rule", "a rule never decides, for another always outweighs it", Severity.WARNING

@@ -1,9 +1,10 @@
-"""E0702 to E0704, E0706: the policy permits each step with the arguments that it has.
+"""E0702 to E0704, E0706, E0719: the policy permits each step with the arguments that it has, and lets it fly.
 
 A permit's clauses over arguments and zones must be true; those over signals, the time and the vehicle's position are
 left for on board.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from rtshcua.decision.authority import authority
@@ -16,6 +17,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.compiler.mission import argument_span
+from rtshcua.ground.compiler.proofs.best import hopeful
 from rtshcua.ground.compiler.proofs.conjuncts import conjuncts
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.flat.contract import SourceKind, TimingClass
@@ -35,11 +37,11 @@ class Unmet(NamedTuple):
 
 
 def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
-    """Whether some state of the vehicle makes a step permitted; reports it where none does."""
+    """Whether in some state of the vehicle a step is permitted and flown; reports it where in none it is."""
     case = ground.case(invocation)
     found = authority(case)
     if PASS in found or not found:
-        return True
+        return not _degraded(ground, step, invocation, case)
     # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
     forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(case.at) & FALSE)
     forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
@@ -48,6 +50,7 @@ def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: Prepared
             codes.FORBIDDEN,
             step.span,
             f"the policy `{ground.prepared.policy.name}` forbids this step",
+            help=_otherwise(ground, invocation, case, forbid),
             labels=[(ground.span(forbid), "by this rule")],
         )
         return False
@@ -59,6 +62,40 @@ def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: Prepared
         case _:
             _out_of_scope(ground, step, invocation, case)
     return False
+
+
+def _degraded(ground: Ground, step: Step, invocation: PreparedInvocation, case: Case) -> bool:
+    """Whether a degrade holds, or is unknown, in every state; reports it."""
+    always = (each.rule for each in invocation.candidates.degrades if not each.condition(case.at) & FALSE)
+    rule = next(always, None)
+    if rule is None or rule.target is None:
+        return False
+    policy = ground.prepared.policy
+    ground.context.report.add(
+        codes.DEGRADED,
+        step.span,
+        f"the policy `{policy.name}` flies `{policy.contracts[rule.target.skill].name}` in place of this step, "
+        "whatever the state",
+        help=_otherwise(ground, invocation, case, rule),
+        labels=[(ground.span(rule), "by this rule")],
+    )
+    return True
+
+
+def _otherwise(ground: Ground, invocation: PreparedInvocation, case: Case, rule: Rule) -> str:
+    """The nearest arguments for which a rule does not hold; where there are none, what else to change."""
+    node = ground.prepared.compiler.when(rule)
+    changes = Changes(case.at, ground.prepared.tables)
+    wanted = None if node is None else changes.find(hopeful(node, False), False)
+    contract, policy = invocation.invocation.contract, ground.prepared.policy
+    offers = [offer(change, contract, policy, case.at) for change in wanted or ()]
+    if not offers or not all(each.change.argument and each.options for each in offers):
+        return "narrow the condition of the rule, or leave the step out"
+    return _accepted({each.subject: "` or `".join(_words(each)) for each in offers})
+
+
+def _accepted(values: Mapping[str, str]) -> str:
+    return "nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in values.items())
 
 
 def _class(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
@@ -118,9 +155,7 @@ def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, ca
         codes.OUT_OF_SCOPE,
         span,
         f"{subject} is outside of what `{ground.prepared.policy.name}` permits for `{flat.contract.name}`",
-        help="nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in accepted.items())
-        if accepted
-        else None,
+        help=_accepted(accepted) if accepted else None,
         labels=[
             *((unmet.span, "this does not hold") for unmet in nearest),
             *(() if default is None else ((default, "the step says nothing, so this default holds"),)),

@@ -1,5 +1,5 @@
-"""E0703, E0704, E0718: a mission's parameters may have values between those that it is checked with, and no step is
-refused for any of them.
+"""E0703, E0704, E0718, E0719: a mission's parameters may have values between those that it is checked with, and no step
+is refused for any of them.
 
 With a value that is refused whatever the time, the step is out of scope, or forbidden. Of one that is refused at times
 only, the same is asked as of every instance: whether the time of issue suits it, or some time would. What the ways of
@@ -61,19 +61,22 @@ def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, line: L
     space = ground.questions.space(invocation.invocation.skill)._replace(
         arguments=line.values, phases=frozenset((invocation.phase,))
     )
-    for witness, forbid in refused(ground, invocation, space, Known.NOTHING, line.given):
+    for witness, rule in refused(ground, invocation, space, Known.NOTHING, line.given):
         policy = ground.prepared.policy
         situation = words(witness, policy, invocation.invocation.contract)
-        rules = [each.rule for each in invocation.candidates.permits] if forbid is None else [forbid]
+        rules = [each.rule for each in invocation.candidates.permits] if rule is None else [rule]
+        label = "this does not permit it" if rule is None else "by this rule"
+        code, said = codes.OUT_OF_SCOPE, f"outside of what `{policy.name}` permits"
+        if rule is not None and rule.target is None:
+            code, said = codes.FORBIDDEN, f"forbidden by `{policy.name}`"
+        elif rule is not None:
+            code, said = codes.DEGRADED, f"not flown: `{policy.name}` flies another skill in its place"
         ground.context.report.add(
-            codes.OUT_OF_SCOPE if forbid is None else codes.FORBIDDEN,
+            code,
             step.span,
-            f"with {situation}, which the mission's parameters allow, this step is "
-            + (f"outside of what `{policy.name}` permits" if forbid is None else f"forbidden by `{policy.name}`"),
+            f"with {situation}, which the mission's parameters allow, this step is {said}",
             help="narrow the range of the mission's parameter",
-            labels=[
-                (ground.span(rule), "this does not permit it" if forbid is None else "by this rule") for rule in rules
-            ],
+            labels=[(ground.span(each), label) for each in rules],
         )
         return True
     return False

@@ -17,6 +17,7 @@ from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.compiler.proofs.hopeful import refusing
 from rtshcua.ground.compiler.proofs.rates import arrives, best, interval, report_intervals
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.timing import approval
@@ -122,8 +123,7 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
 def _forbidden(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
     """Whether a rule that defers while it is unknown must observe longer than the flight up to a step; reports it."""
     at, compiler = ground.case(invocation).at, ground.prepared.compiler
-    candidates = invocation.candidates
-    for rule in (*(each.rule for each in candidates.forbids), *(each.rule for each in candidates.degrades)):
+    for rule in refusing(invocation):
         node = compiler.when(rule)
         window = 0 if node is None else _needed(ground, at, node, False)
         if latest < window < NEVER:

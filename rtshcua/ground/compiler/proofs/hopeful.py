@@ -1,7 +1,8 @@
 """Whether a step can be permitted at all: what only the state of the vehicle decides is taken to go the step's way.
 
 Arguments, the time and the phase are known, or known to be in a set; a permit that no state makes true does not permit,
-a forbid that every state makes true forbids. What is not known of the time (`Known`) is taken to go the step's way too.
+a forbid that every state makes true forbids, and a degrade that every state makes true flies in the step's place. What
+is not known of the time (`Known`) is taken to go the step's way too.
 """
 
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Span
 from rtshcua.decision.zones import NO_BOX
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
@@ -34,7 +35,7 @@ class Known(Enum):
 def refused(
     ground: Ground, invocation: PreparedInvocation, space: Space, known: Known, given: tuple[Goal, ...] = ()
 ) -> Iterator[tuple[Witness, Rule | None]]:
-    """Situations of a space in which a step is surely refused: by a forbid, or (None) for want of a permit.
+    """Situations of a space in which a step is surely refused: by a forbid or degrade, or (None) for want of a permit.
 
     At most one of each, and time between two dates. `given` must hold in them. Where not all of the time is known, the
     places in the space are those of the invocation.
@@ -43,17 +44,23 @@ def refused(
     for span in _between_dates(ground, space.utc) if known is Known.ALL else (None,):
         moments = space if span is None else space._replace(utc=(span,))
         time = Time(known, span, () if span else invocation.invocation.arguments)
-        permits = [_hoped(ground, permit, True, time) for permit in candidates.permits]
+        permits = [_hoped(ground, permit.rule, True, time) for permit in candidates.permits]
         if None not in permits:
             wanting: list[Goal] = [(node, FALSE | UNKNOWN) for node in permits if node is not None]
             answer = satisfiable([*given, *wanting], moments)
             if isinstance(answer, Yes):
                 yield answer.witness, None
-        for forbid in candidates.forbids:
-            node = _hoped(ground, forbid, False, time)
+        for rule in refusing(invocation):
+            node = _hoped(ground, rule, False, time)
             answer = satisfiable([*given, (ALWAYS if node is None else node, TRUE)], moments)
             if isinstance(answer, Yes):
-                yield answer.witness, forbid.rule
+                yield answer.witness, rule
+
+
+def refusing(invocation: PreparedInvocation) -> tuple[Rule, ...]:
+    """The rules that refuse a step where they hold: the forbids, and the degrades that fly something else."""
+    candidates = invocation.candidates
+    return (*(each.rule for each in candidates.forbids), *(each.rule for each in candidates.degrades))
 
 
 class Time(NamedTuple):
@@ -78,10 +85,10 @@ def _between_dates(ground: Ground, utc: tuple[Span, ...]) -> Iterator[Span]:
             yield start, end - 1
 
 
-def _hoped(ground: Ground, rule: PreparedRule, hope: bool, time: Time) -> tree.Node | None:
-    key = (rule.number, hope, time)
+def _hoped(ground: Ground, rule: Rule, hope: bool, time: Time) -> tree.Node | None:
+    key = (() if rule.when is None else rule.when.code, hope, time)
     if key not in ground.hopes:
-        node = ground.prepared.compiler.when(rule.rule)
+        node = ground.prepared.compiler.when(rule)
         ground.hopes[key] = None if node is None else hopeful(_at_time(ground, node, hope, time), hope)
     return ground.hopes[key]
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.words import clock, words
-from rtshcua.ground.compiler.proofs.hopeful import Known, refused
+from rtshcua.ground.compiler.proofs.hopeful import Known, refused, refusing
 from rtshcua.ground.compiler.proofs.line import Line
 from rtshcua.ground.compiler.proofs.period import Period, along
 from rtshcua.ground.compiler.proofs.ruleset import timed
@@ -34,26 +34,28 @@ def prove(
 
 def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, line: Line, window: tuple[int, int]) -> bool:
     flat, zones = invocation.invocation, ground.prepared.policy.zones
-    rules = (each.rule for each in (*invocation.candidates.permits, *invocation.candidates.forbids))
+    rules = (*(each.rule for each in invocation.candidates.permits), *refusing(invocation))
     if not any(rule.when is not None and timed(rule.when.code, zones) for rule in rules):
         return False
     space = ground.questions.space(flat.skill)._replace(
         arguments=line.values, utc=(window,), phases=frozenset((invocation.phase,))
     )
-    for witness, forbid in refused(ground, invocation, space, Known.ALL, line.given):
+    for witness, rule in refused(ground, invocation, space, Known.ALL, line.given):
         offset = ground.prepared.policy.vehicle.utc_offset_us
         at, first, last = (clock(moment, offset) for moment in (witness.at.utc[0][0], *window))
-        told = [each.rule for each in invocation.candidates.permits] if forbid is None else [forbid]
+        told = [each.rule for each in invocation.candidates.permits] if rule is None else [rule]
+        does = "forbids it"
+        if rule is None:
+            does = "does not permit it"
+        elif rule.target is not None:
+            does = "flies another skill in its place"
         moved = f" with {words(witness, ground.prepared.policy, flat.contract)}" if line.moving else ""
         ground.context.report.add(
             codes.NOT_ALWAYS_PERMITTED,
             step.span,
             f"at {at} this step is not permitted{moved}, and it may come from {first} to {last}, local time",
             help="issue the mission at another time, or move the step",
-            labels=[
-                (ground.span(rule), "this does not permit it then" if forbid is None else "this forbids it then")
-                for rule in told
-            ],
+            labels=[(ground.span(each), f"this {does} then") for each in told],
         )
         return True
     return False

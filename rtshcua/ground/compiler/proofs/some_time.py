@@ -13,7 +13,7 @@ from typing import NamedTuple
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.daytime import Arc, Asked, arcs_where, met_by_some
-from rtshcua.ground.compiler.proofs.hopeful import Known, refused
+from rtshcua.ground.compiler.proofs.hopeful import Known, refused, refusing
 from rtshcua.ground.compiler.proofs.line import Line
 from rtshcua.ground.compiler.proofs.period import Period, along, changes
 from rtshcua.ground.compiler.proofs.places import may_be_skipped
@@ -76,7 +76,7 @@ def _failed(
 def _asked(ground: Ground, invocation: PreparedInvocation, line: Line, period: Period) -> Iterator[Asked]:
     """What the rules that read the time of day ask."""
     arguments = invocation.invocation.arguments
-    rules = [each.rule for each in (*invocation.candidates.permits, *invocation.candidates.forbids)]
+    rules = (*(each.rule for each in invocation.candidates.permits), *refusing(invocation))
     read = [(rule, changes(ground, rule.when, arguments)) for rule in rules if rule.when is not None]
     clocked = [rule for rule, (daily, _) in read if daily]
     if clocked:

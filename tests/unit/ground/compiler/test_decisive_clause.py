@@ -1,6 +1,7 @@
-"""E0702 to E0704: which clause refuses a step, where the state of the vehicle decides on others."""
+"""E0702 to E0704, E0719: which clause refuses a step, where the state of the vehicle decides on others."""
 
-from reference.sources import findings, mission, program
+from reference.sources import findings, mission, policy, program
+from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from virtual.rows import rows
 
@@ -35,6 +36,49 @@ def test_what_forbids_in_every_state_is_told_before_what_does_in_some(forbid: st
     found = only("permit takeoff by role operator through agent", forbid, "forbid takeoff by any when altitude > 19 m")
     assert found.code.id == "E0704"
     assert [each.text for each in found.labels] == ["by this rule"]
+
+
+@rows(
+    ("when", "expected", "help"),
+    [
+        ("altitude > 19 m", "E0719", "nearest accepted: `altitude = 19 m`"),
+        ("battery < 20 % or altitude in 15 m .. 30 m", "E0719", "nearest accepted: `altitude = 14999 mm`"),
+        ("battery <= 100 %", "E0719", "narrow the condition of the rule, or leave the step out"),
+        ("battery < 30 % or battery > 20 %", "", None),  # atoms that share a signal are looked at one by one
+        ("battery < 30 %", "", None),
+        ("altitude > 20 m", "", None),
+        ("position inside school", "", None),
+    ],
+)
+def test_a_step_that_a_degrade_always_replaces_is_told(when: str, expected: str, help: str | None) -> None:
+    permit = "permit takeoff by role operator through agent"
+    rules = ["permit return_home, emergency_land by any", permit, f"degrade takeoff when {when} to return_home"]
+    text = "policy rules version 1 {\n" + "\n".join((*rules, "contingency return_home, emergency_land")) + "\n}\n"
+    found = [
+        (each.code.id, each.help, [label.text for label in each.labels])
+        for each in findings(program(text, mission("takeoff(altitude = 20 m)", "return_home()")))
+        if each.code.severity is Severity.ERROR
+    ]
+    assert found == ([(expected, help, ["by this rule"])] if expected else [])
+
+
+@rows(
+    ("when", "expected"),
+    [
+        ("battery < 20 %", []),
+        ("altitude > 30 m", []),
+        ("altitude in 18 m .. 22 m", ["E0719"]),  # neither end of the parameter's range
+        ("local time in 08:00 .. 09:00", []),
+        ("local time in 09:00 .. 08:59", ["E0718"]),  # no time of issue leaves it the minutes that it needs
+    ],
+)
+def test_a_degrade_counts_between_instances_and_at_every_time(when: str, expected: list[str]) -> None:
+    flight = mission("takeoff(altitude = high)", "return_home()").replace(
+        "flight under", "flight(high: altitude in 10 m .. 30 m = 10 m) under"
+    )
+    rules = policy(f"degrade takeoff when {when} to return_home")
+    found = [each.code for each in findings(program(rules, flight)) if each.code.severity is Severity.ERROR]
+    assert [each.id for each in found] == expected
 
 
 @rows(

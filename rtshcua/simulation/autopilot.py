@@ -96,6 +96,8 @@ class Flavour(ABC):
     """Whether STATUSTEXT is sent only once a ground station's heartbeat was seen."""
     check_text: str
     """How a text begins that says what stands against arming, when only asked."""
+    falls_back: bool
+    """Whether a switch that asks for Position without a position gets Altitude, and is not refused."""
     beats_on_mode: bool
     """Whether another mode is told by a heartbeat at once."""
     reminds: bool

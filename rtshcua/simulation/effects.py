@@ -12,7 +12,7 @@ from random import Random
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Way
+from rtshcua.model.faults import Fault, Mode, Way
 from rtshcua.simulation.autopilot import Autopilot, Taker
 from rtshcua.simulation.command import Command
 from rtshcua.simulation.faults import message_number
@@ -165,7 +165,7 @@ def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
     match fault:
         case faults.PilotMode(at_us, mode):
             if mode in a.flavour.modes.numbers:  # the switch has no position for another flavour's mode
-                yield at_us, partial(a.vehicle.set_mode, mode)
+                yield at_us, partial(_choose, a, mode)
         case faults.PilotPause(at_us):
             yield at_us, partial(_pause, a)
         case faults.PilotGoto(at_us, north_mm, east_mm, up_mm):
@@ -177,6 +177,15 @@ def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
             yield at_us, a.vehicle.disarm
         case _:
             raise _unknown(fault)
+
+
+def _choose(a: Autopilot, mode: Mode) -> None:
+    """A switch of the remote control asks for a mode as a ground station does, and is refused as that is. Only PX4
+    enters Altitude where it is asked for Position and has none (`UserModeIntention::change`, `allow_fallback`).
+    """
+    if mode is Mode.POSITION and a.flavour.falls_back and not a.can_enter(mode):
+        mode = Mode.ALTITUDE
+    a.flavour.on_set_mode(a, a.flavour.modes.numbers[mode])
 
 
 def _pause(a: Autopilot) -> None:

@@ -183,6 +183,7 @@ class ArduCopter(Flavour):
     )
     texts_need_ground_station = False
     check_text = "PreArm"
+    falls_back = False
     beats_on_mode = reminds = tells_fence = True
     fix = mavlink.GPS_FIX_TYPE_RTK_FIXED
     coast_s = 7.0

@@ -154,6 +154,7 @@ class Px4(Flavour):
     )
     texts_need_ground_station = True
     check_text = "Preflight Fail"
+    falls_back = True
     beats_on_mode = reminds = tells_fence = False
     fix = mavlink.GPS_FIX_TYPE_3D_FIX
     coast_s = 5.0

@@ -53,6 +53,23 @@ def test_a_pilot_without_effect_does_not(pilot: Callable[..., Any], flavour: str
     assert taken(p, kind, *args) == (None, None)
 
 
+def test_a_switch_to_a_mode_that_cannot_fly_now_is_refused(pilot: Callable[..., Any]) -> None:
+    """PX4's `UserModeIntention::change`: Offboard without targets was entered for a moment, and Hold anew."""
+    p = on_its_way(pilot, "px4")
+    assert taken(p, faults.PilotMode, Mode.GUIDED) == (None, None)
+    assert p.truth.mode is Mode.LOITER
+
+
+def test_a_switch_to_position_without_one_gets_altitude_from_px4_alone(pilot: Callable[..., Any], flavour: str) -> None:
+    p = on_its_way(pilot, flavour)
+    p.simulation.inject(faults.EstimatorUnhealthy(p.simulation.now_us))
+    p.wait(2)
+    before = p.truth.mode
+    p.simulation.inject(faults.PilotMode(p.simulation.now_us, Mode.POSITION))
+    p.wait(0.1)
+    assert p.truth.mode is (Mode.ALTITUDE if p.px4 else before)
+
+
 def test_sticks_take_px4_over(pilot: Callable[..., Any]) -> None:
     assert taken(on_its_way(pilot, "px4"), faults.PilotSticks)[1] is Taker.PILOT
 

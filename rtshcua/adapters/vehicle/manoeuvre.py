@@ -379,12 +379,13 @@ class Manoeuvre:
         return self._commander.accepted if stage.done is None else stage.done(seen)
 
     def _has_held(self, seen: ObservedVehicle) -> bool:
-        """Whether a vehicle that came to stand has done so for the time of a HOLD."""
+        """Whether a vehicle that came to stand has done so for the time of a HOLD, and stands still now."""
         if self._command.kind != MotionKind.HOLD:
             return True
         if self._held_us is None:
             self._held_us = seen.up_us
-        return bool(self._command.hold_us) and seen.up_us - self._held_us >= self._command.hold_us
+        over = bool(self._command.hold_us) and seen.up_us - self._held_us >= self._command.hold_us
+        return over and still(seen)
 
     def _left_its_place(self, seen: ObservedVehicle) -> str | None:
         """Why a vehicle that came to stand for a HOLD does not hold, as a slug."""

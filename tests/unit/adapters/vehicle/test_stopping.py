@@ -111,6 +111,22 @@ def test_a_hold_that_does_not_stop_has_failed(aloft: Make, monkeypatch: pytest.M
     assert failed.at_us - begun < 8 * S, "it declares no brakes: by the cautious guess"
 
 
+def test_a_hold_that_is_blown_along_when_its_time_is_over_has_not_succeeded_yet(
+    aloft: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A campaign found it: a gust that it could not stand against began while it held, and it had held all the same."""
+    one = aloft()
+    one.begin(MotionKind.HOLD, hold_us=3 * S)
+    one.wait(2.5)
+    vehicle = one.vehicle.simulation._autopilot.vehicle
+    with monkeypatch.context() as blown:
+        blown.setattr(type(vehicle), "_fly", lambda self, dt, *_: self.body._move(dt, 0.0, 0.0))
+        vehicle.body.v_north = 3.0
+        ends = [event for event in one.wait(3) if isinstance(event, (Succeeded, Failed, TakenOver))]
+    assert ends == []
+    assert isinstance(one.until((Succeeded, Failed), 15), Succeeded), "it stands again, near where it stood"
+
+
 def test_a_hold_that_drifts_away_has_failed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     one = aloft()
     one.begin(MotionKind.HOLD)

@@ -75,7 +75,10 @@ class InForce:
         self._received_us: tuple[int, ...] = (received_us,) * len(invocations)
         #: the last replacements that were considered, by their bytes
         self._ahead: dict[bytes, _Ahead] = {}
-        self._issued_at_us = bundle.mission.issued_at_us
+        #: of what flies first: who dates a mission later than its steps would be out of reach of a recall for a policy
+        self._issued_at_us = min(
+            [bundle.mission.issued_at_us, *(each.issued_at_us for each in bundle.mission.invocations)]
+        )
         #: of the mission that was opened, and of all that replaced it since
         self._digests: tuple[bytes, ...] = (bundle.mission_digest,)
         #: the ids of all steps that ever were in force

@@ -24,6 +24,7 @@ from reference.world import (
     renewed,
     request_for,
 )
+from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.enforcement.executor import MISSION_OVER
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Dispatch, Ending, LinkBack, LinkLost, Presented
@@ -168,6 +169,13 @@ def test_a_key_that_the_root_does_not_let_recall(fields: dict[str, object], slug
 
 
 POLICY_DIGEST = OF.bundle.policy_digest
+YEAR = 365 * 24 * 60 * MIN
+
+
+def issued(mission_us: int, steps_us: int) -> Mission:
+    """The mission, that says it was issued then, and of its steps that they were."""
+    steps = tuple(replace(each, issued_at_us=steps_us) for each in MISSION.invocations)
+    return replace(MISSION, issued_at_us=mission_us, invocations=steps)
 
 
 @rows(
@@ -193,10 +201,18 @@ def test_what_it_says_must_fit(changed: dict[str, object], slug: str) -> None:
 
 def test_the_recall_of_an_earlier_flight_does_not_serve() -> None:
     earlier = recall(OF)
-    again = loaded(mission=replace(MISSION, issued_at_us=ISSUED + S))
+    again = loaded(mission=issued(ISSUED + S, ISSUED + S))
     assert presented(again, earlier).slug == "other-mission"
     under_policy = recall(OF, flight=b"", mission=b"", policy=POLICY_DIGEST, issued_at_us=ISSUED)
     assert presented(again, under_policy).slug == "before-mission"
+
+
+def test_who_dates_a_mission_later_than_its_steps_is_recalled_all_the_same() -> None:
+    """An agent chooses what its mission says of itself: one of today, by its steps, that says it is of next year."""
+    of = loaded(mission=issued(ISSUED + YEAR, ISSUED))
+    under_policy = recall(OF, flight=b"", mission=b"", policy=POLICY_DIGEST)
+    allowed(of)
+    assert presented(of, under_policy).accepted
 
 
 def test_it_reaches_a_mission_that_was_replaced_since() -> None:

@@ -295,10 +295,11 @@ def _wait(
             notes += [note] if note is not None else []
 
         def admit(data: bytes) -> Loaded | Refusal:
+            trusted.expect_latest()  # a key of it may be revoked: whoever waits for long enough flies under no old root
             return _admit(order, data, base, trusted, log_key, signing, clock)
 
         waiting = Waiting(
-            base, admit, vehicle, clock, interrupts, agents,
+            base, admit, trusted.expect_latest, vehicle, clock, interrupts, agents,
             most_s=order.wait_s, as_json=order.style == "json", notes=notes,
         )  # fmt: skip
         return waiting.follow(events), trusted
@@ -332,8 +333,11 @@ def _admit(
                 f"it is under {theirs.name}@{theirs.version}, and this vehicle waits under {ours.name}@{ours.version}"
             )
             return Refusal("other-policy", text, "the policy's envelope is that of the bundle that is waited with")
-        _expect_current(_lapsed(data, trusted.signed, loaded, clock), resumed=False)
         _expect_log_key_speaks(log_key, trusted.root, loaded, clock.now())
+        if loaded.bundle.mission_digest == base.bundle.mission_digest:  # an agent has it; a person may have signed
+            text = "it is the bundle that is waited with: that says the policy, and its own mission does not fly"
+            return Refusal("waited-with", text, "sign a mission of your own under its policy")
+        _expect_current(_lapsed(data, trusted.signed, loaded, clock), resumed=False)
         _hear(order, loaded, signing)
     except Refused as refused:
         return Refusal(refused.slug, str(refused), refused.help or "")

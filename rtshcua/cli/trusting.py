@@ -9,6 +9,7 @@ from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.files.roots import RootStore, in_force, opened
 from rtshcua.cli.faults import code_of, exit_code_of, untrusted, words_of
 from rtshcua.cli.refused import Refused
+from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import cose
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
@@ -23,13 +24,15 @@ HELPS = {
     "fork": "whoever has the root key signed two roots of one version: find out who, and change it",
     "unknown-key": "a root follows from the one before; another fleet's root takes another `--state-dir`",
     REVOKED: "sign it again, with the key that took its place; `rtshcua keys list` shows what is trusted",
+    "superseded": "begin again: the run goes by the root that the vehicle has now",
     "damaged": "put `trust/` of the state folder right; without it, whatever root is named is trusted",
 }
 
 
 class Trusted(NamedTuple):
     """The root to fly under, with its signed bytes, and the `others` that lead to it or were accepted before it, newest
-    first. `store` is where it is kept from this flight on, if it is to be, and `news` what there is to tell then.
+    first. `store` is where the vehicle keeps what it accepted, `accepted` what lay there, and `keeps` says that this
+    one is to be kept there from this flight on; `news` is what there is to tell then.
 
     `distrust` says why nothing may fly under it that is not in the air already.
     """
@@ -38,6 +41,8 @@ class Trusted(NamedTuple):
     signed: bytes
     others: tuple[bytes, ...] = ()
     store: RootStore | None = None
+    accepted: bytes | None = None
+    keeps: bool = False
     news: str = ""
     distrust: Refused | None = None
 
@@ -53,6 +58,18 @@ class Trusted(NamedTuple):
         if self.distrust is not None:
             raise self.distrust
 
+    def expect_latest(self) -> None:
+        """Raises `Refused` where the vehicle accepted another root since this one was looked up: it may revoke keys."""
+        if self.store is None:
+            return
+        try:
+            accepted = self.store.kept()
+        except (Untrusted, OSError) as error:
+            raise _refused(error) from None
+        if accepted not in (self.accepted, self.signed):
+            text = f"the vehicle's trust root changed meanwhile: it is no longer version {self.root.version}"
+            raise Refused(ExitCode.UNTRUSTED, "root-superseded", text, HELPS["superseded"])
+
     def settle(self, *, resumed: bool) -> str:
         """What there is to tell. The vehicle accepts the root, unless it is in the air and comes down as it began.
 
@@ -61,7 +78,8 @@ class Trusted(NamedTuple):
         if resumed:
             return f"{self.distrust}; it is brought down all the same" if self.distrust is not None else ""
         self.expect()
-        if self.store is not None:
+        self.expect_latest()
+        if self.store is not None and self.keeps:
             self.store.keep(self.signed)
         return self.news
 
@@ -92,9 +110,9 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
             signed, distrust = chain[-1], _refused(error)
     root = opened(signed)
     others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
-    if distrust is not None or signed == kept or (kept is None and root.development):
-        return Trusted(root, signed, others, distrust=distrust)
-    return Trusted(root, signed, others, store, "" if kept is None else told(opened(kept), root))
+    keeps = store is not None and signed != kept and not (kept is None and root.development)
+    news = told(opened(kept), root) if distrust is None and keeps and kept is not None else ""
+    return Trusted(root, signed, others, store, kept, keeps, news, distrust)
 
 
 def _given(roots: Sequence[Path], data: Path, *, needed: bool) -> list[bytes]:

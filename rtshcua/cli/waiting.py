@@ -51,16 +51,18 @@ class Admitted(NamedTuple):
 
 
 class Waiting:
-    """One wait. `admit` says whether a bundle may fly. `most_s`: how long it waits at most, in seconds. `notes`:
-    what there is to tell first.
+    """One wait. `admit` says whether a bundle may fly, and `expect` raises `Refused` once none may any more. `most_s`:
+    how long it waits at most, in seconds. `notes`: what there is to tell first.
     """
 
     def __init__(
-        self, base: Loaded, admit: Callable[[bytes], Loaded | Refusal], vehicle: ConnectedVehicle, clock: LinkClock,
-        interrupts: Interrupts, agents: Agents, *, most_s: float, as_json: bool, notes: Sequence[str] = (),
+        self, base: Loaded, admit: Callable[[bytes], Loaded | Refusal], expect: Callable[[], None],
+        vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, agents: Agents, *,
+        most_s: float, as_json: bool, notes: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._base = base
         self._admit = admit
+        self._expect = expect
         self._vehicle = vehicle
         self._clock = clock
         self._interrupts = interrupts
@@ -93,6 +95,7 @@ class Waiting:
                 if isinstance(event, Readings):
                     self._monitor.update(event)
             if now_s - told_s >= TOLD_S:
+                self._expect()
                 told_s, before, unready = now_s, unready, self._vehicle.driver.unready or ""
                 if unready != before:
                     self._tell("vehicle", f"not ready yet: {unready}" if unready else "the vehicle is ready")

@@ -142,6 +142,30 @@ def test_a_bundle_of_before_is_refused_once_its_key_is_revoked(
     assert version() == 2
 
 
+def test_what_the_vehicle_accepts_meanwhile_counts(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+    """A run waited, or was slow to begin, while a root came that revokes an agent's key: it takes nothing of that key
+    any more, and does not put its own root in the place of the newer one.
+    """
+    assert main(["keys", "rotate-root", "--days", "30"]) == ExitCode.OK
+    clock = SystemClock()
+    waits = trust((), data_folder(), state_folder(), QUAD, clock.now().utc_us)
+    waits.expect_latest()
+    assert main(["keys", "revoke", "mission-agent"]) == ExitCode.OK
+    roots = [str(path) for path in sorted((data_folder() / "keys").glob("root-*.trust"))]
+    assert main(["keys", "accept", *roots, str(fleet.root_path), "--vehicle", QUAD]) == ExitCode.OK
+    newest = version()
+    assert newest > waits.root.version
+    for begins in (waits.expect_latest, lambda: waits.settle(resumed=False)):
+        with pytest.raises(Refused) as refused_as:
+            begins()
+        assert (refused_as.value.code, refused_as.value.slug) == (ExitCode.UNTRUSTED, "root-superseded")
+    assert version() == newest
+    RootStore(state_folder(), QUAD).path.write_bytes(b"damaged")
+    with pytest.raises(Refused) as damaged:
+        waits.expect_latest()
+    assert damaged.value.slug == "root-damaged"
+
+
 def test_two_roots_of_one_version_are_a_fork(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     key, first = fleet.signing_key(Duty.ROOT), opened(fleet.root())
     assert main(["keys", "revoke", "approval-owner-operator"]) == ExitCode.OK
@@ -314,4 +338,4 @@ def test_a_root_in_earnest_is_accepted_by_flying_under_it_and_one_for_developmen
     again = trust((path,), tmp_path, tmp_path, QUAD, 1)
     assert again.distrust is not None
     assert again.distrust.slug == "root-unknown-key"
-    assert trust((path,), tmp_path, tmp_path / "else", QUAD, 1).store is None
+    assert trust((path,), tmp_path, tmp_path / "else", QUAD, 1).keeps is False

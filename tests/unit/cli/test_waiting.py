@@ -75,10 +75,11 @@ class World:
         self.agents = Agents(self.path, base, waits=True)
         self.vehicle, self.interrupts = Vehicle(base), Wished()
         self.tried: list[bytes] = []
+        self.superseded: Refused | None = None
         self.flies = low()
         vehicle: Any = self.vehicle
         self.waiting = Waiting(
-            base, self.admit, vehicle, Clock(), self.interrupts, self.agents,
+            base, self.admit, self.expect, vehicle, Clock(), self.interrupts, self.agents,
             most_s=most_s, as_json=True, notes=["a note"],
         )  # fmt: skip
         self.ended: Admitted | Refused | None = None
@@ -87,6 +88,10 @@ class World:
     def admit(self, data: bytes) -> Loaded | Refusal:
         self.tried.append(data)
         return self.flies if data == BUNDLE else Refusal("untrusted", "not to be trusted")
+
+    def expect(self) -> None:
+        if self.superseded is not None:
+            raise self.superseded
 
     def run(self) -> None:
         try:
@@ -213,3 +218,10 @@ def test_lines_that_are_none_are_answered(begin: Callable[..., World]) -> None:
             said = json.loads(file.readline())
             answers += [said] if said["type"] == "answer" else []
     assert [(each["id"], each["slug"]) for each in answers] == [(3, "malformed"), (4, "untrusted")]
+
+
+def test_once_the_vehicle_has_another_root_the_wait_is_over(begin: Callable[..., World]) -> None:
+    world = begin()
+    world.superseded = Refused(ExitCode.UNTRUSTED, "root-superseded", "the trust root changed meanwhile")
+    assert world.end() is world.superseded
+    assert world.tried == []

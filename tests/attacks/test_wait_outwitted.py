@@ -1,0 +1,72 @@
+"""Threats to a vehicle that waits for a mission: whoever reaches the agent socket flies what is not theirs to fly.
+
+They hold the bundle that is waited with, which names the policy, and an agent's mission key.
+"""
+
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.files.folders import data_folder, state_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli import launch
+from rtshcua.cli.app import main
+from rtshcua.cli.trusting import trust
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.library import root as library
+from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.wire.keys import Duty
+
+PROPOSAL, POLICY = library() / "missions" / "proposal.json", library() / "policies" / "bridge_inspection.rts"
+OF_A_PERSON = """import "lib:policies/bridge_inspection.rts"
+
+mission by_hand under bridge_inspection@7 on quad {
+  intent "Up and down."
+  proposed by operator ada for role operator
+  phase departure { takeoff(altitude = 25 m) }
+  phase recovery { return_home() }
+}
+"""
+
+
+@pytest.fixture
+def hand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
+    """What becomes of a file at the socket of a vehicle that waits with `base.bundle`, a person's: `accepted`, or why
+    not.
+    """
+    monkeypatch.chdir(tmp_path)
+    Path("person.rts").write_text(OF_A_PERSON)
+    assert main(["keys", "init"]) == ExitCode.OK
+    assert main(["compile", "person.rts", "-o", "base.bundle"]) == ExitCode.OK
+    clock, base = SystemClock(), Path("base.bundle")
+    trusted = trust((), data_folder(), state_folder(), "quad-07", clock.now().utc_us)
+    order = launch.Launch(
+        bundle=base, link=None, simulator=(), mode=Mode.SOFTWARE, speed=1, vehicle=None, roots=(), log_key=None,
+        passphrase_file=None, data=data_folder(), state=state_folder(), runs=Path("runs"), style="json", wait_s=60,
+    )  # fmt: skip
+    waits = launch._load(order, base.read_bytes(), trusted.root, clock.now(), secrets.token_bytes(16))
+    signing: Any = SimpleNamespace(unheard=frozenset())
+    log_key = KeyStore(data_folder()).signing_key(Duty.LOG)
+
+    def handed(name: str) -> str:
+        outcome = launch._admit(order, Path(name).read_bytes(), waits, trusted, log_key, signing, clock)
+        assert isinstance(outcome, Loaded | Refusal)
+        return outcome.slug if isinstance(outcome, Refusal) else "accepted"
+
+    return handed
+
+
+def test_what_an_agent_signed_itself_flies(hand_in: Callable[[str], str]) -> None:
+    assert main(["compile", str(PROPOSAL), "--with", str(POLICY), "-o", "own.bundle"]) == ExitCode.OK
+    assert hand_in("own.bundle") == "accepted"
+
+
+def test_the_mission_of_the_bundle_that_is_waited_with_does_not(hand_in: Callable[[str], str]) -> None:
+    """A person may have signed it, for what no agent may ask."""
+    assert hand_in("base.bundle") == "waited-with"

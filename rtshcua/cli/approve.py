@@ -79,7 +79,7 @@ def approve(
         return fail(ExitCode.USAGE, "the answer has to go somewhere", WHERE)
     now_us = time.time_ns() // 1000
     try:
-        flying = subject(bundle, replacement or [], root, now_us)
+        flying = subject(bundle, replacement or [], root, now_us, stops=refused)
         steps = flying.mission.invocations
         if not 0 <= step < len(steps):
             return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 0 to {len(steps) - 1}")

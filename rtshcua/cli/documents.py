@@ -2,7 +2,10 @@
 
 import json
 import re
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
 import typer
@@ -10,10 +13,12 @@ import typer
 from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore, read_root
+from rtshcua.adapters.files.roots import opened
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.cli.faults import fail
 from rtshcua.cli.stdout import out, out_json
+from rtshcua.cli.trusting import LAPSED, REVOKED
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
@@ -22,6 +27,7 @@ from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, open_bundle
 from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
+from rtshcua.wire.untrusted import Untrusted
 
 # ---------------------------------------------------------------- the options that they share
 
@@ -42,25 +48,45 @@ MOST_S = MAX_LIFE_US // 1_000_000
 
 # ---------------------------------------------------------------- what they do alike
 
+NO_HELP: Mapping[str, str] = MappingProxyType({})
 _FLIGHT = re.compile(r"[0-9a-f]{32}")
 #: help for what a document may be handed to
 WHOSE = "give `--flight` (32 hexadecimal digits, or a socket of the flight)"
 WHERE = "give `--to` (a socket of the flight) or `--output`"
 
 
-def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: int) -> Bundle:
+def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: int, *, stops: bool = False) -> Bundle:
     """The bundle that flies, verified, with the replacements that were put into force since.
 
-    Whoever signs must know what it is about. Raises `Untrusted` and OSError.
+    Whoever signs must know what it is about. What only `stops` a flight is signed also where a key of the bundle was
+    revoked, or has expired, since it began: it flies on under the root of before. Raises `Untrusted` and OSError.
     """
     trusted = _root(root, now_us)
-    found = open_bundle(read_regular(bundle, MAX_BUNDLE), root=trusted, vehicle=None, now_us=now_us)
+    data = read_regular(bundle, MAX_BUNDLE)
+    try:
+        found = open_bundle(data, root=trusted, vehicle=None, now_us=now_us)
+    except Untrusted as error:
+        if not stops or error.slug not in (REVOKED, *LAPSED):
+            raise
+        found = _of_before(data, trusted if root is not None else None, error)
     vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
     for path in replacements:
         document = read_regular(path, MAX_DOCUMENT)
         newer = open_replacement(document, root=trusted, vehicle=vehicle, flight=None, bundle=found, now=now)
         found = fit_replacement(newer, found, released=0)
     return found
+
+
+def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bundle:
+    """The bundle as it was trusted when it began to fly, by the root that was named, or else by those of the key store.
+
+    Raises `Untrusted`: `refused` where none of them ever trusted it.
+    """
+    roots = [named] if named is not None else [opened(each) for each in reversed(KeyStore(data_folder()).chain())]
+    for root in roots:
+        with suppress(Untrusted):
+            return open_bundle(data, root=root, vehicle=None, now_us=0)
+    raise refused
 
 
 def flight_id(flight: str | None, to: Path | None) -> bytes | None:
@@ -75,8 +101,18 @@ def flight_id(flight: str | None, to: Path | None) -> bytes | None:
     return None if place is None else flight_at(place)
 
 
-def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None, as_json: bool) -> ExitCode:
-    """Write a document, or hand it to the flight, and say what became of it. Raises OSError."""
+def deliver(
+    document: bytes,
+    what: str,
+    *,
+    to: Path | None,
+    output: Path | None,
+    as_json: bool,
+    help: Mapping[str, str] = NO_HELP,
+) -> ExitCode:
+    """Write a document, or hand it to the flight, and say what became of it; `help` says what to do about what the
+    flight answers, by slug. Raises OSError.
+    """
     if output is not None:
         write_out(output, document, mode=PRIVATE_FILE)
     if to is None:
@@ -84,17 +120,17 @@ def deliver(document: bytes, what: str, *, to: Path | None, output: Path | None,
     said = hand_in(to, document)
     code = ExitCode.OK if said.slug == "accepted" else ExitCode.REFUSED
     text = f"{what}: {said.text}" if code is ExitCode.OK else f"the flight refused it: {said.text} ({said.slug})"
-    return _say(code, said.slug, text, as_json=as_json)
+    return _say(code, said.slug, text, as_json=as_json, help=help.get(said.slug))
 
 
-def _say(code: ExitCode, slug: str, text: str, *, as_json: bool) -> ExitCode:
+def _say(code: ExitCode, slug: str, text: str, *, as_json: bool, help: str | None = None) -> ExitCode:
     text = visible(text)  # names of the mission's, of files, and the words of who listens at the socket
     if as_json:
         out_json(json.dumps({"slug": slug, "text": text, "exit": code.slug}, ensure_ascii=False))
     elif code is ExitCode.OK:
         out(text)
     else:
-        return fail(code, text)
+        return fail(code, text, help)
     return code
 
 

@@ -2,7 +2,7 @@
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -30,6 +30,9 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.untrusted import Untrusted
 
+#: where another mission flies: one that an agent handed in has a bundle of its own
+HELP: Final = {"other-mission": "`--policy` calls home whatever flies under the policy of this bundle"}
+
 app = typer.Typer(add_completion=False)
 
 
@@ -56,7 +59,7 @@ def recall(
         return fail(ExitCode.USAGE, "the recall has to go somewhere", WHERE)
     now_us = time.time_ns() // 1000
     try:
-        flying = subject(bundle, [], root, now_us)
+        flying = subject(bundle, [], root, now_us, stops=True)
         vehicle = flying.policy.vehicle.identity
         flight_named = b"" if policy else flight_id(flight, to)
         if flight_named is None:
@@ -69,4 +72,4 @@ def recall(
     except Untrusted as error:
         return refuse(untrusted(error))
     name = f"all under `{flying.policy.name}`" if policy else f"`{flying.mission.name}`"
-    return deliver(document, f"recalled {name} on `{vehicle}`", to=to, output=output, as_json=as_json)
+    return deliver(document, f"recalled {name} on `{vehicle}`", to=to, output=output, as_json=as_json, help=HELP)

@@ -149,6 +149,49 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     assert not (here / "other.replacement").exists()
 
 
+@pytest.mark.parametrize("whose", ["mission-agent", "policy"])
+def test_what_flies_is_stopped_also_once_the_keys_of_its_bundle_are_revoked(here: Path, whose: str) -> None:
+    """It flies on under the root that it began with: an operator must not have to choose what to do first."""
+    flies, again = in_force(here / "low.bundle"), in_force(here / "low.bundle")
+    first = here / "first.trust"
+    first.write_bytes(KeyStore(data_folder()).root())
+    for _ in range(2):
+        assert main(["keys", "replace", whose]) == ExitCode.OK
+    answer = ["approve", "low.bundle", "--step", "2", "-o", "answer", *FLIGHT]
+    assert main([*answer, "--refuse"]) == ExitCode.OK
+    assert presented(flies, here / "answer").granted == 0
+    assert main(answer) == ExitCode.UNTRUSTED, "what lets it fly on is signed under the root of today"
+    for of, words in ((flies, ()), (again, ("--policy",))):
+        assert main(["recall", "low.bundle", "-o", "home", *FLIGHT, *words]) == ExitCode.OK
+        assert presented(of, here / "home").slug == "accepted"
+    assert main(["recall", "low.bundle", "-o", "home", *FLIGHT, "--root", str(first)]) == ExitCode.OK
+
+
+@pytest.mark.parametrize("named", [(), ("--root", "now.trust")])
+def test_a_bundle_that_no_root_ever_trusted_is_not_recalled(
+    here: Path, capsys: pytest.CaptureFixture[str], named: tuple[str, ...]
+) -> None:
+    assert main(["keys", "revoke", "mission-agent"]) == ExitCode.OK
+    (here / "now.trust").write_bytes(KeyStore(data_folder()).root())
+    forged = bytearray((here / "low.bundle").read_bytes())
+    forged[-1] ^= 1
+    (here / "low.bundle").write_bytes(forged)
+    capsys.readouterr()
+    assert main(["recall", "low.bundle", "-o", "home", *FLIGHT, *named]) == ExitCode.UNTRUSTED
+    assert "was revoked" in capsys.readouterr().err
+    assert not (here / "home").exists()
+
+
+def test_who_replaced_the_key_that_a_flight_knows_recalls_it_with_that_one(here: Path) -> None:
+    """The flight began under a root that knows no other key of theirs."""
+    of = in_force(here / "low.bundle")
+    assert main(["keys", "replace", "approval-owner-operator"]) == ExitCode.OK
+    (old,) = (data_folder() / "keys").glob("revoked-*.key")
+    recall = ["recall", "low.bundle", "-o", "home", "--as", "owner", *FLIGHT]
+    assert main([*recall, "--approval-key", str(old)]) == ExitCode.OK
+    assert presented(of, here / "home").slug == "accepted"
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -174,13 +217,13 @@ def test_a_bundle_that_was_cut_is_malformed_for_everybody(
 
 @pytest.fixture
 def listening() -> Iterator[Path]:
-    """A flight's socket that accepts the first document and refuses the others."""
+    """A flight's socket that accepts the first document and refuses the others, the next as for another mission."""
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
         agents = AgentSocket(Path(name) / "s", lambda: b'{"type":"hello"}\n')
         over = threading.Event()
 
         def serve() -> None:
-            slugs = ["accepted"]
+            slugs = ["other-mission", "accepted"]
             while not over.wait(0.005):
                 event = agents.poll(time.monotonic_ns() // 1000)
                 if event is not None:
@@ -200,6 +243,8 @@ def test_what_the_flight_says_is_what_the_command_says(
     to = ["--to", str(listening)]
     assert main(["approve", "low.bundle", "--step", "2", *to]) == ExitCode.OK
     assert "approved as supervisor for 300 s: step 2" in capsys.readouterr().out
+    assert main(["recall", "low.bundle", *to]) == ExitCode.REFUSED
+    assert "`--policy` calls home whatever flies" in capsys.readouterr().err
     assert main(["recall", "low.bundle", *to, "--json"]) == ExitCode.REFUSED
     said = json.loads(capsys.readouterr().out)
     assert said == {"slug": "expired", "text": "the flight refused it: as it says (expired)", "exit": "refused"}

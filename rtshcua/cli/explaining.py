@@ -12,10 +12,19 @@ from rtshcua.cli.showing.page import for_terminal
 from rtshcua.cli.showing.record import Told, show_record
 from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.records import AnyRecord
+from rtshcua.ground.auditor.revoked import RevokedKeys
 
 
 def explained(
-    logs: list[Path], number: int, pinned: Pin, anchors: tuple[Path, ...], *, derive: bool, as_json: bool
+    logs: list[Path],
+    number: int,
+    pinned: Pin,
+    roots: tuple[bytes, ...],
+    anchors: tuple[Path, ...],
+    *,
+    derive: bool,
+    as_json: bool,
 ) -> ExitCode:
     """Prints record `number` of one log; the exit code is that of the log's audit."""
     logs = logs_meant(logs)
@@ -26,8 +35,13 @@ def explained(
         return fail(ExitCode.INPUT, f"`{logs[0]}` is not a log of this program", NO_LOG_HELP)
     told = Told(number)
     asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
-    audit = verify_carefully(path, asked, derive=derive, each=told.take)
-    report = audit.report
+    revoked = RevokedKeys(roots)
+
+    def each(record: AnyRecord) -> None:
+        told.take(record)
+        revoked.take(record)
+
+    report = revoked.judged(verify_carefully(path, asked, derive=derive, each=each)).report
     if told.record is None:
         if report.failure is None:
             return fail(ExitCode.INPUT, f"`{path}` has no record {number}: it ends after {report.records}")

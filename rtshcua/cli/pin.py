@@ -15,10 +15,13 @@ _TEXT = 200  # bytes of a file that may hold a key as text
 
 
 class Pin(NamedTuple):
-    """A root's public key or its `kid`, and where it comes from, for a person."""
+    """A root's public key or its `kid`, and where it comes from, for a person. `roots` are the signed trust roots that
+    were given with it.
+    """
 
     key: bytes
     source: str
+    roots: tuple[bytes, ...] = ()
 
 
 def pin(given: str | None) -> Pin:
@@ -29,7 +32,7 @@ def pin(given: str | None) -> Pin:
     if given is None:
         store = KeyStore(data_folder())
         root = open_root(store.root(), pinned=store.pin(), now_us=0)
-        return Pin(store.pin(), f"{_kind(root)} of your key store, {store.root_path}")
+        return Pin(store.pin(), f"{_kind(root)} of your key store, {store.root_path}", tuple(store.chain()))
     if _KEY.fullmatch(given):
         return Pin(bytes.fromhex(given), "the key that you gave")
     path = Path(given)
@@ -42,7 +45,7 @@ def pin(given: str | None) -> Pin:
         root = open_root(data, pinned=kid, now_us=0)
     except Untrusted as error:
         raise Untrusted("no-pin", f"`{path}` is neither a root key nor a trust root: {error}") from None
-    return Pin(kid, f"{_kind(root)} in {path}")
+    return Pin(kid, f"{_kind(root)} in {path}", (data,))
 
 
 def _kind(root: TrustRoot) -> str:

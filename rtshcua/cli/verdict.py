@@ -38,10 +38,14 @@ _SHORT = {
     "anchor": "The log is whole, and witnesses outside did not see all of it: `rtshcua witness` cosigns it.",
     "close": "The program stopped before it closed the log, or its end was cut off. What came after is not known.",
     "tail": MEANINGS["tail"],
+    "trust": "The log is whole, and a key that it rests on was revoked since: it may have been signed after that.",
 }
 #: what to do about a failure, by its slug
 _HELPS = {
     "trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key",
+    "trust/root-revoked-key": "`--root` or `--revocations` takes the very trust root that was flown under",
+    "trust/revoked-log-key": "what witnesses cosigned before counts: `--anchors`",
+    "trust/revoked-when": "`--revocations` takes the trust roots between too, one by one",
 }
 
 _SHOWN = 160

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from rtshcua.adapters.files.keystore import read_root
 from rtshcua.adapters.files.verification import Asked, Progress, verify_carefully, verify_quickly
 from rtshcua.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.cli.faults import distrust, fail, of_each
@@ -20,7 +21,9 @@ from rtshcua.cli.unconfirmed import UnconfirmedFallbacks
 from rtshcua.cli.verdict import as_object, as_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.records import AnyRecord
 from rtshcua.evidence.report import Report, Verdict, cosigned
+from rtshcua.ground.auditor.revoked import RevokedKeys
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -29,13 +32,16 @@ _LONG = 32 << 20  # bytes of a log that is worth a progress bar
 
 
 class Wanted(NamedTuple):
-    """How a log is verified: how deep, by how many, and whether it must be anchored to its end."""
+    """How a log is verified: how deep, by how many, whether it must be anchored to its end, and by which trust roots
+    keys may have been revoked since.
+    """
 
     audit: bool = False
     derive: bool = True
     fast: bool = False
     jobs: int = 0
     anchored: bool = False
+    roots: tuple[bytes, ...] = ()
 
 
 @app.command()
@@ -64,6 +70,10 @@ def verify_log(
         list[Path] | None,
         typer.Option("--anchors", metavar="FILE", help="what witnesses cosigned, besides `*.anchors`"),
     ] = None,
+    revocations: Annotated[
+        list[Path] | None,
+        typer.Option("--revocations", metavar="FILE", help="a newer trust root: what it revokes counts (repeatable)"),
+    ] = None,
     require_anchor: Annotated[
         bool, typer.Option("--require-anchor", help="a log that witnesses did not see to its end is incomplete")
     ] = False,
@@ -84,14 +94,16 @@ def verify_log(
         return fail(ExitCode.USAGE, "`--no-derive` goes with `--audit`", "without `--audit` nothing is derived")
     try:
         pinned = pin(root)
+        roots = (*pinned.roots, *(read_root(path) for path in revocations or ()))
+        RevokedKeys(roots)
     except Untrusted as error:
         help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
         return distrust(error, help, where="no root to trust: ")
     if explain is not None:
         from rtshcua.cli.explaining import explained
 
-        return explained(logs, explain, pinned, tuple(anchors or ()), derive=not no_derive, as_json=as_json)
-    wanted = Wanted(audit, not no_derive, fast, jobs, require_anchor)
+        return explained(logs, explain, pinned, roots, tuple(anchors or ()), derive=not no_derive, as_json=as_json)
+    wanted = Wanted(audit, not no_derive, fast, jobs, require_anchor, roots)
     named = tuple(anchors or ())
     return of_each(
         logs_meant(logs), lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first)
@@ -106,15 +118,19 @@ def _verify(
         return fail(ExitCode.INPUT, f"`{given}` is not a log of this program", NO_LOG_HELP)
     asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     raw = raw_frames(path)
-    unconfirmed = UnconfirmedFallbacks()
+    unconfirmed, revoked = UnconfirmedFallbacks(), RevokedKeys(wanted.roots)
+
+    def each(record: AnyRecord) -> None:
+        unconfirmed.take(record)
+        revoked.take(record)
+
     with _progress(path.stat().st_size) as told:
         if wanted.audit:
             frames = raw.frames if raw is not None and wanted.derive else None
-            audit = verify_carefully(
-                path, asked, derive=wanted.derive, frames=frames, each=unconfirmed.take, progress=told
-            )
+            audit = verify_carefully(path, asked, derive=wanted.derive, frames=frames, each=each, progress=told)
         else:
             audit = verify_quickly(path, asked, fast=wanted.fast, jobs=wanted.jobs, progress=told)
+    audit = revoked.judged(audit)
     report = audit.report
     if raw is not None:
         report = raw.unread(report) if wanted.fast else raw.judged(report, followed=wanted.audit and wanted.derive)

@@ -23,6 +23,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "config": ("*.toml",),
     "witness paths": _LOGS,
     "root": _ROOTS,
+    "revocations": _ROOTS,
     "roots": _ROOTS,
     "bundle": _BUNDLE,
     "log": _LOGS,

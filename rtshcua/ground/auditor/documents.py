@@ -9,7 +9,8 @@ from rtshcua.evidence.records import Effect
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.receipt import APPROVAL, RECALL, REPLACEMENT
 
-_KINDS: Final = {"approval": APPROVAL, "recall": RECALL, "replacement": REPLACEMENT}
+#: the documents of a flight, by the event that records one
+KINDS: Final = {"approval": APPROVAL, "recall": RECALL, "replacement": REPLACEMENT}
 
 
 class Documents:
@@ -17,11 +18,11 @@ class Documents:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.counts = dict.fromkeys(_KINDS, 0)
+        self.counts = dict.fromkeys(KINDS, 0)
 
     def check(self, record: Effect) -> Flaw | None:
         """What is wrong with an effect, if it is a document."""
-        kind = _KINDS.get(record.event)
+        kind = KINDS.get(record.event)
         if kind is None:
             return None
         document = octets(record.detail)

@@ -71,4 +71,4 @@ def _apart(one: tuple[Point, ...], other: tuple[Point, ...]) -> int:
     import shapely  # noqa: PLC0415  it is slow to import
 
     lines = [shapely.LineString(points) if len(points) > 1 else shapely.Point(points[0]) for points in (one, other)]
-    return round(shapely.hausdorff_distance(*lines))
+    return round(float(shapely.hausdorff_distance(*lines)))

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from rtshcua.ground.compiler.plan import DEFAULT_PATTERN
+from rtshcua.ground.compiler.survey import DEFAULT_PATTERN
 from rtshcua.ground.handbook.words.conditions import told_condition
 from rtshcua.ground.handbook.words.values import between, told_value
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, listed, name, named, sentence

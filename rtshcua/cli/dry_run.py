@@ -105,7 +105,8 @@ def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, refus
         called = words.call(loaded.bundle.policy, invocation)
         page.text(f"{each.step:>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {called}")
         if decision.outcome is not Outcome.ALLOW:
-            clause = "" if decision.clause is None else f": `{decision.clause.text}`"
+            quoted = words.quoted(loaded.bundle.policy, invocation, decision.clause)
+            clause = f": {quoted}" if quoted else ""
             page.row("because", f"{decision.reason.value}{clause}", indent=7, width=10)
             page.rows("would pass", [would_pass(one) for one in each.nearest], indent=7, width=10)
     page.text("")

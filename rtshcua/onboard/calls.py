@@ -7,6 +7,8 @@ nowhere as what flies.
 from collections.abc import Sequence
 
 from rtshcua.decision.contracts import cells
+from rtshcua.model.decision import Decisive
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -41,6 +43,17 @@ def argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
     if parameter.kind == PLACE:
         return place(policy, value, cells[parameter.cell + 1])
     return quantity(value, parameter.dimension)
+
+
+def is_own(policy: Policy, one: Invocation, clause: Decisive) -> bool:
+    """Whether a clause is the step's own, not its skill's: then its text is of whoever signed the mission, who may word
+    it as they like. What it says by its code only tightens.
+    """
+    if not isinstance(clause, Clause):
+        return False
+    contract = policy.contracts[one.skill]
+    skills = {(each.code, each.text) for each in (*contract.require, *contract.assume, *contract.maintain)}
+    return (clause.code, clause.text) not in skills
 
 
 def quantity(value: int, dimension: str) -> str:

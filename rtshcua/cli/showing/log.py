@@ -122,7 +122,7 @@ class Names:
         """A record in one line."""
         if isinstance(record, Decision):
             subject = self._subject(record.kind, record.step, record.link)
-            clause = f" because `{record.clause}`" if record.clause is not None else ""
+            clause = f" because {self._quoted(record)}" if record.clause is not None else ""
             target = f", to {record.target}" if record.target is not None else ""
             return f"{record.outcome:<9} {subject}: {record.reason}{clause}{target}"
         if isinstance(record, Effect):
@@ -136,6 +136,16 @@ class Names:
         if isinstance(record, Recover):
             return f"recovered, {record.discarded_bytes} bytes discarded; epoch {record.epoch} sealed"
         return f"begun in mode {record.mode}"
+
+    def _quoted(self, record: Decision) -> str:
+        steps = () if self._bundle is None else self._bundle.mission.invocations
+        if record.kind == STEP and 0 <= record.step < len(steps) and self._bundle is not None:
+            of, policy = steps[record.step], self._bundle.policy
+            own = (*of.contract.require, *of.contract.assume, *of.contract.maintain)
+            clause = next((each for each in own if each.text == record.clause), None)
+            if clause is not None and 0 <= of.skill < len(policy.contracts):
+                return words.quoted(policy, of, clause)
+        return f"`{record.clause}`"
 
     def _subject(self, kind: int, step: int, link: int) -> str:
         if kind not in _KINDS:

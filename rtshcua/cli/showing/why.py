@@ -17,6 +17,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.calls import is_own
 
 _TRUTHS: Mapping[int, str] = {TRUE: "true", FALSE: "false", UNKNOWN: "unknown"}
 _MINUTE = 60_000_000
@@ -42,7 +43,7 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
     decision = trace.decision
     page.head(f"{_subject(policy, invocation)}: {decision.outcome.name.lower()}, {decision.reason.value}")
     if decision.clause is not None:
-        page.row("because", f"`{_text(decision.clause)}`")
+        page.row("because", words.quoted(policy, flat, decision.clause))
         page.row("written", f"{_place(policy, decision.clause)}")
     if decision.outcome is Outcome.FALLBACK:
         page.row("flies", _flies(decision.target, case.aloft))
@@ -61,6 +62,7 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
         "outcome": decision.outcome.name.lower(),
         "reason": decision.reason.value,
         "clause": None if decision.clause is None else _text(decision.clause),
+        "own": is_own(policy, flat, decision.clause),
         "written": None if decision.clause is None else _place(policy, decision.clause),
         "target": None if decision.target is None else decision.target.text,
         "aloft": case.aloft,
@@ -105,7 +107,8 @@ def _step(page: Page, step: Traced, case: Case, decisive: Decisive) -> dict[str,
         mark = ">" if check.clause is decisive and decisive is not None else " "
         text = "the charge to finish and to come home" if check.clause is None else _text(check.clause)
         values = ", ".join(_read(invocation, each) for each in read)
-        words_of = f"{truth_of(check)}: `{text}`" + (f"   with {values}" if values else "")
+        told = words.quoted(invocation.policy.policy, invocation.invocation, check.clause) or f"`{text}`"
+        words_of = f"{truth_of(check)}: {told}" + (f"   with {values}" if values else "")
         page.row(f"{mark} {check.role}", words_of, indent=5, width=10)
         checks.append({"role": check.role, "clause": text, "truth": truth_of(check), "reads": _for_program(read)})
     return {"number": step.number, "name": step.name, "verdict": verdict, "fact": fact, "checks": checks}

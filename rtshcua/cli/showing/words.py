@@ -5,12 +5,13 @@ from itertools import pairwise
 from math import atan2, degrees, isqrt
 
 from rtshcua.decision.outline import rings as outline
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.quantity import Dimension, display
-from rtshcua.onboard.calls import argument
+from rtshcua.onboard.calls import argument, is_own
 from rtshcua.onboard.calls import arguments as arguments
 from rtshcua.onboard.calls import call as call
 from rtshcua.onboard.calls import geographic as geographic
@@ -59,6 +60,12 @@ def step(policy: Policy, one: Invocation) -> str:
         told.append(f"{each.name} = {argument(policy, each, one.arguments)}{f' [{where}]' if where else ''}")
     covers = f" along {_path(one.plan.path)}" if one.plan.kind == MotionKind.COVER else ""
     return f"{contract.name}({', '.join(told)}){covers}"
+
+
+def quoted(policy: Policy, one: Invocation, clause: Decisive) -> str:
+    """What decided, in the words of whoever wrote it; those of a step's own clause are no more than that."""
+    text = "" if clause is None else f"`{' '.join(clause.text.split())}`"
+    return f"{text}, in the mission's own words" if is_own(policy, one, clause) else text
 
 
 def _path(path: Sequence[int]) -> str:

@@ -168,6 +168,27 @@ def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
     ):
         if not same:
             yield f"`{name}` is looser than in the policy"
+    codes: dict[str, set[tuple[int, ...]]] = {}
+    for one in (*policys.require, *policys.assume, *policys.maintain):
+        codes.setdefault(one_line(one.text), set()).add(one.code)
+    for one in (*mine.require, *mine.assume, *mine.maintain):
+        if one.code not in codes.get(one_line(one.text), {one.code}) and not is_cut(one.text):
+            yield posing(one)
+
+
+def one_line(text: str) -> str:
+    """A text as it is shown."""
+    return " ".join(text.split())
+
+
+def is_cut(text: str) -> bool:
+    """Whether a text is no more than the beginning of one, so that others may begin with it too."""
+    return len(text) == limits.MAX_TEXT and text.endswith("...")
+
+
+def posing(one: Clause) -> str:
+    """What is wrong with a clause of a mission's own that would be taken for the policy's."""
+    return f"a clause says `{one_line(one.text)}` in the policy's words, and is another"
 
 
 # What is the policy's says so in the policy's words: a log and its readers are told by them.

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.checks.contracts import contract, tightens
+from rtshcua.decision.checks.contracts import contract, one_line, posing, tightens
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.checks.zones import place
 from rtshcua.decision.contracts import cells, first_cell
@@ -36,8 +36,21 @@ def mission(mission: Mission, policy: Policy) -> Iterator[str]:
         yield from at(f"step {step}", index("phase", one.phase, len(mission.phases)))
         if one.phases & ~_phases(one.contract, mission):
             yield f"step {step}: it is valid in a phase that its contract does not name"
+    yield from _rules_words(mission, policy)
     if len({one.invocation_id for one in mission.invocations}) != len(mission.invocations):
         yield "two steps have the same id"
+
+
+def _rules_words(mission: Mission, policy: Policy) -> Iterator[str]:
+    """A log says what decided by its text, and no condition is worded as a rule is."""
+    contracts = (one.contract for one in mission.invocations)
+    clauses = {each.text: each for of in contracts for each in (*of.require, *of.assume, *of.maintain)}
+    worded = {one_line(text): each for text, each in clauses.items()}
+    airspace = () if policy.airspace is None else (policy.airspace,)
+    for decisive in (*policy.rules, *airspace):
+        found = worded.get(one_line(decisive.text))
+        if found is not None:
+            yield posing(found)
 
 
 def _phases(contract: Contract, mission: Mission) -> int:

@@ -4,9 +4,7 @@ from collections.abc import Mapping
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.report import Report
-
-#: a clause's text is for a person; what is longer is cut
-MAX_TEXT = 400
+from rtshcua.model.flat.limits import MAX_TEXT
 
 
 def shortened(text: str) -> str:

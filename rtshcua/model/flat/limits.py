@@ -25,6 +25,7 @@ MAX_CONTRACTS = 256
 MAX_PARAMETERS = 32
 MAX_CELLS = 64
 MAX_CLAUSES = 64  # of one kind in one contract
+MAX_TEXT = 400  # characters of the text of a clause, which is for a person; what is longer is cut
 MAX_LINKS = 8
 MAX_RULES = 16_384
 MAX_RULE_KEYS = 1 << 18  # entries of the rule index: skills times roles, summed over all rules

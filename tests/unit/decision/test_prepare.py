@@ -18,7 +18,7 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
-from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STALE, MAX_ZONES
+from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STALE, MAX_TEXT, MAX_ZONES
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, LeftOut, Policy, RuleKind
 from rtshcua.model.flat.zone import CIRCLE, MAX_COORDINATE, MAX_VERTICES, POLYGON, Zone
@@ -307,6 +307,11 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (mine(record=(*S.contract.record, "written")), "`durability` is looser than in the policy"),
     (mine(record=(*S.contract.record, "written", "synced")), "recorded as `written` and as `synced`"),
     (mine(assume=(*S.contract.assume, BAD)), f"assume 3: {DEEP}"),
+    (
+        # a clause of the mission's own is stricter, and may not be taken for one of the policy's
+        mine(assume=(*S.contract.assume, replace(S.contract.assume[1], text=S.contract.assume[0].text))),
+        f"a clause says `{S.contract.assume[0].text}` in the policy's words, and is another",
+    ),
     (plan(kind=2), "plan: kind 2 is not the skill's, 3"),
     (plan(speed=3 * M), "plan: speed 3000 is not the argument, 4000"),
     (plan(speed=-1), "plan: speed -1 is not in 0.."),
@@ -367,6 +372,15 @@ def test_a_mission_may_tighten(tighter: Any) -> None:
     assert isinstance(prepare_invocation(replace(S, contract=tighter), POLICY, flat.MISSION.phases), PreparedInvocation)
 
 
+def test_a_text_that_was_cut_may_begin_as_another_does() -> None:
+    cut = "x" * (MAX_TEXT - 3) + "..."
+    of = prepare(contract(INSPECT, assume=(replace(S.contract.assume[0], text=cut), *S.contract.assume[1:])))
+    assert isinstance(of, PreparedPolicy)
+    clauses = of.policy.contracts[INSPECT].assume
+    own = replace(of.policy.contracts[INSPECT], assume=(*clauses, replace(clauses[1], text=cut)))
+    assert isinstance(prepare_invocation(replace(S, contract=own), of, flat.MISSION.phases), PreparedInvocation)
+
+
 def test_a_mission_may_choose_among_phases_where_the_policy_names_none() -> None:
     goto = flat.INVOCATIONS[1]
     chosen = replace(goto, contract=replace(goto.contract, phases=("inspection",)))
@@ -379,6 +393,14 @@ MISSION = flat.MISSION
 def phases(step: int, bits: int) -> Mission:
     changed = (replace(one, phases=bits) if one.step == step else one for one in MISSION.invocations)
     return replace(MISSION, invocations=tuple(changed))
+
+
+def saying(text: str) -> Mission:
+    """A clause of the mission's own that is worded like this."""
+    goto = MISSION.invocations[1]
+    worded = replace(goto.contract, assume=(*goto.contract.assume, replace(S.contract.assume[0], text=text)))
+    steps = (*MISSION.invocations[:1], replace(goto, contract=worded), *MISSION.invocations[2:])
+    return replace(MISSION, invocations=steps)
 
 
 @pytest.mark.parametrize(("step", "bits"), [(0, 0b111), (0, 0), (2, 0b010), (2, 0)])
@@ -401,6 +423,10 @@ def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: i
             "two steps have the same id",
         ),
         (replace(MISSION, invocations=(replace(MISSION.invocations[0], role=9),)), "step 0: there is no role 9"),
+        *(
+            (saying(f" {each.text}\n"), f"a clause says `{each.text}` in the policy's words, and is another")
+            for each in (P.rules[0], P.airspace)
+        ),
         (phases(2, 0b011), "step 2: it is valid in a phase that its contract does not name"),
         (phases(0, 0b1001), "step 0: it is valid in a phase that its contract does not name"),
     ],

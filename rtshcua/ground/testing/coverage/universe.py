@@ -18,10 +18,9 @@ from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import No
-from rtshcua.ground.compiler.files import MAX_TEXT
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract
-from rtshcua.model.flat.limits import FULL
+from rtshcua.model.flat.limits import FULL, MAX_TEXT
 from rtshcua.model.flat.policy import Airspace, Rule, RuleKind
 from rtshcua.model.outcome import Outcome
 

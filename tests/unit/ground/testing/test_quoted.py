@@ -3,10 +3,10 @@
 import pytest
 
 from reference.deciding import IMPORT, NOMINAL, WHEN, found, made, ran
-from rtshcua.ground.compiler.files import MAX_TEXT
 from rtshcua.ground.testing.clauses import quotes
 from rtshcua.ground.testing.coverage.universe import universe
 from rtshcua.ground.testing.run import run_case
+from rtshcua.model.flat.limits import MAX_TEXT
 
 SITE = """import "lib:policies/site.rts"
 import "lib:skills/hover.rts"

@@ -1,0 +1,83 @@
+"""Threat: who signs a mission holds a step to a clause of their own, and words it as something else than it is.
+
+Its code only tightens; its text stands in the log, where an investigator reads why a step was refused.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from reference.flat_case import CALM, ENOUGH_CHARGE, MISSION, POLICY
+from reference.world import Run, assert_audited, loaded, sealed, try_load
+from rtshcua.cli.app import main
+from rtshcua.cli.showing.log import show_log
+from rtshcua.cli.showing.page import Page
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.mission import Mission
+from rtshcua.onboard.calls import is_own
+
+#: what no battery meets, in whatever words
+FULL = flat.apply(flat.Op.GT, flat.signal(flat.BATTERY), flat.const(10_000))
+
+
+def held_to(text: str, step: int = 0) -> Mission:
+    """A step asks for more than a full battery, and says something else."""
+    of = MISSION.invocations[step]
+    contract = replace(of.contract, assume=(*of.contract.assume, flat.clause(text, FULL)))
+    contract = replace(contract, reads=tuple(sorted({*contract.reads, flat.BATTERY})))
+    steps = list(MISSION.invocations)
+    steps[step] = replace(of, contract=contract)
+    return replace(MISSION, invocations=tuple(steps))
+
+
+@pytest.mark.parametrize("text", [CALM.text, f"  {ENOUGH_CHARGE.text}\n", POLICY.rules[0].text])
+def test_a_clause_that_borrows_the_policys_words_is_not_loaded(text: str) -> None:
+    found = try_load(sealed(POLICY, held_to(text)))
+    assert isinstance(found, Refusal)
+    assert "in the policy's words, and is another" in found.text
+
+
+def test_what_refused_a_step_in_the_missions_own_words_is_told_so() -> None:
+    run = Run(loaded(POLICY, held_to("wind.speed < 9 m/s"))).until_over()
+    assert_audited(run)
+    page = Page(bold=False)
+    show_log(page, run.lines)
+    (why,) = {line.split("because ")[1] for line in str(page).splitlines() if "because" in line}
+    assert why.startswith("`wind.speed < 9 m/s`, in the mission's own words")
+
+
+def test_what_is_the_policys_is_told_as_it_is() -> None:
+    step = held_to("wind.speed < 9 m/s").invocations[0]
+    own: list[Clause] = [*step.contract.require, *step.contract.assume, *step.contract.maintain]
+    assert [is_own(POLICY, step, each) for each in own].count(True) == 1
+    assert not is_own(POLICY, step, POLICY.rules[0])
+    assert not is_own(POLICY, step, None)
+
+
+HELD = """import "lib:policies/bridge_inspection.rts"
+
+mission m under bridge_inspection@7 on quad {
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 20 m) { assume battery > 60 % } }
+  phase recovery { return_home() }
+}
+"""
+
+
+def test_why_tells_whose_words_they_are_and_what_they_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "m.rts"
+    source.write_text(HELD)
+    command = ["why", str(source), "--step", "0", "--at", "2026-05-01T10:00:00Z", "--state", "battery=50 %"]
+    assert main(command) == ExitCode.OK
+    out = " ".join(capsys.readouterr().out.split())
+    assert "because `battery > 60 %`, in the mission's own words" in out
+    assert "> assume false: `battery > 60 %`, in the mission's own words with battery = 50 %" in out
+    assert main([*command, "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["own"] is True
+    assert main([*command[:-1], "battery=32 %", "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["own"] is False, "the skill's own asks for 35 %"

@@ -92,6 +92,7 @@ BAD_DIVISION = _code("E0322", "bad-division", "a value is divided by zero, or by
 PHASE_NAME = _code("E0323", "phase-name", "the mission's phase is compared with something that names no phase")
 
 TURNED_KNOWN = _code("E0324", "turned-known", "`is known` stands under `not` or an edge, and is never false")
+BEYOND_RANGE = _code("E0325", "beyond-range", "a value is asked or given of a signal that it never has")
 
 # E04: signals and the dialect
 UNKNOWN_MESSAGE = _code("E0401", "unknown-message", "the dialect has no such message")

@@ -3,6 +3,7 @@
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.fitting import declaration_labels
 from rtshcua.ground.checker.phases import is_phase, phase_compared, phase_in_range
+from rtshcua.ground.checker.ranges import check_compared, check_ends
 from rtshcua.ground.checker.scope import LOCAL_TIME, Scope
 from rtshcua.ground.checker.types import MISSION_PHASE, POSITION, TIME_OF_DAY, ZONE, Kind, Type, Typed
 from rtshcua.ground.checker.values import typed, typed_range, unknown_member
@@ -59,7 +60,9 @@ def check_comparison(scope: Scope, node: Comparison) -> None:
 def _same(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
     """Both sides of one dimension and datum; a literal length takes the datum of an altitude above home."""
     if left.type == right.type:
+        check_compared(scope, node, left, right)
         return
+    before = len(scope.report.found)
     altitude = Dimension.ALTITUDE
     if left.constant is not None and right.type.dimension is altitude:
         typed(scope, node.left, right.type)
@@ -76,6 +79,8 @@ def _same(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
             help="a length becomes an altitude only when it is added to one" if _lengths(left, right) else None,
             labels=[*declaration_labels(scope, node.left), *declaration_labels(scope, node.right)],
         )
+    if len(scope.report.found) == before:
+        check_compared(scope, node, left, right)
 
 
 def _lengths(left: Typed, right: Typed) -> bool:
@@ -163,6 +168,8 @@ def check_within(scope: Scope, node: Within) -> None:
         )
         return
     ends = typed_range(scope, node.range, subject.type)
+    if ends is not None and kind is Kind.NUMBER:
+        check_ends(scope, node, subject, ends)
     if ends is None or kind is not Kind.TIME_OF_DAY:
         return
     is_clock = isinstance(node.subject, Reference) and node.subject.name == LOCAL_TIME

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
@@ -19,6 +21,18 @@ from rtshcua.model.ir.tests import NominalDecl, TestDecl
 Declaration = (
     EnumDecl | SignalDecl | ZoneDecl | VehicleDecl | SkillDecl | TemplateDecl | PolicyDecl | MissionDecl | NominalDecl
 )
+
+
+class Extent(NamedTuple):
+    """From the least to the greatest value, in canonical units; None where there is no bound."""
+
+    low: Fraction | int | None
+    high: Fraction | int | None
+
+    def has(self, value: Fraction | int) -> bool:
+        """Whether a value is within."""
+        return (self.low is None or self.low <= value) and (self.high is None or value <= self.high)
+
 
 #: a fix as `Report.add` takes it: the span, the replacement and a title
 Correction = tuple[Span, str, str]
@@ -45,6 +59,7 @@ class Symbols:
     `tests` and `scenarios` are those of the file that was asked for, which has them run; they are called by texts, not
     by names.
     `broken` are the names whose declarations have a syntax error: nothing is known of them, and nothing is said.
+    `ranges` has, of each signal of a number that was found well declared, what it can report.
     """
 
     declared: dict[str, Declaration] = field(default_factory=dict)
@@ -63,6 +78,7 @@ class Symbols:
     tests: tuple[TestDecl, ...] = ()
     scenarios: tuple[ScenarioDecl, ...] = ()
     broken: frozenset[str] = frozenset()
+    ranges: dict[str, Extent] = field(default_factory=dict)
 
     def _declare(self, declarations: Sequence[Declaration], table: dict[str, Declaration]) -> None:
         for declaration in declarations:

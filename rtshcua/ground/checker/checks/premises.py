@@ -1,4 +1,4 @@
-"""E1406: what nominals and tests hold for given is well typed, and said once."""
+"""E0325, E1406: what nominals and tests hold for given is well typed, and said once."""
 
 from collections.abc import Iterable
 
@@ -8,6 +8,7 @@ from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.fields import on_globe, one_of, quantity, size
+from rtshcua.ground.checker.ranges import beyond
 from rtshcua.ground.checker.scope import Argument, signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.flat.contract import SourceKind
@@ -81,7 +82,11 @@ def check_cell(context: Context, subject: Subject, cell: Cell) -> None:
     seen = Parameter(span=signal.name.span, name=signal.name, type=signal.type, range=None, choices=(), default=None)
     bound = bind_value(context.scope(), Argument(seen, type), cell.value)
     if bound is not None and check_size(context, cell.value, bound, type.dimension):
-        context.given[signal.name.text, cell.value] = bound
+        extent = context.symbols.ranges.get(signal.name.text)
+        if extent is not None and type.dimension is not None and isinstance(bound, int) and not extent.has(bound):
+            beyond(context.scope(), cell.value, signal.name.text, extent, type.dimension, bound)
+        else:
+            context.given[signal.name.text, cell.value] = bound
 
 
 def check_size(context: Context, value: Value, bound: Bound, dimension: Dimension | None) -> bool:

@@ -6,6 +6,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import quantity, size
+from rtshcua.ground.checker.ranges import INTEGERS, reported
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
@@ -16,13 +17,6 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.signals import EnumDecl, Selected, SignalDecl, SignalSource
 from rtshcua.model.quantity import Dimension
 
-MAX_INTEGER = (1 << 63) - 1
-#: what an integer field can hold, as far as it is kept on board
-INTEGERS: Mapping[str, tuple[int, int]] = {
-    f"{sign}int{bits}_t": (0, min((1 << bits) - 1, MAX_INTEGER)) if sign else (-(1 << bits - 1), (1 << bits - 1) - 1)
-    for sign in ("", "u")
-    for bits in (8, 16, 32, 64)
-}
 PLACE_UNIT = "degE7"
 #: the field that says into which direction a sensor looks
 _DIRECTION = "orientation"
@@ -88,8 +82,11 @@ def _signal(context: Context, signal: SignalDecl) -> None:
         )
         return
     type = signal_type(context.symbols, signal)
+    before = len(context.report.found)
     for source in signal.sources:
         _source(context, signal, source, type)
+    if len(context.report.found) == before and type is not None and type.dimension is not None:
+        context.symbols.ranges[signal.name.text] = reported(context.dialect, signal, type.dimension)
 
 
 def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Type | None) -> None:

@@ -1,0 +1,187 @@
+"""E0325: a signal is compared with a value, or given one, that its fields cannot carry.
+
+A whole-number field carries what its type holds, two components make a magnitude, and a ratio is between 0 % and 100 %.
+Of a floating-point field nothing is said.
+"""
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from math import ceil, floor
+from typing import Final, NamedTuple
+
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.dimensions import COHERENT
+from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.checker.symbols import Extent
+from rtshcua.ground.checker.types import Typed
+from rtshcua.ground.checker.values import typed
+from rtshcua.mavlink.dialect import Dialect
+from rtshcua.mavlink.quantise import UNITS, quantise
+from rtshcua.model.flat.limits import FULL
+from rtshcua.model.ir.expression import Arithmetic, Comparison, Function, Reference, Value, Within
+from rtshcua.model.ir.signals import SignalDecl
+from rtshcua.model.quantity import Dimension, display
+
+MAX_INTEGER: Final = (1 << 63) - 1
+#: what an integer field can hold, as far as it is kept on board
+INTEGERS: Final = {
+    f"{sign}int{bits}_t": (0, min((1 << bits) - 1, MAX_INTEGER)) if sign else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    for sign in ("", "u")
+    for bits in (8, 16, 32, 64)
+}
+
+
+OPEN: Final = Extent(None, None)
+
+
+class Carrier(NamedTuple):
+    """A message and its fields of a number; a raw value `v` is `v * numerator / denominator` in the canonical unit."""
+
+    message: str
+    fields: Sequence[str]
+    numerator: int
+    denominator: int
+
+
+def carried(dialect: Dialect, dimension: Dimension, carriers: Iterable[Carrier]) -> Extent:
+    """What a signal can report that is read from one of these."""
+    each = [_carried(dialect, carrier) for carrier in carriers]
+    lows, highs = [one.low for one in each if one.low is not None], [one.high for one in each if one.high is not None]
+    low = min(lows) if each and len(lows) == len(each) else None
+    high = max(highs) if each and len(highs) == len(each) else None
+    if dimension is not Dimension.RATIO:
+        return Extent(low, high)
+    return Extent(0 if low is None else max(low, 0), FULL if high is None else min(high, FULL))
+
+
+def _carried(dialect: Dialect, carrier: Carrier) -> Extent:
+    if len(carrier.fields) > 1:
+        return Extent(0, None)
+    held = INTEGERS.get(dialect.messages[carrier.message].fields[carrier.fields[0]].type)
+    if held is None:
+        return OPEN
+    low, high = (quantise(end, carrier.numerator, carrier.denominator) for end in held)
+    return Extent(low, high)
+
+
+def reported(dialect: Dialect, signal: SignalDecl, dimension: Dimension) -> Extent:
+    """What a declared signal of a number can report; its fields were found to measure it."""
+    units = UNITS[Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension]
+    return carried(
+        dialect,
+        dimension,
+        (
+            Carrier(
+                source.message.text,
+                [name.text for name in source.fields],
+                *units[dialect.messages[source.message.text].fields[source.fields[0].text].unit],
+            )
+            for source in signal.sources
+        ),
+    )
+
+
+def accepted(extent: Extent, dimension: Dimension, value: Fraction | int) -> str:
+    """What a signal can have instead of a value."""
+    low = "" if extent.low is None else f"from `{display(ceil(extent.low), dimension)}`"
+    high = "" if extent.high is None else f"up to `{display(floor(extent.high), dimension)}`"
+    nearest = extent.low if extent.low is not None and value < extent.low else extent.high
+    assert nearest is not None
+    near = display(ceil(nearest) if nearest is extent.low else floor(nearest), dimension)
+    return f"it goes {low} {high or 'on'}".replace("  ", " ") + f"; the nearest value is `{near}`"
+
+
+def check_compared(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
+    """Report a constant that the other side of a comparison never comes to."""
+    if right.constant is not None and left.constant is None:
+        _check(scope, node.left, left, node.right, right.constant)
+    elif left.constant is not None and right.constant is None:
+        _check(scope, node.right, right, node.left, left.constant)
+
+
+def check_ends(scope: Scope, node: Within, subject: Typed, ends: tuple[Typed, Typed]) -> None:
+    """Report each end of a range that its subject never comes to."""
+    for written, end in zip((node.range.low, node.range.high), ends, strict=True):
+        if end.constant is not None:
+            _check(scope, node.subject, subject, written, end.constant)
+
+
+def _check(scope: Scope, subject: Value, type: Typed, written: Value, constant: Fraction) -> None:
+    extent, dimension = extent_of(scope, subject), type.type.dimension
+    if dimension is None or extent.has(constant):
+        return
+    beyond(scope, written, scope.report.text(subject.span), extent, dimension, constant)
+
+
+def beyond(
+    scope: Scope, written: Value, what: str, extent: Extent, dimension: Dimension, value: Fraction | int
+) -> None:
+    """Report a value, as written, that something never has."""
+    low = extent.low is not None and value < extent.low
+    signal, text = scope.symbols.signals.get(what), scope.report.text(written.span)
+    if not any(map(str.isdigit, text)):  # a name that stands for it where a template is used
+        text = display(floor(value), dimension)
+    scope.report.add(
+        codes.BEYOND_RANGE,
+        written.span,
+        f"`{what}` is never as {'low' if low else 'high'} as `{text}`",
+        help=accepted(extent, dimension, value),
+        labels=[] if signal is None else [(signal.name.span, "declared here, with the fields that carry it")],
+    )
+
+
+def extent_of(scope: Scope, node: Value) -> Extent:
+    """The values that an expression over signals may have; its types were found to go together."""
+    found = typed(scope, node)
+    if found is not None and found.constant is not None:
+        return Extent(found.constant, found.constant)
+    match node:
+        case Reference():
+            return scope.symbols.ranges.get(node.name, OPEN)
+        case Arithmetic():
+            return _arithmetic(scope, node)
+        case Function():
+            return _function(node.name, [extent_of(scope, operand) for operand in node.operands])
+        case _:
+            return OPEN
+
+
+def _arithmetic(scope: Scope, node: Arithmetic) -> Extent:
+    left, right = extent_of(scope, node.left), extent_of(scope, node.right)
+    if node.operator in ("+", "-"):
+        if node.operator == "-":
+            right = _times(right, Fraction(-1))
+        return Extent(
+            None if left.low is None or right.low is None else left.low + right.low,
+            None if left.high is None or right.high is None else left.high + right.high,
+        )
+    types = [typed(scope, each) for each in (node, node.left, node.right)]
+    units = [Fraction(COHERENT[each.type.dimension]) for each in types if each is not None and each.type.dimension]
+    assert len(units) == len(types)
+    whole, one, other = units
+    if node.operator == "*":
+        if left.low == left.high and left.low is not None:
+            left, right = right, left
+        assert right.low is not None
+        return _times(left, right.low * whole / (one * other))
+    assert right.low is not None
+    return _times(left, whole * other / one / right.low)
+
+
+def _times(extent: Extent, factor: Fraction) -> Extent:
+    low, high = (None if end is None else end * factor for end in extent)
+    return Extent(low, high) if factor >= 0 else Extent(high, low)
+
+
+def _function(name: str, extents: Sequence[Extent]) -> Extent:
+    lows, highs = [each.low for each in extents], [each.high for each in extents]
+    if name == "abs":
+        (low,), (high,) = lows, highs
+        if low is not None and low >= 0:
+            return extents[0]
+        return Extent(0, None if low is None or high is None else max(-low, high))
+    known_lows, known_highs = [end for end in lows if end is not None], [end for end in highs if end is not None]
+    least = known_lows if name == "max" or len(known_lows) == len(lows) else []
+    most = known_highs if name == "min" or len(known_highs) == len(highs) else []
+    pick = min if name == "min" else max
+    return Extent(pick(least) if least else None, pick(most) if most else None)

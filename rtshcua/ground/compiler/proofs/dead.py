@@ -1,4 +1,5 @@
-"""E0720: rules whose condition can never hold, whatever is asked for, by whom, and in what state.
+"""E0720: rules whose condition can never hold, whatever is asked for, by whom, and in what state; E1102: a confirm
+whose condition never fails.
 
 A forbid and a confirm rule act too where their condition is unknown: they may then defer a step, but never do what they
 say, so they are reported too.
@@ -7,7 +8,7 @@ say, so they are reported too.
 from collections.abc import Iterator
 
 from rtshcua.decision import tree
-from rtshcua.decision.values import TRUE, UNKNOWN, Truth
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import No, Undecided, Yes, satisfiable
@@ -52,6 +53,23 @@ def dead(rules: Ruleset, group: Group) -> bool:
         labels=[*others, *_ranges(rules, group, conflict)],
     )
     return True
+
+
+def always(rules: Ruleset, group: Group) -> None:
+    """Report a condition that makes no difference to who confirms; of what forbids or degrades always, E0721 tells."""
+    when = group.declared.when
+    if group.kind != RuleKind.CONFIRM or when is None:
+        return
+    for number in group.rules:
+        for skill in rules.skills(number):
+            if rules.exhausted or not isinstance(rules.ask([(number, FALSE)], skill), No):
+                return
+    rules.ground.context.report.add(
+        codes.ALWAYS_HOLDS,
+        when.span,
+        "this cannot be false, so every step that the rule is about is confirmed",
+        help="leave the condition out, or say what was meant",
+    )
 
 
 def _defers(rules: Ruleset, group: Group) -> bool:

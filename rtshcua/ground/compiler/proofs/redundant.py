@@ -1,9 +1,9 @@
 """E0721, E0722: rules that decide nothing, for others always outweigh them or always say the same.
 
-A permit never decides where some forbid is true wherever it is. A permit says nothing further where some other permit
-is true wherever it is; a forbid, where some other forbid is, and where wherever it is unknown another is true or
-unknown; the other kinds have words of their own (`nested`). Of rules that make each other redundant the last one is
-reported.
+A permit never decides where, wherever it is true, some forbid or some degrade to another skill is true or unknown: then
+no step is flown by it. A permit says nothing further where some other permit is true wherever it is; a forbid, where
+some other forbid is, and where wherever it is unknown another is true or unknown; the other kinds have words of their
+own (`nested`). Of rules that make each other redundant the last one is reported.
 """
 
 from collections.abc import Set as AbstractSet
@@ -38,15 +38,20 @@ def prove(rules: Ruleset, alive: list[Group]) -> set[int]:
 
 
 def _shadowed(rules: Ruleset, group: Group) -> bool:
-    question = ((TRUE, FALSE | UNKNOWN),)
-    outweighing = _covered(rules, group, RuleKind.FORBID, frozenset(), question, "is ever not outweighed by a `forbid`")
+    outweighing = None
+    for kind in (RuleKind.FORBID, RuleKind.DEGRADE):
+        word = kind.name.lower()
+        what = f"is ever not outweighed by a `{word}`"
+        outweighing = _covered(rules, group, kind, frozenset(), ((TRUE, FALSE),), what)
+        if outweighing is not None:
+            break
     if outweighing is None:
         return False
     rules.ground.context.report.add(
         codes.SHADOWED_RULE,
         group.span,
-        "this `permit` never decides: wherever it matches, a `forbid` does too",
-        help="narrow the `forbid`, or delete this rule",
+        f"this `permit` never decides: wherever it matches, a `{word}` does too, or is unknown",
+        help=f"narrow the `{word}`, or delete this rule",
         labels=[(span, "this outweighs it") for span in outweighing],
     )
     return True

@@ -1,8 +1,8 @@
-"""E0720 to E0723: rules that are dead, shadowed, redundant or in the way of each other."""
+"""E0720 to E0723, E1102: rules that are dead, always hold, are shadowed, redundant or in the way of each other."""
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs import bundles, conflicting, redundant
-from rtshcua.ground.compiler.proofs.dead import dead
+from rtshcua.ground.compiler.proofs.dead import always, dead
 from rtshcua.ground.compiler.proofs.ruleset import MOST_EFFORT, Ruleset
 from rtshcua.ground.compiler.proofs.situation import Ground
 
@@ -13,6 +13,8 @@ def prove(ground: Ground) -> None:
     alive = [group for group in rules.groups if not dead(rules, group) and group.span not in rules.open]
     living = {number for group in alive for number in group.rules}
     rules.drop(number for group in rules.groups for number in group.rules if number not in living)
+    for group in alive:
+        always(rules, group)
     gone = redundant.prove(rules, alive)
     bundles.prove(rules, alive, gone)
     conflicting.prove(rules, [group for group in alive if gone.isdisjoint(group.rules)])

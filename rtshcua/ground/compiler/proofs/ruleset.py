@@ -316,10 +316,11 @@ class Ruleset:
         return None
 
     def _about(self, number: int, key: Key) -> bool:
-        """Whether a rule is about a key."""
+        """Whether a rule is about a key; none is about the skill that it flies itself."""
         rule = self.rule(number)
         return (
-            (not rule.skills or key.skill in rule.skills)
+            (rule.target is None or rule.target.skill != key.skill)
+            and (not rule.skills or key.skill in rule.skills)
             and (not rule.roles or key.role in rule.roles)
             and (not rule.sources or key.source in rule.sources)
         )

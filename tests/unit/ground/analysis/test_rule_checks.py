@@ -75,6 +75,30 @@ CASES = {
         f"{GOTO} when local time in 08:00 .. 16:00\n{GOTO} when local time in 09:00 .. 15:00",
         [("E0722", f"{GOTO} when local time in 09:00 .. 15:00")],
     ),
+    "a degrade that always holds": (
+        f"{GOTO}\ndegrade goto when battery <= 100 % to hover",
+        [("E0721", GOTO)],
+    ),
+    "a degrade that holds wherever it is permitted": (
+        f"{GOTO} when battery < 50 %\ndegrade goto when battery < 60 % to hover",
+        [("E0721", f"{GOTO} when battery < 50 %")],
+    ),
+    "a degrade that mostly holds": (f"{GOTO}\ndegrade goto when battery < 100 % to hover", []),
+    "a degrade to the skill itself": ("degrade any when battery <= 100 % to hover", []),
+    "a forbid that is true or unknown": (f"{GOTO}\nforbid goto by any when battery >= 0 %", [("E0721", GOTO)]),
+    "two that hold together": (
+        f"{GOTO}\ndegrade goto when battery < 50 % to hover\ndegrade goto when battery > 40 % to return_home",
+        [("E0721", GOTO)],
+    ),
+    "a confirm that always holds": (
+        f"{GOTO}\nconfirm goto when battery <= 100 % by role pilot within 30 s",
+        [("E1102", "battery <= 100 %")],
+    ),
+    "a confirm over all arguments": (
+        f"{GOTO}\nconfirm goto when altitude < 900 m by role pilot within 30 s",
+        [("E1102", "altitude < 900 m")],
+    ),
+    "a confirm that mostly holds": (f"{GOTO}\nconfirm goto when battery < 100 % by role pilot within 30 s", []),
     "over midnight": (f"{GOTO} when local time in 22:00 .. 06:00 and local time in 07:00 .. 21:00", ["E0720"]),
     "each because of the other": (
         f"{GOTO} when altitude < 20 m\n{GOTO} when altitude < 20 m",

@@ -46,6 +46,7 @@ EXIT_CODES = {
     Ending.COMPLETED: ExitCode.OK,
     Ending.ABORTED: ExitCode.ABORTED,
     Ending.RECALLED: ExitCode.ABORTED,
+    Ending.CANCELLED: ExitCode.ABORTED,
     Ending.REFUSED: ExitCode.REFUSED,
     Ending.STOOD_DOWN: ExitCode.STOOD_DOWN,
     Ending.CRASHED: ExitCode.CRASHED,

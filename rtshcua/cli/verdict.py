@@ -25,7 +25,7 @@ MEANINGS = {
     "close": "The end of the log was forged or damaged: it is not the end of these records.",
     "trust": "Not trusted here: the log may be sound in itself, but it does not rest on the root that you trust.",
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
-    "document": "An approval, a recall or a replacement was forged, or taken in where it should have been refused.",
+    "document": "What somebody signed for the flight was forged, or taken in where it should have been refused.",
     "dispatch": "The vehicle was commanded without the permission that the log should show first.",
     "preparation": "Parameters of the autopilot were set otherwise than their record says, or when they may not be.",
     "frames": "The raw frames show a command that the log does not: it went out without a record before it.",

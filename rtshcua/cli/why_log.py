@@ -28,7 +28,7 @@ from rtshcua.wire.request import STEP
 
 #: effects that turn a flight homeward, or end it
 _TURNS = frozenset({
-    "violated", "failed", "taken-over", "interrupted", "recall", "gap", "link-lost", "long-silence",
+    "violated", "failed", "taken-over", "interrupted", "recall", "cancellation", "gap", "link-lost", "long-silence",
     "crashed", "stranded", "not-landed", "resumed", "already-airborne", "left", "refused", "undecided", "stood-down",
 })  # fmt: skip
 _MOST = 20  # what is told of how it ended, in records

@@ -3,9 +3,9 @@ again, what is decided about links, and what is in force. The boundary follows t
 derives a log again.
 
 What is in force is changed by signed documents. Whatever is wrong with a document, it changes nothing. An approval is
-what later decisions are told of; a recall ends the mission; a replacement puts its steps in the place of those that
-were not released. It brings no step back under an id that was there before, and none that was refused: a refusal is of
-what it refused, wherever that stands now.
+what later decisions are told of; a recall or a cancellation ends the mission; a replacement puts its steps in the place
+of those that were not released. It brings no step back under an id that was there before, and none that was refused: a
+refusal is of what it refused, wherever that stands now.
 """
 
 from typing import Final, NamedTuple
@@ -22,10 +22,11 @@ from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import names
 from rtshcua.wire.approval import Approvals, open_approval
 from rtshcua.wire.bundle import Bundle
+from rtshcua.wire.cancellation import open_cancellation
 from rtshcua.wire.document import DocumentError, check_key, check_root, kind_of
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.recall import open_recall
-from rtshcua.wire.receipt import ACCEPTED, APPROVAL, RECALL, REPLACEMENT, UNKNOWN, Receipt
+from rtshcua.wire.receipt import ACCEPTED, APPROVAL, CANCELLATION, RECALL, REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.replacement import MAX_REPLACEMENTS, Replacement, fit_replacement, open_replacement
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Status
@@ -35,7 +36,9 @@ from rtshcua.wire.untrusted import Untrusted
 #: how many documents may be considered ahead of being taken
 MOST_AHEAD: Final = 8
 
-_KINDS: Final = {names.APPROVAL: APPROVAL, names.RECALL: RECALL, names.REPLACEMENT: REPLACEMENT}
+_KINDS: Final = {
+    names.APPROVAL: APPROVAL, names.RECALL: RECALL, names.REPLACEMENT: REPLACEMENT, names.CANCELLATION: CANCELLATION,
+}  # fmt: skip
 
 
 class _Ahead(NamedTuple):
@@ -50,7 +53,7 @@ class InForce:
 
     `flight` is the id of this one flight: documents name it, so that none serves another flight of the same mission.
     `received_us` is when the bundle was received on board, monotonic.
-    `recalled` says that no step may begin any more.
+    `recalled` and `cancelled` say by whose word no step may begin any more: a person's, or the proposer's own.
     """
 
     def __init__(
@@ -66,6 +69,7 @@ class InForce:
         self.bundle = bundle
         self.invocations = invocations
         self.recalled = False
+        self.cancelled = False
         self._policy = policy
         self._root = root
         self._vehicle = vehicle
@@ -83,6 +87,11 @@ class InForce:
         self._digests: tuple[bytes, ...] = (bundle.mission_digest,)
         #: the ids of all steps that ever were in force
         self._seen = frozenset(each.invocation_id for each in bundle.mission.invocations)
+
+    @property
+    def called_off(self) -> bool:
+        """Whether no step may begin any more."""
+        return self.recalled or self.cancelled
 
     def approvals(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
         """The verified answers that a decision on an invocation is told of."""
@@ -109,17 +118,23 @@ class InForce:
         for old in list(self._ahead)[:-MOST_AHEAD]:
             self._ahead.pop(old, None)
 
-    def take(self, document: bytes, now: Now, *, decided: int, released: int) -> Receipt:
-        """Take a document in. The first `decided` steps are decided for good, the first `released` were released."""
+    def take(self, document: bytes, now: Now, *, decided: int, released: int, current: int = 0) -> Receipt:
+        """Take a document in. The first `decided` steps are decided for good, the first `released` were released; those
+        from `current` on are not over.
+        """
         kind = UNKNOWN
         try:
             kind = _KINDS[kind_of(document)]
             if self.recalled:
                 raise DocumentError("recalled", "the mission was recalled")
+            if self.cancelled and kind != RECALL:
+                raise DocumentError("cancelled", "the mission was cancelled")
             if kind == APPROVAL:
                 return self._approval(document, now, decided)
             if kind == RECALL:
                 return self._recall(document, now)
+            if kind == CANCELLATION:
+                return self._cancellation(document, now, current)
             return self._replacement(document, now, released)
         except Untrusted as error:
             return Receipt(kind, error.slug, str(error))
@@ -151,6 +166,20 @@ class InForce:
         )
         self.recalled = True
         return Receipt(RECALL, ACCEPTED, "the mission is recalled")
+
+    def _cancellation(self, document: bytes, now: Now, current: int) -> Receipt:
+        open_cancellation(
+            document,
+            root=self._root,
+            vehicle=self._vehicle,
+            flight=self.flight,
+            missions=self._digests,
+            bundle=self.bundle,
+            current=current,
+            now=now,
+        )
+        self.cancelled = True
+        return Receipt(CANCELLATION, ACCEPTED, "the mission is cancelled: the policy's contingency flies")
 
     def _replacement(self, document: bytes, now: Now, released: int) -> Receipt:
         if len(self._digests) > MAX_REPLACEMENTS:
@@ -226,7 +255,7 @@ class Session:
 
     def refusal(self, ref: Ref) -> Status | None:
         """Why nothing is decided about a step or a link: there is none, or its turn is not now. None where it may be
-        asked for. After a recall it is no step's turn; links may fly as before.
+        asked for. Once the mission is called off it is no step's turn; links may fly as before.
         """
         kind, step, link = ref
         if kind == CONTINGENCY_LINK:
@@ -241,7 +270,7 @@ class Session:
         if kind != STEP or link != -1:
             return _UNKNOWN_STEP
         passed_over = step < self._latest and step not in self._consumed
-        return _NOT_CURRENT if self._in_force.recalled or passed_over or step > self._latest + 1 else None
+        return _NOT_CURRENT if self._in_force.called_off or passed_over or step > self._latest + 1 else None
 
     def decide_step(self, step: int, state: State, context: Context, now: Now) -> Decision:
         """Decide on a step that may be asked for (`refusal`), and remember it."""
@@ -281,7 +310,8 @@ class Session:
         replacement brings were never used.
         """
         decided = self._latest + self.consumed(self._latest)
-        receipt = self._in_force.take(document, now, decided=max(decided, 0), released=max(released, self._latest + 1))
+        released = max(released, self._latest + 1)
+        receipt = self._in_force.take(document, now, decided=max(decided, 0), released=released, current=self.current)
         if receipt.kind == REPLACEMENT and receipt.accepted:
             self._consumed = {step for step in self._consumed if step < receipt.step}
         return receipt

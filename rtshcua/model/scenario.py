@@ -16,6 +16,7 @@ ENDINGS = (
     "aborted",
     "refused",
     "recalled",
+    "cancelled",
     "stood-down",
     "crashed",
     "link-lost",

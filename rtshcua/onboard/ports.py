@@ -148,7 +148,8 @@ class Said(Event, frozen=True):
 
 
 class Presented(Event, frozen=True):
-    """Somebody handed over a signed document, as yet unverified: an approval, a recall, a replacement.
+    """Somebody handed over a signed document, as yet unverified: an approval, a recall, a replacement, a
+    cancellation.
 
     `sender` numbers who gets the answer.
     """
@@ -198,6 +199,7 @@ class Ending(StrEnum):
     ABORTED = "aborted"  # a fallback or the contingency brought it down, or home
     REFUSED = "refused"  # nothing ever flew: refused on the ground
     RECALLED = "recalled"  # an operator called it back; it fell back first
+    CANCELLED = "cancelled"  # who proposed it called it off; it fell back first
     STOOD_DOWN = "stood-down"  # the pilot or the autopilot took over
     CRASHED = "crashed"  # the vehicle came down as no landing does; nothing more is sent
     LINK_LOST = "link-lost"  # the vehicle went silent, or answered nothing

@@ -377,7 +377,7 @@ class Conduct:
             match record.get("event"):
                 case "violated" if after["type"] == "decision" and after["kind"] == FALLBACK_LINK:
                     yield from self._first(after)
-                case "recall":
+                case "recall" | "cancellation":
                     yield from self._recalled(self._at(record), flights, records)
                 case "stranded":
                     yield from self._stranded(record, flights)
@@ -415,7 +415,7 @@ class Conduct:
             if flight.kind != STEP or flight.motion in _HOMEWARD or silent:
                 continue
             if flight.since_us <= at_us and flight.until_us is not None and flight.until_us > at_us + bound_us:
-                text = f"step {flight.step} went on for {(flight.until_us - at_us) / 1e6:.1f} s after a recall"
+                text = f"step {flight.step} went on for {(flight.until_us - at_us) / 1e6:.1f} s after it was called off"
                 yield Failure("chain", at_us, text)
 
     def _stranded(self, record: Record, flights: Sequence[Flight]) -> Iterator[Failure]:

@@ -1,4 +1,5 @@
-"""Signed documents that are handed to a vehicle while it is under way: what approvals, recalls and replacements share.
+"""Signed documents that are handed to a vehicle while it is under way: what approvals, recalls,
+replacements and cancellations share.
 
 Each is a COSE_Sign1 around an artefact of its own content type, so that none can be taken for another. A document
 speaks for a bounded time: it says when it was issued and when it ends, in UTC us.
@@ -22,14 +23,15 @@ FLIGHT_BYTES: Final = 16
 #: a document larger than this is refused unread, in bytes; one that holds no mission has no reason to be large
 MAX_DOCUMENT: Final = 1 << 18
 MAX_WITHOUT_MISSION: Final = 1 << 11
-#: how long an approval or a recall may speak at most, in us
+#: how long an approval, a recall or a cancellation may speak at most, in us
 MAX_LIFE_US: Final = 3_600_000_000
 
 _OUTSET: Final = b"\xd2\x84"  # tag 18, an array of four
 _STRING: Final = 2
 _EMPTY_MAP: Final = b"\xa0"
 
-_KINDS: Final = {kind.content_type: kind for kind in (names.APPROVAL, names.RECALL, names.REPLACEMENT)}
+_HANDED_IN: Final = (names.APPROVAL, names.RECALL, names.REPLACEMENT, names.CANCELLATION)
+_KINDS: Final = {kind.content_type: kind for kind in _HANDED_IN}
 
 
 _F = TypeVar("_F", bound=Flat)

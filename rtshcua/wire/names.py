@@ -28,6 +28,7 @@ BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 2)  # 2: names mission and flight
 RECALL: Final = Artefact("rtshcua/recall", 2)  # 2: names the flight
 REPLACEMENT: Final = Artefact("rtshcua/replacement", 2)  # 2: names the flight
+CANCELLATION: Final = Artefact("rtshcua/cancellation", 1)
 QUALIFICATION: Final = Artefact("rtshcua/qualification", 1)
 RECEIPT: Final = Artefact("rtshcua/receipt", 1)
 LOG: Final = Artefact("rtshcua/log", 4, "")  # JSON lines (RFC 8785), without a registered suffix; 4: `received_us`

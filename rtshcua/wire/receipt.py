@@ -9,7 +9,7 @@ from rtshcua.wire import artefact, names
 from rtshcua.wire.artefact import ArtefactError
 
 #: what a document was
-UNKNOWN, APPROVAL, RECALL, REPLACEMENT = range(4)
+UNKNOWN, APPROVAL, RECALL, REPLACEMENT, CANCELLATION = range(5)
 #: the slug of a document that took effect
 ACCEPTED: Final = "accepted"
 

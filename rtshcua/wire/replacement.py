@@ -103,7 +103,7 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle
         text = f"it changes step {found.kept}, and {released} steps were released already"
         raise DocumentError("already-released", text)
     _check_kept(bundle.mission, found.mission, found.kept)
-    _check_replacer(found, bundle)
+    check_set_aside(found.key, bundle, found.kept)
     return found.over(bundle)
 
 
@@ -114,12 +114,16 @@ def _after(flight: bytes, supersedes: bytes, kept: int) -> bytes:
     return cbor.encode([flight, supersedes, kept])
 
 
-def _check_replacer(found: Replacement, bundle: Bundle) -> None:
-    """Who replaces steps may speak for those who proposed them: an agent sets aside what agents proposed, no more."""
-    replaced = bundle.mission.invocations[found.kept :]
-    if HUMAN in found.key.sources:
-        replaced = tuple(replace(each, source=SourceKind.OPERATOR) for each in replaced)
-    check_proposer(found.key, bundle.policy, replaced, now_us=0)  # whether the key expired was asked before
+def check_set_aside(key: VerificationKey, bundle: Bundle, first: int) -> None:
+    """Whether a mission key may set aside the steps of a bundle from `first` on: who does may speak for those who
+    proposed them. An agent sets aside what agents proposed, no more. Whether the key expired is asked before.
+
+    Raises `BundleError`.
+    """
+    steps = bundle.mission.invocations[first:]
+    if HUMAN in key.sources:
+        steps = tuple(replace(each, source=SourceKind.OPERATOR) for each in steps)
+    check_proposer(key, bundle.policy, steps, now_us=0)
 
 
 def _check_kept(old: Mission, new: Mission, kept: int) -> None:

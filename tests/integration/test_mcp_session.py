@@ -85,7 +85,7 @@ def test_tools_without_a_vehicle(ground: Any, base: str, place: Path) -> None:
         names = {each.name for each in (await session.list_tools()).tools}
         assert names == {
             "describe_vehicle", "describe_policy", "check_mission", "propose_mission", "mission_status",
-            "explain_decision", "replan", "read_evidence",
+            "explain_decision", "replan", "read_evidence", "cancel",
         }  # fmt: skip
         assert (await call(session, "describe_vehicle"))["stage"] == "unreachable"
         policy = await call(session, "describe_policy")
@@ -126,6 +126,9 @@ HOSTILE: tuple[tuple[str, dict[str, Any]], ...] = (
     ("propose_mission", {"mission": PROPOSAL, "idempotency_key": "k", "mission_key": "/root/operator.key"}),
     ("propose_mission", {"mission": "fly", "idempotency_key": "k"}),
     ("propose_mission", {"mission": [], "idempotency_key": "k"}),
+    ("cancel", {}),
+    ("cancel", {"to": "city"}),
+    ("cancel", {"flight": "00" * 16}),
     ("arm", {}),
     ("set_parameter", {"name": "FENCE_ENABLE", "value": 0}),
     ("connect", {"url": "udpin:0.0.0.0:14550"}),
@@ -287,5 +290,41 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
     session_of(ground, base, place, work)
     assert run.end().code == 0, run.stderr
     assert run.dispatched() == ["takeoff", "goto", "return_home"]
+    verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
+    assert verified.code == 0, verified.events
+
+
+@pytest.mark.clients
+def test_an_agent_cancels_its_flight_and_the_contingency_brings_it_home(ground: Any, base: str, place: Path) -> None:
+    run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
+    run.until("waiting")
+
+    async def work(session: ClientSession) -> None:
+        vehicle: dict[str, Any] = {}
+        while not (vehicle.get("untrusted", {}).get("state") or {}).get("ready"):
+            vehicle = await call(session, "describe_vehicle")
+            await asyncio.sleep(0.2)
+        early = await call(session, "cancel")
+        assert (early["wrong"], early["code"]) == (True, "not-flying")
+        ticket = (await call(session, "propose_mission", mission=PROPOSAL, idempotency_key="one"))["ticket"]
+        status: dict[str, Any] = {}
+        while "goto" not in [each["detail"] for each in await evidence(session) if each.get("event") == "dispatched"]:
+            status = await call(session, "mission_status", ticket=ticket, wait_s=10)
+            assert not status["over"], status
+        cancelled = await call(session, "cancel")
+        assert (cancelled["accepted"], cancelled["flies"][-1]) == (True, "emergency_land"), cancelled
+        again = await call(session, "cancel")
+        assert again["accepted"] is False
+        late = await call(session, "replan", mission=PROPOSAL, from_step=3, idempotency_key="back")
+        while not (status := await call(session, "mission_status", ticket=ticket, wait_s=10))["over"]:
+            pass
+        assert status["ending"] == "cancelled", status
+        assert (await call(session, "mission_status", ticket=late["ticket"]))["state"] == "refused"
+
+    session_of(ground, base, place, work)
+    assert run.end().code == 6, run.stderr
+    kinds = [record["kind"] for record in run.log() if record.get("event") == "dispatched"]
+    assert sorted(kinds) == kinds
+    assert kinds[-1] == 2, "the contingency"
     verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
     assert verified.code == 0, verified.events

@@ -12,6 +12,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Presented, Reply
 from rtshcua.wire.approval import ApprovalDocument, sign_approval
+from rtshcua.wire.cancellation import CancellationDocument, sign_cancellation
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.receipt import Receipt, decode
@@ -58,6 +59,12 @@ def recall(of: Loaded, key: SigningKey = APPROVAL_KEY, now: Now = START, **chang
     """A signed recall of the mission, but for what is `changed`."""
     said = RecallDocument(VEHICLE, of.in_force.flight, of.bundle.mission_digest, b"", now.utc_us, now.utc_us + MIN)
     return sign_recall(replace(said, **changed), key)
+
+
+def cancellation(of: Loaded, key: SigningKey = MISSION_KEY, now: Now = START, **changed: Any) -> bytes:
+    """A signed cancellation of the mission, but for what is `changed`."""
+    said = CancellationDocument(of.in_force.flight, of.bundle.mission_digest, now.utc_us, now.utc_us + MIN)
+    return sign_cancellation(replace(said, **changed), key)
 
 
 def shorter(of: Loaded) -> Mission:

@@ -2,7 +2,8 @@
 
 Statement. From theorem 1: whatever an agent signs with its own key, what flies of it is what the policy permits to
 agents, under the policy's contracts or tighter ones, on this vehicle; its word approves nothing, recalls nothing, and
-sets nothing aside that a person ordered. The key is bound by the trust root to its source, roles and policies;
+sets nothing aside that a person ordered; what it cancels flies the
+policy's contingency, and no step any more. The key is bound by the trust root to its source, roles and policies;
 approvals are bound to a person, the mission and the flight.
 
 Attacker: the agent, with the mission key that `keys init` makes for agents, and all that was ever signed. It compiles
@@ -18,7 +19,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference import worlds
-from reference.documents import MIN, approval, low_mission, recall, replacement
+from reference.documents import MIN, approval, cancellation, low_mission, recall, replacement
 from reference.flat_case import BATTERY, HEIGHT, MISSION, POLICY, POSITION_X, POSITION_Y
 from reference.naive_code import TooNear
 from reference.oracle import Oracle
@@ -34,8 +35,9 @@ from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.document import DocumentError
 from rtshcua.wire.keys import Duty, SigningKey
-from rtshcua.wire.receipt import REPLACEMENT, Receipt
+from rtshcua.wire.receipt import CANCELLATION, REPLACEMENT, Receipt
 from rtshcua.wire.receipt import decode as read_receipt
+from rtshcua.wire.request import CONTINGENCY_LINK
 from rtshcua.wire.response import Answer
 
 AGENT_SEED = b"\xa9" * 32
@@ -154,11 +156,16 @@ def test_no_agent_at_all_does(of: Random) -> None:
 
 
 def test_it_does_not_set_aside_what_a_person_ordered() -> None:
-    """A person's mission, of the key for both, is replaced by that person and not by the agent."""
+    """A person's mission, of the key for both, is replaced and cancelled by that person and not by the agent."""
     ordered = replace(
         MISSION, invocations=tuple(replace(each, source=SourceKind.OPERATOR) for each in MISSION.invocations)
     )
     for key, accepted in ((AGENT, False), (MISSION_KEY, True)):
+        found = opened(ordered, MISSION_KEY)
+        assert isinstance(found, Loaded), found
+        receipt = read_receipt(found.boundary.present(cancellation(found, key), START, 0))
+        assert isinstance(receipt, Receipt)
+        assert (receipt.kind, receipt.accepted) == (CANCELLATION, accepted), receipt
         found = opened(ordered, MISSION_KEY)
         assert isinstance(found, Loaded), found
         first, *_, last = found.bundle.mission.invocations
@@ -174,6 +181,28 @@ def test_it_does_not_set_aside_what_a_person_ordered() -> None:
         receipt = read_receipt(found.boundary.present(paper, START, 1))
         assert isinstance(receipt, Receipt)
         assert (receipt.kind, receipt.accepted) == (REPLACEMENT, accepted), receipt
+
+
+@given(worlds.CHANCES)
+def test_what_it_cancels_flies_the_contingency_and_no_step(of: Random) -> None:
+    """Whatever it proposed, and after whichever step: the links of the policy are decided as ever."""
+    found = opened(proposed(of))
+    if isinstance(found, Refusal):
+        return
+    for step in found.bundle.mission.invocations[: of.randrange(3)]:
+        answer = answer_to(found, request_for(found, step=step.step))
+        if isinstance(answer, Answer) and answer.permit:
+            found.executor.ended()
+            found.executor.dispatch(answer.permit, START.monotonic_us)
+    receipt = read_receipt(found.boundary.present(cancellation(found, AGENT), START, 0))
+    assert isinstance(receipt, Receipt)
+    assert receipt.accepted, receipt
+    for step in found.bundle.mission.invocations:
+        assert not isinstance(answer_to(found, request_for(found, step=step.step)), Answer)
+    links = [request_for(found, CONTINGENCY_LINK, -1, number) for number in range(len(POLICY.contingency))]
+    allowed = [answer for answer in (answer_to(found, link) for link in links) if isinstance(answer, Answer)]
+    assert len(allowed) == len(links)
+    assert any(answer.permit for answer in allowed)
 
 
 def test_what_agents_may_do_flies() -> None:

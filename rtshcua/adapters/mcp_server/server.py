@@ -36,6 +36,7 @@ _READS: Final = types.ToolAnnotations(readOnlyHint=True, openWorldHint=False)
 _ACTS: Final = types.ToolAnnotations(
     readOnlyHint=False, destructiveHint=False, idempotentHint=True, openWorldHint=False
 )
+_ENDS: Final = types.ToolAnnotations(readOnlyHint=False, destructiveHint=True, idempotentHint=True, openWorldHint=False)
 _RESOURCES: Final = {"policy": "describe_policy", "schema": "schema", "log": "read_evidence"}
 
 
@@ -70,6 +71,7 @@ TOOLS: Final = (
         _ACTS, ("mission", "from_step", "idempotency_key"), mission=_MISSION,
         from_step={"type": "integer", "minimum": 0}, idempotency_key=_KEY,
     ),
+    _tool("cancel", "End the mission that flies: no step begins any more; the policy's contingency flies.", _ENDS),
     _tool(
         "read_evidence", "Records of the flight's log, as they were told.",
         first={"type": "integer", "minimum": 0}, count={"type": "integer", "minimum": 1, "maximum": 100},

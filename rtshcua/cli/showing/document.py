@@ -13,6 +13,7 @@ from rtshcua.onboard.calls import quantity
 from rtshcua.wire import cose, names
 from rtshcua.wire.approval import ApprovalDocument
 from rtshcua.wire.bundle import parse
+from rtshcua.wire.cancellation import CancellationDocument
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.names import Artefact
 from rtshcua.wire.recall import RecallDocument
@@ -24,12 +25,17 @@ HANDED_IN = {
     names.APPROVAL: "`rtshcua approve --to` hands one to a flight",
     names.RECALL: "`rtshcua recall --to` hands one to a flight",
     names.REPLACEMENT: "`rtshcua replace` hands it to a flight under way",
+    names.CANCELLATION: "`cancel` of `rtshcua mcp` hands one to a flight",
 }
-_NAMES = {names.APPROVAL: "approval", names.RECALL: "recall", names.REPLACEMENT: "replacement"}
+_NAMES = {
+    names.APPROVAL: "approval", names.RECALL: "recall", names.REPLACEMENT: "replacement",
+    names.CANCELLATION: "cancellation",
+}  # fmt: skip
 _SHAPES: dict[Artefact, type[Flat]] = {
     names.APPROVAL: ApprovalDocument,
     names.RECALL: RecallDocument,
     names.REPLACEMENT: ReplacementDocument,
+    names.CANCELLATION: CancellationDocument,
 }
 
 
@@ -92,6 +98,9 @@ def show_document(page: Page, data: bytes) -> dict[str, object]:
             page.row("supersedes", newer.supersedes.hex())
             for step in newer.mission.invocations:
                 page.row("stays" if step.step < newer.kept else "new", f"step {step.step} {_called(step)}")
+        case CancellationDocument() as cancelled:
+            page.row("flight", cancelled.flight.hex())
+            page.row("issued", utc(cancelled.issued_at_us))
     page.row("use", HANDED_IN[what.kind])
     return {"kind": kind, "verified": False, "key": what.kid.hex(), "text": what.text, "said": named(what.body)}
 
@@ -122,5 +131,7 @@ def _body(body: Flat) -> str:
             return f"calls home {whom}, good until {utc(until)}"
         case ReplacementDocument(mission=mission, kept=kept):
             return f"`{mission.name}`, {len(mission.invocations)} steps, new from step {kept}"
+        case CancellationDocument(mission=mission, expires_at_us=until):
+            return f"cancels the mission {mission.hex()}, good until {utc(until)}"
         case _:
             return ""

@@ -20,7 +20,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
 #: effects whose detail is a signed document
-DOCUMENTS = ("approval", "recall", "replacement")
+DOCUMENTS = ("approval", "recall", "replacement", "cancellation")
 
 _KINDS = {STEP: "step", FALLBACK_LINK: "fallback of step", CONTINGENCY_LINK: "contingency"}
 

@@ -5,7 +5,8 @@
 10. anchors: what witnesses cosigned is what the log holds (`rtshcua.evidence.witnessing.anchors`)
 11. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
     ruled out by the states that the records hold (`observed`)
-12. documents: each approval, recall and replacement is verified again, and no decision read another (`documents`)
+12. documents: each approval, recall, replacement and cancellation is verified again, and no decision read another
+    (`documents`)
 13. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
     `none`
 

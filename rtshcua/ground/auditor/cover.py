@@ -15,7 +15,8 @@ class Cover:
     """
 
     def __init__(self) -> None:
-        self.recalled = False  # no step may be sent any more
+        self.recalled = False  # no step may be sent any more,
+        self.cancelled = False  # nor then
         self.dispatches = 0
         self._until_us: dict[Ref, int] = {}
         self._standing: set[int] = set()
@@ -37,6 +38,8 @@ class Cover:
         self.dispatches += 1
         if self.recalled and record.kind == STEP:
             return Flaw("dispatch/recalled", "a step was sent after the mission was recalled", f"step {record.step}")
+        if self.cancelled and record.kind == STEP:
+            return Flaw("dispatch/cancelled", "a step was sent after the mission was cancelled", f"step {record.step}")
         until_us = self._until_us.pop(record.ref, None)
         if until_us is not None:
             if record.at_us <= until_us or self._stands(record):

@@ -113,6 +113,8 @@ class Deriver:
                 return Flaw("decision/consumed", text, str(given), str(consumed))
             if self._basis.in_force.recalled:
                 return Flaw("decision/recalled", "a step is decided after the mission was recalled")
+            if self._basis.in_force.cancelled:
+                return Flaw("decision/cancelled", "a step is decided after the mission was cancelled")
         if refused is None:
             return None
         text = "a step is decided whose turn had not come, or was over: the boundary decides no such step"

@@ -1,4 +1,6 @@
-"""Approvals, recalls and replacements of a log: each is verified again, as of when it came, before it counts."""
+"""The documents of a log (approvals, recalls, replacements, cancellations): each is verified again, as of when it came,
+before it counts.
+"""
 
 from typing import Final
 
@@ -7,10 +9,12 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import Effect
 from rtshcua.model.flat.situation import Now
-from rtshcua.wire.receipt import APPROVAL, RECALL, REPLACEMENT
+from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, REPLACEMENT
 
 #: the documents of a flight, by the event that records one
-KINDS: Final = {"approval": APPROVAL, "recall": RECALL, "replacement": REPLACEMENT}
+KINDS: Final = {
+    "approval": APPROVAL, "recall": RECALL, "replacement": REPLACEMENT, "cancellation": CANCELLATION,
+}  # fmt: skip
 
 
 class Documents:

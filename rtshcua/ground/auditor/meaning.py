@@ -62,6 +62,7 @@ class Meaning:
         flaw = self._documents.check(record) or self.preparations.check(record)
         if flaw is None and self.mode != UNENFORCED:
             self._cover.recalled = self._documents.counts["recall"] > 0
+            self._cover.cancelled = self._documents.counts["cancellation"] > 0
             flaw = self._cover.check(record) or self._turns.check(record)
         if flaw is None and self._frames is not None:
             self._frames.happened(record, self.preparations.listed)

@@ -109,7 +109,7 @@ class SoftwareBoundary:
             return encode_receipt(Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before"))
         self._now_us = now.monotonic_us
         receipt = self._session.take(document, now, released)
-        self._commands.recalled = self._in_force.recalled
+        self._commands.called_off = self._in_force.called_off
         if receipt.kind == REPLACEMENT and receipt.accepted:
             self._commands.replace(self._in_force.bundle.mission)
             self._own = self._own_numbers()

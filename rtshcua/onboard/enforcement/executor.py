@@ -36,7 +36,7 @@ LATE: Final = Refusal("permit/late", "its time is over")
 NOT_COVERED: Final = Refusal("permit/not-covered", "the link does not stand behind this permit")
 LAPSED: Final = Refusal("permit/lapsed", "it is standing, but its step is over or its flight has landed")
 OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "it is for a step while another runs, or for one behind it")
-MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was recalled")
+MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was called off")
 NOT_DOWN: Final = Refusal("permit/not-down", "the vehicle is not known to stand on the ground, disarmed")
 BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
 
@@ -44,11 +44,11 @@ BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one t
 class Commands:
     """Looks up the command of a step or a link.
 
-    `recalled` says that no step may be sent any more. Only the boundary changes it, and the steps.
+    `called_off` says that no step may be sent any more. Only the boundary changes it, and the steps.
     """
 
     def __init__(self, policy: Policy, mission: Mission) -> None:
-        self.recalled = False
+        self.called_off = False
         self._policy = policy
         self._made: dict[tuple[int, int, int], _Made] = {}
         self._targets: dict[int, _Made] = {}
@@ -217,7 +217,7 @@ class Executor:
             self._fallback = (permit.step, _position(permit))
 
     def _refuse_step(self, permit: Permit) -> Refusal | None:
-        if self._homeward or self._commands.recalled:
+        if self._homeward or self._commands.called_off:
             return MISSION_OVER
         if self._running or permit.step <= self._step:
             return OUT_OF_TURN

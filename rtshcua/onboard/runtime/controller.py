@@ -28,7 +28,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Answer
 
 #: what ends a run matters more the further down it stands
-_GRAVITY = (Ending.ABORTED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
+_GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 _UP = LinkState.UP  # an enumeration's attributes are slow to find
 _WAITING, _DECIDING, _RUNNING, _FALLING, _ENDED = Stage
 
@@ -347,6 +347,10 @@ class MissionController:
     def recall(self, now: Now) -> None:
         """An operator calls the vehicle back."""
         self.break_off(now, Ending.RECALLED, CONTINGENCY_LINK)
+
+    def cancel(self, now: Now) -> None:
+        """Who proposed the mission calls it off: what flies then is the policy's, as after a recall."""
+        self.break_off(now, Ending.CANCELLED, CONTINGENCY_LINK)
 
     def evidence_failed(self, now: Now) -> None:
         """Records are not kept: as the policy says, the mission is given up, or no further step begins."""

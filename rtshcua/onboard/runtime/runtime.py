@@ -20,7 +20,7 @@ from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage, View
 from rtshcua.wire import names
 from rtshcua.wire.document import kind_of
-from rtshcua.wire.receipt import APPROVAL, RECALL, UNKNOWN, Receipt, decode
+from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, UNKNOWN, Receipt, decode
 from rtshcua.wire.request import STEP, Ref
 from rtshcua.wire.untrusted import Untrusted
 
@@ -103,10 +103,10 @@ class Runtime:
 
     @property
     def used_up(self) -> bool:
-        """Whether the bundle may not fly any more: a command of it was dispatched, or an operator recalled it. One that
-        was refused, deferred or interrupted on the ground was not used.
+        """Whether the bundle may not fly any more: a command of it was dispatched, or it was recalled or cancelled.
+        One that was refused, deferred or interrupted on the ground was not used.
         """
-        return self._controller.dispatcher.used or self.ending is Ending.RECALLED
+        return self._controller.dispatcher.used or self.ending in (Ending.RECALLED, Ending.CANCELLED)
 
     @property
     def linked(self) -> bool:
@@ -247,6 +247,9 @@ class EventHandler:
         elif receipt.kind == RECALL:
             journal.effect(now, "recall", detail=envelope)
             controller.recall(now)
+        elif receipt.kind == CANCELLATION:
+            journal.effect(now, "cancellation", detail=envelope)
+            controller.cancel(now)
         else:
             journal.effect(now, "replacement", Ref(STEP, receipt.step, -1), detail=envelope)
             controller.replaced()

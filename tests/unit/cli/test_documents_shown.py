@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from reference.documents import approval, hand, low, recall, replacement
+from reference.documents import approval, cancellation, hand, low, recall, replacement
 from reference.flat_case import BATTERY, WIND, S
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
 from rtshcua.cli.app import main
@@ -86,6 +86,7 @@ def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture
         (lambda of: approval(of, granted=0), APPROVAL_KEY, "refused as supervisor"),
         (recall, APPROVAL_KEY, "calls home the mission"),
         (replacement, MISSION_KEY, "new from step 2"),
+        (cancellation, MISSION_KEY, "cancels the mission"),
     ],
 )
 def test_a_document_is_shown_and_a_run_says_where_it_goes(

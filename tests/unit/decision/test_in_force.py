@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from reference.documents import ASKED, MIN, approval, low, recall, replacement, shorter
+from reference.documents import ASKED, MIN, approval, cancellation, low, recall, replacement, shorter
 from reference.flat_case import GOTO, S
 from reference.world import APPROVAL_KEY, FLIGHT, MISSION_KEY, ROOT, START, VEHICLE
 from rtshcua.decision.session import MOST_AHEAD, InForce
@@ -150,6 +150,32 @@ def test_after_a_recall_nothing_else_is_accepted() -> None:
     assert take(of, recall(OF)).accepted
     assert of.recalled
     assert {take(of, each).slug for each in (approval(OF), recall(OF), replacement(OF))} == {"recalled"}
+
+
+def test_after_a_cancellation_a_persons_recall_alone_is_accepted() -> None:
+    of = flight()
+    assert take(of, cancellation(OF)).accepted
+    assert (of.cancelled, of.recalled, of.called_off) == (True, False, True)
+    papers = (approval(OF), cancellation(OF), replacement(OF))
+    assert {take(of, each).slug for each in papers} == {"cancelled"}
+    assert take(of, recall(OF)).accepted
+    assert take(of, cancellation(OF)).slug == "recalled"
+
+
+@rows(
+    ("changed", "slug"),
+    [
+        ({"flight": bytes([7]) * 16}, "other-flight"),
+        ({"mission": bytes(32)}, "other-mission"),
+        ({"issued_at_us": IN_DOUBT + 1}, "issued-in-future"),
+        ({"expires_at_us": IN_DOUBT}, "expired"),
+        ({"expires_at_us": START.utc_us + 60 * MIN + 1}, "too-long-lived"),
+    ],
+)
+def test_a_cancellation_that_does_not_fit_is_refused(changed: dict[str, object], slug: str) -> None:
+    of = flight()
+    assert take(of, cancellation(OF, **changed)).slug == slug
+    assert not of.called_off
 
 
 def test_a_recall_of_all_under_the_policy_is_accepted() -> None:

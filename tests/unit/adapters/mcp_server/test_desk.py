@@ -18,7 +18,9 @@ from rtshcua.adapters.mcp_server.missions import Answer, Missions
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.wire import cose, names
 from rtshcua.wire.binding import bind
-from rtshcua.wire.bundle import policy_digest, policy_payload
+from rtshcua.wire.bundle import parse, policy_digest, policy_payload
+from rtshcua.wire.cancellation import CancellationDocument
+from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import STEP
 
@@ -117,6 +119,29 @@ def test_proposals_are_bounded(desk: Desk, handed: list[bytes], monkeypatch: pyt
         desk.propose_mission(PROPOSAL, "two")
     assert misused.value.code == "too-many"
     assert desk.propose_mission(PROPOSAL, "one")["accepted"], "what is known is answered as before"
+
+
+def test_a_cancellation_says_which_flight_and_nothing_of_where_to(desk: Desk, handed: list[bytes]) -> None:
+    with pytest.raises(Misused) as misused:
+        desk.cancel()
+    assert (misused.value.code, handed) == ("not-flying", [])
+    flight, mission = bytes([7]) * 16, bytes([8]) * 32
+    for told in ({"digest": mission.hex()}, {"digest": "no"}, {}):
+        desk.following.connected, desk.following.hello = True, {"flight": flight.hex()}
+        desk.following.mission = {"type": "mission", **told}
+        if told.get("digest") == mission.hex():
+            answer = desk.cancel()
+            assert (answer["accepted"], answer["flies"][-1]) == (True, "emergency_land")
+        else:
+            with pytest.raises(Misused):
+                desk.cancel()
+    (document,) = handed
+    kind = names.CANCELLATION
+    opened = cose.open1(document, keys={AGENT.kid: AGENT.verification()}, duty=Duty.MISSION,
+                        content_type=kind.content_type, limit=MAX_DOCUMENT)  # fmt: skip
+    said = parse(kind, opened.payload, CancellationDocument)
+    assert (said.flight, said.mission) == (flight, mission)
+    assert 0 < said.expires_at_us - said.issued_at_us <= MAX_LIFE_US
 
 
 def test_a_decision_is_explained_by_the_mission_that_it_is_of_alone(

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
-from mcp import ClientSession, StdioServerParameters
+from mcp import ClientSession, McpError, StdioServerParameters, types
 from mcp.client.stdio import stdio_client
 
 from rtshcua.wire.request import STEP
@@ -43,24 +43,42 @@ def base(ground: Any) -> str:
 
 
 @asynccontextmanager
-async def hosted(ground: Any, base: str, place: Path, *more: str) -> AsyncIterator[ClientSession]:
+async def hosted(
+    ground: Any, base: str, place: Path, *more: str, heard: Callable[[str], None] | None = None
+) -> AsyncIterator[ClientSession]:
     words = ["-m", "rtshcua.cli.app", "mcp", base, "--to", str(place), "--with", str(POLICY), *more]
     server = StdioServerParameters(
         command=sys.executable, args=words, env=dict(ground.environment), cwd=str(ground.folder)
     )
-    async with stdio_client(server) as (read, write), ClientSession(read, write) as session:
+
+    async def message(what: Any) -> None:
+        told = what.root if isinstance(what, types.ServerNotification) else None
+        if heard is not None and isinstance(told, types.ResourceUpdatedNotification):
+            heard(str(told.params.uri))
+
+    async with stdio_client(server) as (read, write), ClientSession(read, write, message_handler=message) as session:
         yield session
 
 
 def session_of(
-    ground: Any, base: str, place: Path, work: Callable[[ClientSession], Awaitable[None]], *more: str
-) -> None:
+    ground: Any, base: str, place: Path, work: Callable[[ClientSession], Awaitable[None]], *more: str,
+    heard: Callable[[str], None] | None = None,
+) -> None:  # fmt: skip
     async def run() -> None:
-        async with hosted(ground, base, place, *more) as session:
-            await session.initialize()
+        async with hosted(ground, base, place, *more, heard=heard) as session:
+            told = await session.initialize()
+            assert told.capabilities.resources is not None
+            assert told.capabilities.resources.subscribe
             await work(session)
 
     asyncio.run(asyncio.wait_for(run(), 200))
+
+
+async def refused(doing: Awaitable[Any]) -> str:
+    """Why the server refuses a request."""
+    with pytest.raises(McpError) as error:
+        await doing
+    return str(error.value)
 
 
 async def call(session: ClientSession, name: str, /, **arguments: Any) -> dict[str, Any]:
@@ -92,9 +110,11 @@ def test_tools_without_a_vehicle(ground: Any, base: str, place: Path) -> None:
         assert policy["policy"] == "bridge_inspection@7"
         assert "From 3 m to 40 m" in policy["skills"]["takeoff"]["arguments"]["altitude"]
         assert (await call(session, "check_mission", mission=PROPOSAL))["accepted"]
-        for uri in ("rtshcua://policy", "rtshcua://schema", "rtshcua://log"):
+        for uri in ("rtshcua://policy", "rtshcua://schema", "rtshcua://log", "rtshcua://flight"):
             (found,) = (await session.read_resource(uri)).contents  # type: ignore[arg-type]
             assert json.loads(found.text)  # type: ignore[union-attr]
+        for uri in ("rtshcua://policy", "rtshcua://keys", "file:///etc/passwd"):
+            assert "does not change" in await refused(session.subscribe_resource(uri))  # type: ignore[arg-type]
         wrong = deepcopy(PROPOSAL)
         wrong["proposed_by"]["source"] = "operator"
         answer = await call(session, "propose_mission", mission=wrong, idempotency_key="a")
@@ -215,6 +235,49 @@ def test_what_a_hostile_agent_calls_is_answered_and_signs_nothing(ground: Any, b
     session_of(ground, base, place, work)
 
 
+def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: Any, base: str, place: Path) -> None:
+    """A vehicle that is played by a socket: it waits, then flies, then ends."""
+    updated: list[str] = []
+
+    async def until(uri: str) -> None:
+        while uri not in updated:
+            await asyncio.sleep(0.02)
+
+    async def stage(session: ClientSession) -> str:
+        (found,) = (await session.read_resource("rtshcua://flight")).contents  # type: ignore[arg-type]
+        return str(json.loads(found.text)["stage"])  # type: ignore[union-attr]
+
+    async def work(session: ClientSession) -> None:
+        assert await stage(session) == "unreachable"
+        await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
+        await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]  # twice is once
+        await session.subscribe_resource("rtshcua://log")  # type: ignore[arg-type]
+        peers: list[asyncio.StreamWriter] = []
+        door = await asyncio.start_unix_server(lambda _, peer: peers.append(peer), str(place))
+        while not peers:
+            await asyncio.sleep(0.02)
+        peers[0].write(b'{"type":"hello","vehicle":"quad-07","flight":"ab"}\n')
+        await until("rtshcua://flight")
+        assert await stage(session) == "waiting"
+        updated.clear()
+        peers[0].write(b'{"type":"mission","digest":"cd"}\n{"type":"effect","seq":4,"event":"dispatched"}\n')
+        await until("rtshcua://log")
+        await until("rtshcua://flight")
+        assert await stage(session) == "flying"
+        await asyncio.sleep(0.6)
+        assert len(updated) <= 4, "nothing changes, and nothing is told"
+        await session.unsubscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
+        updated.clear()
+        peers[0].write(b'{"type":"close","seq":5,"ending":"completed"}\n')
+        await until("rtshcua://log")
+        await asyncio.sleep(0.6)
+        assert "rtshcua://flight" not in updated
+        door.close()
+        peers[0].close()
+
+    session_of(ground, base, place, work, heard=updated.append)
+
+
 def test_a_key_that_may_speak_for_others_is_refused(ground: Any, base: str, place: Path) -> None:
     (key,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("mission-operator.key")
     run = ground.start("mcp", base, "--to", str(place), "--with", str(POLICY), "--mission-key", str(key))
@@ -241,6 +304,7 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
     progress: list[float] = []
+    updated: list[str] = []
 
     async def heard(now: float, total: float | None, message: str | None) -> None:
         progress.append(now)
@@ -251,6 +315,7 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
             vehicle = await call(session, "describe_vehicle")
             await asyncio.sleep(0.2)
         assert vehicle["stage"] == "waiting"
+        await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
         at_s = time.monotonic()
         ticket = await call(session, "propose_mission", mission=PROPOSAL, idempotency_key="one")
         took_s = time.monotonic() - at_s
@@ -274,6 +339,7 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
             assert not found.isError, found
         assert (status["state"], status["ending"]) == ("admitted", "completed"), status
         assert progress
+        assert set(updated) == {"rtshcua://flight"}
         assert (await call(session, "mission_status", ticket=replaced["ticket"]))["state"] == "admitted"
         decided = [each for each in await evidence(session) if each.get("type") == "decision"]
         steps = [each for each in decided if each["kind"] == STEP]
@@ -287,7 +353,7 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
         assert len(records["untrusted"]["records"]) == 5
         print(f"proposed in {took_s * 1000:.0f} ms")
 
-    session_of(ground, base, place, work)
+    session_of(ground, base, place, work, heard=updated.append)
     assert run.end().code == 0, run.stderr
     assert run.dispatched() == ["takeoff", "goto", "return_home"]
     verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()

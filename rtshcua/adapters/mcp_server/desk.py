@@ -260,6 +260,11 @@ class Desk:
                     "no-ticket", "there is no such ticket", "give the one that `propose_mission` answered with"
                 )
             told = known.told()
+        flight = self.flight()
+        return told | flight | {"over": known.state == "refused" or flight["over"]}
+
+    def flight(self) -> dict[str, Any]:
+        """How the flight stands: its stage, the latest decision, who must approve, what happened, how it ended."""
         seen = self.following
         records = list(seen.records)
         decided = next((each for each in reversed(records) if each.get("type") == "decision"), None)
@@ -269,9 +274,9 @@ class Desk:
             for each in records
             if each.get("event") in _TELLING
         ]
-        return told | {
+        return {
             "stage": seen.stage,
-            "over": known.state == "refused" or seen.stage in ("ended", "unreachable"),
+            "over": seen.stage in ("ended", "unreachable"),
             "ending": seen.close.get("ending"),
             "decision": None if decided is None else {key: decided.get(key) for key in _DECIDED},
             "approval": {"rule": decided.get("clause"), "step": decided.get("step"), "how": _HOW}

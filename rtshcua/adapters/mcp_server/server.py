@@ -5,14 +5,17 @@ import logging
 import os
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
 import anyio
+from anyio.abc import TaskGroup
 from anyio.to_thread import run_sync
 from mcp import types
 from mcp.server.lowlevel import Server
 from mcp.server.lowlevel.helper_types import ReadResourceContents
+from mcp.server.session import ServerSession
 from mcp.server.stdio import stdio_server
 from pydantic import AnyUrl
 
@@ -37,7 +40,11 @@ _ACTS: Final = types.ToolAnnotations(
     readOnlyHint=False, destructiveHint=False, idempotentHint=True, openWorldHint=False
 )
 _ENDS: Final = types.ToolAnnotations(readOnlyHint=False, destructiveHint=True, idempotentHint=True, openWorldHint=False)
-_RESOURCES: Final = {"policy": "describe_policy", "schema": "schema", "log": "read_evidence"}
+_RESOURCES: Final = {"policy": "describe_policy", "schema": "schema", "log": "read_evidence", "flight": "flight"}
+#: those that change, and of which a host may be told when they do
+_CHANGING: Final = frozenset({"log", "flight"})
+#: how many resources may be followed at once, by all hosts together; one more takes the place of the oldest
+_MOST_FOLLOWED: Final = 32
 
 
 def _tool(
@@ -119,7 +126,6 @@ def serve(make: Callable[[], Any]) -> None:
 
 
 async def _speak(opening: Opening) -> None:
-    server = made(opening)
     # streams of its own: the SDK closes what it is given, and the command still has to end
     stdin, stdout = (
         anyio.wrap_file(os.fdopen(os.dup(number), mode, encoding="utf-8", errors="replace"))
@@ -127,6 +133,7 @@ async def _speak(opening: Opening) -> None:
     )
     async with stdio_server(stdin, stdout) as (incoming, outgoing), anyio.create_task_group() as others:
         others.start_soon(_warm, opening)
+        server = made(opening, others)
         await server.run(incoming, outgoing, server.create_initialization_options())
         others.cancel_scope.cancel()
 
@@ -137,9 +144,72 @@ async def _warm(opening: Opening) -> None:
     opening.begin()
 
 
-def made(opening: Opening) -> "Server[Any, Any]":
-    """A server with the tools and the resources."""
-    server: Server[Any, Any] = Server("rtshcua", version=__version__, instructions=INSTRUCTIONS)
+class _Subscribing(Server[Any, Any]):
+    """The SDK's server, which offers no subscription whatever handlers it has."""
+
+    def get_capabilities(self, *about: Any) -> types.ServerCapabilities:
+        capabilities = super().get_capabilities(*about)
+        assert capabilities.resources is not None
+        capabilities.resources.subscribe = True
+        return capabilities
+
+
+class _Subscriptions:
+    """Who follows which resource; each is told by a task of its own, so that a host which does not read delays none."""
+
+    def __init__(self, opening: Opening, others: TaskGroup) -> None:
+        self._opening = opening
+        self._others = others
+        self._following: dict[tuple[int, str], anyio.CancelScope] = {}
+
+    async def begin(self, session: ServerSession, uri: AnyUrl) -> None:
+        """Tell a host from now on. Raises ValueError for what does not change."""
+        name = _resource(uri)
+        if name not in _CHANGING:
+            raise ValueError("there is no such resource, or it does not change")
+        desk = await run_sync(self._opening.get)
+        self.end(session, uri)
+        while len(self._following) >= _MOST_FOLLOWED:
+            self._following.pop(next(iter(self._following))).cancel()
+        scope = self._following[id(session), name] = anyio.CancelScope()
+        self._others.start_soon(self._tell, session, uri, desk, scope)
+
+    def end(self, session: ServerSession, uri: AnyUrl) -> None:
+        """Tell it no more."""
+        scope = self._following.pop((id(session), _resource(uri)), None)
+        if scope is not None:
+            scope.cancel()
+
+    async def _tell(self, session: ServerSession, uri: AnyUrl, desk: Any, scope: anyio.CancelScope) -> None:
+        with scope, suppress(anyio.ClosedResourceError, anyio.BrokenResourceError):
+            known = _state(desk, _resource(uri))
+            while True:
+                await anyio.sleep(_TOLD_S)
+                now = _state(desk, _resource(uri))
+                if now != known:
+                    known = now
+                    await session.send_resource_updated(uri)
+        if self._following.get((id(session), _resource(uri))) is scope:
+            self.end(session, uri)
+
+
+def _resource(uri: AnyUrl) -> str:
+    return str(uri).removeprefix("rtshcua://").rstrip("/")
+
+
+def _state(desk: Any, name: str) -> Any:
+    """What is another one once the resource is."""
+    records = desk.following.records
+    latest = records[-1].get("seq") if records else None
+    if name == "log":
+        return desk.following.hello.get("flight"), latest
+    return desk.following.hello.get("flight"), desk.following.stage, latest, desk.following.mission.get("digest")
+
+
+def made(opening: Opening, others: TaskGroup) -> "Server[Any, Any]":
+    """A server with the tools and the resources. What goes on beside requests does so in `others`."""
+    server: Server[Any, Any] = _Subscribing("rtshcua", version=__version__, instructions=INSTRUCTIONS)
+    subscriptions = _Subscriptions(opening, others)
 
     async def listed() -> list[types.Tool]:
         return list(TOOLS)
@@ -162,16 +232,24 @@ def made(opening: Opening) -> "Server[Any, Any]":
         ]
 
     async def read(uri: AnyUrl) -> Iterable[ReadResourceContents]:
-        name = _RESOURCES.get(str(uri).removeprefix("rtshcua://").rstrip("/"))
+        name = _RESOURCES.get(_resource(uri))
         if name is None:
             raise ValueError("there is no such resource")
         desk = await run_sync(opening.get)
         return [ReadResourceContents(json.dumps(await run_sync(getattr(desk, name))), "application/json")]
 
+    async def subscribed(uri: AnyUrl) -> None:
+        await subscriptions.begin(server.request_context.session, uri)
+
+    async def unsubscribed(uri: AnyUrl) -> None:
+        subscriptions.end(server.request_context.session, uri)
+
     server.list_tools()(listed)  # type: ignore[no-untyped-call]
     server.call_tool()(called)
     server.list_resources()(resources)  # type: ignore[no-untyped-call]
     server.read_resource()(read)  # type: ignore[no-untyped-call]
+    server.subscribe_resource()(subscribed)  # type: ignore[no-untyped-call]
+    server.unsubscribe_resource()(unsubscribed)  # type: ignore[no-untyped-call]
     return server
 
 

@@ -8,6 +8,7 @@ import re._parser as patterns  # type: ignore[import-not-found]
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import pytest
@@ -17,6 +18,8 @@ from rtshcua.diagnostics.codes import IMPORT_PATH, TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.checker.features import Refused
+from rtshcua.ground.checker.geojson import read_area
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.elaborate import elaborate
 from rtshcua.ground.format.comments import gap_of
@@ -148,6 +151,15 @@ def test_no_pattern_keeps_what_it_might_give_back() -> None:
     assert list(given_back(patterns.parse(r'"(?:[^"]|\\.)*"')))
     found = [(name, each) for name, each, flags in written_patterns() if list(given_back(patterns.parse(each, flags)))]
     assert found == []
+
+
+def test_a_text_in_a_zone_that_is_not_closed_is_looked_through_once() -> None:
+    text = b'"' + b'\\"' * 60_000  # from each quote to the end: minutes
+    before = process_time()
+    with pytest.raises(Refused) as refused:
+        read_area(text, None)
+    assert refused.value.message == "line 1, column 1: unterminated string starting at"
+    assert process_time() - before < 3
 
 
 def test_comments_on_one_line_are_put_together_once() -> None:

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from reference.many_rules import policy
-from rtshcua.diagnostics.codes import IMPORT_PATH, TOO_LARGE
+from rtshcua.cli.formatting.each import of_file
+from rtshcua.diagnostics.codes import IMPORT_PATH, TOO_LARGE, UNKNOWN_IGNORE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
@@ -22,13 +23,18 @@ from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.geojson import read_area
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.elaborate import elaborate
+from rtshcua.ground.format import attempt as attempting
+from rtshcua.ground.format.attempt import attempt
 from rtshcua.ground.format.comments import gap_of
 from rtshcua.ground.language import load as loading
 from rtshcua.ground.language import parse as parsing
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.language.paths import shown
 from rtshcua.ground.language.size import MAX_TOKENS
 from rtshcua.ground.language.table import PATH as TABLE
+from rtshcua.ground.lint import ignores as ignoring
+from rtshcua.ground.lint.ignores import ignores
 from rtshcua.mavlink import dialect
 
 MOST = 1_000  # instead of `MAX_TOKENS`, for speed
@@ -166,3 +172,52 @@ def test_comments_on_one_line_are_put_together_once() -> None:
     gap = gap_of("/*1*/ /*2*/\n/*3*/  // 4\n" + "/**/" * 300_000, at_start=True, at_end=True)
     assert [each.text[:11] for each in gap.comments] == ["/*1*/ /*2*/", "/*3*/ // 4", "/**/ /**/ /"]
     assert [(each.first, each.last) for each in gap.comments] == [(True, True)] * 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{word}{comment}" * 6_000, "{word}" * 6_000 + "{comment}" * 6_000, "{comment}" * 6_000 + "{word}" * 6_000],
+)
+def test_a_line_with_many_ignores_is_looked_through_once(text: str) -> None:
+    source = text.format(word='import "a.rts" ', comment="/* rtshcua: ignore E1303 because why */ ")
+    before = process_time()
+    made = attempt(source)
+    assert isinstance(made, str)
+    assert made.count("ignore") == 6_000
+    assert process_time() - before < 8  # a minute and more, when each walked all of it
+
+
+def test_more_comments_than_are_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(attempting, "MAX_TOKENS", 20)
+    fits = "//\n" * 10 + "/**/" * 10 + 'import "//"' + "\n"
+    assert isinstance(attempt(fits), str)
+    many = tmp_path / "many.rts"
+    many.write_text("//" * 50 + "\n" + fits)
+    laid = of_file(many, 100, write=True)
+    assert [each.message for each in laid.diagnostics] == [
+        f"`{shown(str(many))}` has more than 500,000 comments; no more are laid out"
+    ]
+    assert laid.unreadable
+    assert [each.code for each in laid.diagnostics] == [TOO_LARGE]
+    assert many.read_text() == "//" * 50 + "\n" + fits
+
+
+def test_more_words_than_are_read_are_not_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for module in (attempting, parsing):
+        monkeypatch.setattr(module, "MAX_TOKENS", 20)
+    many = tmp_path / "many.rts"
+    many.write_text('import "a.rts"\n' * 11)
+    laid = of_file(many, 100, write=True)
+    assert [each.code for each in laid.diagnostics] == [TOO_LARGE]
+    assert laid.unreadable
+
+
+def test_ignores_of_codes_that_there_are_not_cost_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ignoring, "MOST_GUESSES", 3)
+    found = ignores(Source("a.rts", "// rtshcua: ignore E1333 because why\n" * 5)).faults
+    assert [bool(each.fixes) for each in found] == [True] * 3 + [False] * 2
+    assert [each.code for each in found] == [UNKNOWN_IGNORE] * 5
+    many = ignores(Source("a.rts", "// rtshcua: ignore " + "E1303, " * 101 + "because why"))
+    assert [each.message for each in many.faults] == ["this names more than 100 codes, so it ignores nothing"]
+    assert many.given == ()
+    assert len(ignores(Source("a.rts", "// rtshcua: ignore " + "E1303, " * 100 + "because why")).given) == 100

@@ -6,6 +6,7 @@ from pathlib import Path
 from rtshcua import library
 from rtshcua.adapters.files.readable import Readable
 from rtshcua.adapters.store.writing import rewrite
+from rtshcua.diagnostics.codes import TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.attempt import attempt
@@ -73,4 +74,5 @@ def of_text(path: Path, data: bytes, width: int) -> Laid:
         return Laid(name, data, made.encode())
     from rtshcua.ground.format.format import formatted  # with the parser, which says why
 
-    return Laid(name, data, None, formatted(Source(name, text), width).diagnostics)
+    told = formatted(Source(name, text), width).diagnostics
+    return Laid(name, data, None, told, unreadable=any(each.code is TOO_LARGE for each in told))

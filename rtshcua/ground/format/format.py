@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.format.attempt import attempt
+from rtshcua.ground.format.attempt import attempt, crowded
+from rtshcua.ground.format.read import read
 from rtshcua.ground.format.same import Difference
 from rtshcua.ground.format.style import WIDTH
+from rtshcua.ground.language.faults import too_many_comments
 from rtshcua.ground.language.parse import parse
 
 
@@ -29,5 +31,7 @@ def formatted(source: Source, width: int = WIDTH) -> Formatted:
         return Formatted(made)
     if made is None:
         told = parse(source).diagnostics
+        if not told and (taken := read(source.text)) is not None and crowded(taken):
+            told = (too_many_comments(source.file),)
         return Formatted(None, told or (Difference("what can be read", 0).told(source),))
     return Formatted(None, (made.told(source),))

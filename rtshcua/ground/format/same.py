@@ -1,6 +1,7 @@
 """Whether two texts say the same: the same parse tree, the same words, the same comments between the same words."""
 
 from bisect import bisect_left
+from itertools import accumulate
 from typing import NamedTuple
 
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
@@ -30,13 +31,13 @@ class Difference(NamedTuple):
 
 class _Said(NamedTuple):
     """What is compared: the words and where they stand, the comments with how many words are before each, and for each
-    comment that ignores findings of a line the words on that line.
+    comment that ignores findings of a line how many words are before those on that line, and before what follows them.
     """
 
     words: list[str]
     starts: list[int]
     comments: list[tuple[int, str]]
-    ignored: list[list[str]]
+    ignored: list[tuple[int, int]]
 
 
 def difference(before: Read, after: Read | None) -> Difference | None:
@@ -79,27 +80,41 @@ def _said(read: Read) -> _Said:
     words = [word for word, counts in zip(read.words, counted, strict=True) if counts]
     starts = [start for start, counts in zip(read.starts, counted, strict=True) if counts]
     comments: list[tuple[int, str]] = []
-    ignored: list[list[str]] = []
+    ignored: list[tuple[int, int]] = []
     if "//" in text or "/*" in text:
         before = 0
+        counting = list(accumulate(counted, initial=0))
+        lines = _Lines(read)
         for end, start, counts in zip([0, *read.ends], [*read.starts, len(text)], [*counted, True], strict=True):
             if start - end > 1 and "/" in (gap := text[end:start]):
                 for found in COMMENT.finditer(gap):
                     comments.append((before, content(found[0])))
                     if ignores_line(found[0]):
-                        first, last = _on_line(read, end + found.start())
-                        line = zip(read.words[first:last], counted[first:last], strict=True)
-                        ignored.append([word for word, counts in line if counts])
+                        first, last = lines.about(end + found.start())
+                        ignored.append((counting[first], counting[last]))
             before += counts
     return _Said(words, starts, comments, ignored)
 
 
-def _on_line(read: Read, offset: int) -> tuple[int, int]:
-    """The tokens before a comment on its line; where there are none, those on the next line that has any."""
-    text, starts = read.text, read.starts
-    begin = bisect_left(starts, text.rfind("\n", 0, offset) + 1)
-    end = bisect_left(starts, offset)
-    if begin == end < len(starts):
-        after = text.find("\n", starts[end])
-        end = bisect_left(starts, after if after >= 0 else len(text))
-    return begin, end
+class _Lines:
+    """The lines that comments speak of, asked for in the order of the text; none is looked through twice, for one may
+    have all the text, and all the comments.
+    """
+
+    def __init__(self, read: Read) -> None:
+        self._text, self._starts = read.text, read.starts
+        self._begin = self._asked = 0  # where the line begins of what was asked for last, and what that was
+        self._next, self._after = -1, 0  # a token, and where its line ends
+
+    def about(self, offset: int) -> tuple[int, int]:
+        """The tokens before a comment on its line; where there are none, those on the next line that has any."""
+        text, starts = self._text, self._starts
+        self._begin = text.rfind("\n", self._asked, offset) + 1 or self._begin
+        self._asked = offset
+        begin, end = bisect_left(starts, self._begin), bisect_left(starts, offset)
+        if begin == end < len(starts):
+            if self._next != end:
+                after = text.find("\n", starts[end])
+                self._next, self._after = end, after if after >= 0 else len(text)
+            end = bisect_left(starts, self._after)
+        return begin, end

@@ -186,20 +186,25 @@ def _hold(read: Read, notes: dict[int, Gap], ended: list[int], kept: list[int]) 
     for number, symbol in enumerate(read.symbols):
         if symbol in SPACED and "\n" in read.text[read.starts[number] : read.ends[number]]:
             begun[number + 1] = 1
+    lines = list(accumulate(begun))  # each walked once: one line may have all the ignores of a file
+    before: dict[int, int] = {}  # by line, the last token before a comment that speaks of it
+    after: dict[int, int] = {}  # by line, the first token that such a comment at its beginning speaks of
     for number in ignoring:
         comments = notes[number].comments
         behind = not comments[0].first and "\n" not in comments[0].text
         if comments[0].ignores and behind:
-            token = number - 1
-            while token > 0 and not begun[token]:
-                held.add(token)
-                token -= 1
-            kept[token] = token > 0
+            before[lines[number - 1]] = number - 1
         if any(each.ignores for each in comments[behind:]):
-            token = number + 1
-            while token < count and not begun[token]:
-                held.add(token)
-                token += 1
-            if token < count:
-                kept[token] = 1
+            after.setdefault(lines[number], number + 1)
+    for token in before.values():
+        while token > 0 and not begun[token]:
+            held.add(token)
+            token -= 1
+        kept[token] = token > 0
+    for token in after.values():
+        while token < count and not begun[token]:
+            held.add(token)
+            token += 1
+        if token < count:
+            kept[token] = 1
     return held

@@ -84,6 +84,12 @@ def too_long(file: str) -> Diagnostic:
     return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
 
 
+def too_many_comments(file: str) -> Diagnostic:
+    """A file of more comments than are laid out."""
+    message = f"`{file}` has more than {MAX_TOKENS:,} comments; no more are laid out"
+    return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
+
+
 def too_many_files(by: Import) -> Diagnostic:
     """An import that, with those before it, names more files than a program may have."""
     message = f"the program has more than {MAX_FILES:,} files; this import and what comes after it are not looked at"

@@ -10,6 +10,7 @@ slug. What has no reason, or names no code that can be ignored, ignores nothing.
 
 import re
 from collections.abc import Iterator
+from itertools import islice
 from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
@@ -22,6 +23,10 @@ from rtshcua.ground.project.reasons import says_why
 
 _REASON = re.compile(r"(?:^|(?<=[\s,]))because(?!\S)")
 _NAME = re.compile(r"[^\s,]+")
+#: codes that one comment names; there are not that many
+MOST_NAMES = 100
+#: faults for which the nearest code is looked for: that takes long, and a file may have a hundred thousand
+MOST_GUESSES = 1_000
 _HELP = "write it as `// rtshcua: ignore E1304 because the authority's letter says 30 m`"
 
 
@@ -70,6 +75,10 @@ def _read(source: Source, comment: Comment, what: "re.Match[str]", faults: list[
     found = _REASON.search(what["rest"])
     written = what["rest"] if found is None else what["rest"][: found.start()]
     reason = "" if found is None else " ".join(what["rest"][found.end() :].split())
+    if len([*islice(_NAME.finditer(written), MOST_NAMES + 1)]) > MOST_NAMES:
+        message = f"this names more than {MOST_NAMES} codes, so it ignores nothing"
+        faults.append(Diagnostic(codes.UNKNOWN_IGNORE, message, comment.span, _HELP))
+        return
     names = [(each[0], Span(source.file, start + each.start(), start + each.end())) for each in _NAME.finditer(written)]
     if not says_why(reason):
         faults.append(_without_reason(comment))
@@ -83,7 +92,7 @@ def _read(source: Source, comment: Comment, what: "re.Match[str]", faults: list[
     for at, (name, span) in enumerate(names):
         code = code_named(name)
         if code is None or not can_be_ignored(code):
-            faults.append(_unknown(name, code, span))
+            faults.append(_unknown(name, code, span, guess=len(faults) < MOST_GUESSES))
         else:
             yield Ignore(
                 code, None if word == FILE else comment.about, reason, span, _removal(source, comment, names, at)
@@ -95,14 +104,14 @@ def _without_reason(comment: Comment) -> Diagnostic:
     return Diagnostic(codes.IGNORE_WITHOUT_REASON, message, comment.span, "end it with `because ...`")
 
 
-def _unknown(name: str, code: Code | None, span: Span) -> Diagnostic:
+def _unknown(name: str, code: Code | None, span: Span, *, guess: bool) -> Diagnostic:
     if code is not None:
         why = "is an error, and errors cannot be ignored"
         if code.severity is not Severity.ERROR:
             why = "is about ignores themselves, and cannot be ignored"
         return Diagnostic(codes.UNKNOWN_IGNORE, f"`{name}` {why}", span, "remove it, and correct what it is about")
     can = [code for code in REGISTRY.values() if can_be_ignored(code)]
-    near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)])
+    near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)]) if guess else None
     help = "codes are written as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
     fixes = () if near is None else (Fix(span, near, f"write `{near}`"),)
     return Diagnostic(codes.UNKNOWN_IGNORE, f"there is no code `{name}`", span, help, fixes=fixes)

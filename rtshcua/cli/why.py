@@ -20,12 +20,14 @@ from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.cli.subject import Subject, prepared, unpacked
 from rtshcua.cli.why_log import from_log
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.why.given import given
+from rtshcua.ground.why.given import given, settings
 from rtshcua.ground.why.nominal import lasting, nominal
 from rtshcua.ground.why.trace import trace
-from rtshcua.model.flat.situation import Context, Now
+from rtshcua.mavlink import dialect
+from rtshcua.model.flat.situation import Approval, Context, Now
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import MAX_BUNDLE, policy_digest, policy_payload
@@ -49,19 +51,23 @@ def why(
     record: Annotated[
         int | None, typer.Option(help="the number of a record in a log: a decision on a step or link, or an effect")
     ] = None,
+    approved: Annotated[
+        bool, typer.Option("--approved", help="whoever a `confirm` asks approved, when the step was released")
+    ] = False,
     mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
     """Show a decision step by step: what each step looked at, what decided, and what would have passed.
 
-    By hand: the step of a mission in a state in which its own conditions hold, but for what --state says. From a log:
-    the inputs that the record holds, and how the flight ended; without --record the last decision on a step that was
-    not `allow`, else the last on a step. Nothing is verified; `rtshcua verify-log` does that.
+    By hand: the step of a mission in a state in which its own conditions hold, but for what --state says, each signal
+    once; a member under `unknown at` is missing, as in a test. --approved grants what a `confirm` waits for. From a
+    log: the inputs that the record holds, and how the flight ended; without --record the last decision on a step that
+    was not `allow`, else the last on a step. Nothing is verified; `rtshcua verify-log` does that.
     """
     page = for_terminal()
     file = path / LOG if path.is_dir() else path
     if begins_as_log(file):
-        if step is not None or state or at is not None or waited or mission is not None:
+        if step is not None or state or at is not None or waited or approved or mission is not None:
             return fail(ExitCode.USAGE, "a log says itself what was decided on", "only --record goes with a log")
         shown = from_log(page, file, record)
     elif record is not None:
@@ -73,7 +79,7 @@ def why(
         subject = _subject(file, mission, utc_us, as_json)
         if isinstance(subject, ExitCode):
             return subject
-        shown = _by_hand(page, subject, step, state or [], utc_us, waited)
+        shown = _by_hand(page, subject, step, state or [], utc_us, waited, approved=approved)
     if isinstance(shown, ExitCode):
         return shown
     if as_json:
@@ -97,7 +103,14 @@ def _subject(path: Path, mission: str | None, at_us: int | None, as_json: bool) 
 
 
 def _by_hand(
-    page: Page, subject: Subject, step: int | None, settings: list[str], at_us: int | None, waited_ms: int
+    page: Page,
+    subject: Subject,
+    step: int | None,
+    texts: list[str],
+    at_us: int | None,
+    waited_ms: int,
+    *,
+    approved: bool,
 ) -> dict[str, object] | ExitCode:
     policy, count = subject.policy, len(subject.invocations)
     if step is None or not 0 <= step < count:
@@ -108,20 +121,37 @@ def _by_hand(
     flat = invocation.invocation
     utc_us = flat.issued_at_us if at_us is None else at_us
     now = Now(waited_ms * 1_000, utc_us, 0)
+    said, spoken = settings(texts), dialect.load()
+    if isinstance(said, Refusal):
+        return refuse(said)
     situation = nominal(subject.invocations, step, policy, now)
     for last in (False, True):  # what is set over time outweighs what follows from what is set of signals
-        for setting in settings:
-            changed = given(situation, setting, policy.policy)
+        for setting in said:
+            changed = given(situation, setting, policy.policy, spoken)
             if isinstance(changed, Refusal):
                 return refuse(changed)
             situation = changed
         if not last:
             situation = lasting(situation, policy, now)
     vehicle = policy.policy.vehicle.identity
-    context = Context(flat.binding, vehicle, policy.policy.version, 0, 0, flat.phase, CONSERVATIVE_US, ())
+    answers = _approvals(invocation) if approved else ()
+    context = Context(flat.binding, vehicle, policy.policy.version, 0, 0, flat.phase, CONSERVATIVE_US, answers)
     case = Case(invocation, situation, context, now, subject.phases)
     shown = show_why(page, trace(invocation, situation, policy, context, now), case)
     page.head("Taken for granted")
     page.row("state", "as the contract wants it, the vehicle where the plan has it, but for --state; and so for long")
     page.row("time", f"{utc(utc_us)}, {waited_ms} ms after the release")
+    if answers:
+        roles = dict.fromkeys(policy.policy.roles[each.role] for each in answers)
+        page.row("approvals", f"{' and '.join(roles)}, when the step was released")
     return shown
+
+
+def _approvals(invocation: PreparedInvocation) -> tuple[Approval, ...]:
+    """A grant of each role that a `confirm` asks, by as many people."""
+    return tuple(
+        Approval(confirm.number, role, 1, 0, person)
+        for confirm in invocation.candidates.confirms
+        for person, role in enumerate((confirm.rule.approver, confirm.rule.second))
+        if role != -1
+    )

@@ -7,6 +7,7 @@ from rtshcua.decision.evaluate import Tables
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.values import MISSING, Span, Value, interval, maybe, members
 from rtshcua.ground.analysis.plane import Plane
+from rtshcua.ground.analysis.reported import means_unknown
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract
 from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE
 from rtshcua.model.flat.policy import Policy
@@ -86,7 +87,7 @@ def signals(policy: Policy) -> Sequence[Value]:
 
 def _reported(signal: Signal) -> list[int]:
     """The members that an enumeration's signal may be: one that each of its sources lists as unknown is missing."""
-    return [value for value, _ in signal.labels if any(value not in source.unknown for source in signal.sources)]
+    return [value for value, _ in signal.labels if not means_unknown(signal, value)]
 
 
 def _moments(policy: Policy) -> tuple[Span, ...]:

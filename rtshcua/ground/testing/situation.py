@@ -7,13 +7,14 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.analysis.reported import means_unknown
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.testing.case import Tested
 from rtshcua.ground.testing.monitored import monitored
 from rtshcua.ground.why.nominal import lasting
 from rtshcua.model.flat.policy import RuleKind
-from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
+from rtshcua.model.flat.signal import POSITION, Signal
 from rtshcua.model.flat.situation import Approval, Now, State
 from rtshcua.model.ir.expression import Coordinates, Reference
 from rtshcua.model.ir.tests import Answer, Cell, Named, OverTime, Subject
@@ -101,7 +102,7 @@ class Situations:
             place = self._policy.lowered.zones.place(value)
             return (None, None) if place is None else (place[0], place[1])
         assert isinstance(value, int)
-        return (None,) if _means_unknown(signal, value) else (value,)
+        return (None,) if means_unknown(signal, value) else (value,)
 
     def _numbers(self, subject: OverTime) -> Sequence[int]:
         numbers = self._monitors.numbers(subject.condition)
@@ -141,11 +142,6 @@ class Situations:
             help=suggestion(answer.role.text, names) or waits,
             labels=[(under.declaration.name.span, "the policy is declared here")],
         )
-
-
-def _means_unknown(signal: Signal, value: int) -> bool:
-    """Whether the value of an enumeration is one that whoever reads the signal takes for "not known"."""
-    return signal.kind == ENUMERATION and all(value in source.unknown for source in signal.sources)
 
 
 def _truth(cell: Cell) -> int:

@@ -1,11 +1,17 @@
 """A state changed by hand: `battery=20 %`, `gps.fix=fix_3d`, `position=47.39 N, 8.54 E`, `wind.speed=unknown`."""
 
 import re
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.analysis.reported import extent, means_unknown
+from rtshcua.ground.checker.ranges import accepted
+from rtshcua.ground.checker.symbols import Extent
 from rtshcua.ground.language.exact import exact
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
@@ -19,11 +25,32 @@ _NUMBER = re.compile(r"(-?)\s*([0-9][0-9_]*(?:\.[0-9]+)?)\s*(\S*)(?:\s+above\s+h
 _PLACE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([NS])\s*,\s*([0-9]+(?:\.[0-9]+)?)\s*([EW])")
 
 
-def given(state: State, setting: str, policy: Policy) -> State | Refusal:
-    """The state with one signal changed; `name=unknown` for one that is missing, `CONDITION=true` over time."""
-    name, equals, text = (part.strip() for part in setting.rpartition("="))
-    if not equals:
-        return Refusal("usage", f"`{setting}` sets nothing", "write a signal and its value: `battery=20 %`")
+class Setting(NamedTuple):
+    """What is set, and to what, as written."""
+
+    name: str
+    text: str
+
+
+def settings(texts: Sequence[str]) -> tuple[Setting, ...] | Refusal:
+    """What is set by hand, each signal and each condition once."""
+    found: dict[str, Setting] = {}
+    for each in texts:
+        name, equals, text = (" ".join(part.split()) for part in each.rpartition("="))
+        if not equals:
+            return Refusal("usage", f"`{each}` sets nothing", "write a signal and its value: `battery=20 %`")
+        if name in found:
+            return Refusal("usage", f"`{name}` is given twice", "keep one of them")
+        found[name] = Setting(name, text)
+    return tuple(found.values())
+
+
+def given(state: State, setting: Setting, policy: Policy, dialect: Dialect) -> State | Refusal:
+    """The state with one signal changed; `name=unknown` for one that is missing, `CONDITION=true` over time.
+
+    As in a test, what the signal has under `unknown at` is missing, and what its fields cannot carry is refused.
+    """
+    name, text = setting
     signal = next((each for each in policy.signals if each.name == name), None)
     if signal is None:
         return _over_time(state, name, text, policy)
@@ -32,7 +59,9 @@ def given(state: State, setting: str, policy: Policy) -> State | Refusal:
     if text == NOT_KNOWN:
         found: tuple[int | None, ...] | Refusal = (None,) * len(slots)
     else:
-        found = _value(signal, text, policy)
+        found = _value(signal, text, policy, dialect)
+        if not isinstance(found, Refusal) and means_unknown(signal, found[0]):
+            found = (None,)
     if isinstance(found, Refusal):
         return found
     for slot, value in zip(slots, found, strict=True):
@@ -43,7 +72,7 @@ def given(state: State, setting: str, policy: Policy) -> State | Refusal:
 def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Refusal:
     """The truth of a condition over time, which is called as it is written."""
     conditions = [" ".join(monitor.when.text.split()) for monitor in policy.monitors]
-    if " ".join(name.split()) not in conditions:
+    if name not in conditions:
         names = [signal.name for signal in policy.signals]
         near = nearest(name, [*names, *conditions])
         known = ", ".join(f"`{each}`" for each in [*names, *conditions])
@@ -52,14 +81,13 @@ def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Re
     truth = _TRUTHS.get(text)
     if truth is None:
         return Refusal("usage", f"`{text}` is no truth of `{name}`", "write `true`, `false` or `unknown`")
-    wanted = " ".join(name.split())
     monitors = tuple(
-        truth if condition == wanted else old for condition, old in zip(conditions, state.monitors, strict=True)
+        truth if condition == name else old for condition, old in zip(conditions, state.monitors, strict=True)
     )
     return State(state.values, state.ages, monitors)
 
 
-def _value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refusal:
+def _value(signal: Signal, text: str, policy: Policy, dialect: Dialect) -> tuple[int, ...] | Refusal:
     if signal.kind == POSITION:
         return _place(signal, text, policy)
     if signal.kind == ENUMERATION:
@@ -68,10 +96,10 @@ def _value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refus
         near = nearest(text, labels)
         help = f"did you mean `{near}`?" if near is not None else f"it is one of {', '.join(labels)}"
         return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help) if value is None else (value,)
-    return _number(signal, text)
+    return _number(signal, text, extent(signal, dialect))
 
 
-def _number(signal: Signal, text: str) -> tuple[int, ...] | Refusal:
+def _number(signal: Signal, text: str, values: Extent) -> tuple[int, ...] | Refusal:
     dimension = Dimension(signal.dimension)
     measured = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
     units = ", ".join(f"`{name}`" for name, unit in UNITS.items() if unit.dimension is measured)
@@ -82,6 +110,9 @@ def _number(signal: Signal, text: str) -> tuple[int, ...] | Refusal:
     found = exact(match[2], match[3] or None, negative=bool(match[1]))
     if found.trouble is not None or found.dimension is not measured or abs(found.value) > MAX_VALUE:
         return Refusal("usage", f"`{text}` is no {dimension.value} that `{signal.name}` can have", help)
+    if not values.has(found.value):
+        accepts = accepted(values, dimension, found.value)
+        return Refusal("usage", f"`{signal.name}` is never `{text}`", accepts)
     return (found.value,)
 
 

@@ -41,6 +41,7 @@ def test_every_step_of_the_shipped_mission_is_admitted_as_its_contract_wants_the
         (["battery=32 %"], "state/violated", "battery > 35 %", ["35.01 %"]),
         (["battery=20%"], "state/violated", "battery > 35 %", ["35.01 %"]),
         (["gps.fix=unknown"], "state/unknown", "gps.fix >= fix_3d", []),
+        (["gps.fix=fix_2d"], "state/unknown", "gps.fix >= fix_3d", []),  # `unknown at`, as in a test
         (["position=47.39729 N, 8.54771 E"], "safety/airspace", "airspace inside city outside school", []),
     ],
 )
@@ -76,6 +77,9 @@ def test_late(capsys: pytest.CaptureFixture[str]) -> None:
         ([STANDARD, "--step", "0", "--state", "batery=3 %"], "did you mean `battery`?"),
         ([STANDARD, "--step", "0", "--state", "battery"], "sets nothing"),
         ([STANDARD, "--step", "0", "--state", "battery=3 m"], "write a ratio with one of the units `%`"),
+        ([STANDARD, "--step", "0", "--state", "battery=-1 %"], "it goes from `0 %` up to `100 %`"),
+        ([STANDARD, "--step", "0", "--state", "battery=101 %"], "the nearest value is `100 %`"),
+        ([STANDARD, "--step", "0", "--state", "battery=9 %", "--state", "battery = 9 %"], "`battery` is given twice"),
         ([STANDARD, "--step", "0", "--state", "battery=much"], "is no value of `battery`"),
         ([STANDARD, "--step", "0", "--state", "gps.fix=fix_4d"], "did you mean `fix_"),
         ([STANDARD, "--step", "0", "--state", "position=here"], "is no value of `position`"),
@@ -167,3 +171,36 @@ def test_by_hand_a_state_has_lasted_as_long_as_conditions_look_back(
     path.write_text(OVER_TIME, encoding="utf-8")
     options = [word for setting in settings for word in ("--state", setting)]
     assert shown(capsys, str(path), "--step", "0", *options)["outcome"] == outcome
+
+
+CONFIRMED = """
+import "lib:policies/site.rts"
+import "lib:skills/takeoff.rts"
+import "lib:skills/hover.rts"
+
+role supervisor, safety
+policy seen version 1 {
+  permit  takeoff by role operator through agent
+  confirm takeoff by role supervisor within 30 s
+  confirm takeoff by role supervisor and another of role safety within 30 s
+  permit  hover, return_home, emergency_land by any
+  contingency hover for 10 s, return_home, emergency_land
+}
+
+mission up under seen@1 on surveyor {
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 20 m) }
+  phase recovery  { return_home() }
+}
+"""
+
+
+def test_what_follows_an_approval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "seen.rts"
+    path.write_text(CONFIRMED, encoding="utf-8")
+    asked = (str(path), "--step", "0")
+    assert shown(capsys, *asked)["reason"] == "approval/awaited"
+    assert shown(capsys, *asked, "--approved")["outcome"] == "allow"
+    assert shown(capsys, *asked, "--approved", "--state", "battery=9 %")["reason"] == "state/violated"
+    assert shown(capsys, *asked, "--approved", "--waited", "31000")["reason"] == "timing/no-slack"
+    assert "approvals     supervisor and safety, when the step was released" in why(capsys, *asked, "--approved")[1]

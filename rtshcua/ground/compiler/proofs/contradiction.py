@@ -1,4 +1,5 @@
-"""E1101, E1102: what a skill requires, assumes and maintains cannot all hold at once; a clause that cannot fail.
+"""E1101, E1102: what a skill requires, assumes and maintains cannot all hold at once; nor all zones of an airspace; a
+clause that cannot fail.
 
 Of each skill for all arguments that it may be given, and of each step of a mission with the arguments that it has. The
 airspace counts too, but not for a skill that no permit names: it need not be one that flies there. The clauses and the
@@ -37,6 +38,7 @@ def prove(ground: Ground) -> None:
     permitted = {
         skill for rule in ground.prepared.policy.rules if rule.kind == RuleKind.PERMIT for skill in rule.skills
     }
+    _nowhere(ground)
     for number, contract in enumerate(ground.prepared.policy.contracts):
         space = ground.questions.space(number)
         parts = list(_clauses(ground, contract))
@@ -51,6 +53,42 @@ def prove(ground: Ground) -> None:
         _together(ground, [*airspace, *parts], space, ("skill", number), together, [(name, "the skill")], name)
         if any(found.code is codes.CONTRADICTION for found in ground.context.report.found[before:]):
             ground.impossible.add(number)
+
+
+def _nowhere(ground: Ground) -> None:
+    """Report an airspace in which a vehicle can be nowhere, at no time."""
+    declared, space = ground.lowered.declaration.airspace, ground.questions.space(0)
+    if declared is None:
+        return
+    zones = ground.lowered.zones
+    inside = [(name, tree.Inside(zones.zone(name.text, 0, smaller=True, span=name.span))) for name in declared.inside]
+    outside = [
+        (name, tree.Not(tree.Inside(zones.zone(name.text, 0, smaller=False, span=name.span))))
+        for name in declared.outside
+    ]
+    parts = [
+        Part(words, name.span, node)
+        for words, every in (("inside", inside), ("outside", outside))
+        for name, node in every
+    ]
+
+    def goals() -> list[Goal]:
+        return [(part.node, TRUE) for part in parts]
+
+    def impossible(some: list[Part]) -> bool:
+        return isinstance(satisfiable([(part.node, TRUE) for part in some], space), No)
+
+    if not isinstance(ground.questions.ask(("airspace",), goals, space), No):
+        return
+    conflict = minimal(parts, impossible)
+    ground.context.report.add(
+        codes.CONTRADICTION,
+        declared.span,
+        "nothing is left of the airspace: the vehicle can be nowhere in it",
+        help="it is inside of all zones after `inside`, and outside of all after `outside`: leave one out of those "
+        "marked, or take their union",
+        labels=[(part.span, f"it must be {part.words} of this") for part in conflict],
+    )
 
 
 def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:

@@ -1,6 +1,6 @@
 """Vehicles."""
 
-from rtshcua.diagnostics.codes import SYNTAX
+from rtshcua.diagnostics.codes import NOT_WRITTEN, SYNTAX
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
 from rtshcua.ground.language.build.zones import Zones
@@ -20,6 +20,9 @@ class Vehicles(Zones):
 
     def identity(self, span: Span, text: str) -> Part:
         """`identity "quad-07"`."""
+        if not text.strip():
+            help = 'say what the vehicle calls itself, as in `identity "quad-07"`: a bundle runs nowhere else'
+            self.report(NOT_WRITTEN, "the identity is empty", span, help)
         return Part("identity", span, text)
 
     def home(self, span: Span, place: Coordinates, within: Quantity) -> Part:

@@ -137,18 +137,20 @@ def test_a_log_that_lacks_what_is_asked_for(log: Path, capsys: pytest.CaptureFix
 OVER_TIME = """
 import "lib:policies/site.rts"
 import "lib:skills/takeoff.rts"
+import "lib:skills/goto.rts"
 import "lib:skills/hover.rts"
 
 policy calm version 1 {
-  permit  takeoff by role operator through agent  when wind.speed < 8 m/s for the last 3 s
-  forbid  takeoff by any when rising landed == in_air within the last 10 s
+  permit  takeoff by role operator through agent
+  permit  goto by role operator through agent  when wind.speed < 8 m/s for the last 3 s
+  forbid  goto by any when rising landed == in_air within the last 10 s
   permit  hover, return_home, emergency_land by any
   contingency hover for 10 s, return_home, emergency_land
 }
 
 mission up under calm@1 on surveyor {
   proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 20 m) }
+  phase departure { takeoff(altitude = 20 m) goto(47.39774 N, 8.54569 E, altitude = 20 m) }
   phase recovery  { return_home() }
 }
 """
@@ -170,7 +172,7 @@ def test_by_hand_a_state_has_lasted_as_long_as_conditions_look_back(
     path = tmp_path / "calm.rts"
     path.write_text(OVER_TIME, encoding="utf-8")
     options = [word for setting in settings for word in ("--state", setting)]
-    assert shown(capsys, str(path), "--step", "0", *options)["outcome"] == outcome
+    assert shown(capsys, str(path), "--step", "1", *options)["outcome"] == outcome
 
 
 CONFIRMED = """

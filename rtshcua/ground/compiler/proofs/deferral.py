@@ -101,6 +101,8 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
     latest = 0
     for step, invocation in zip(steps, invocations, strict=True):
         contract = invocation.invocation.contract
+        if _unpermitted(ground, step, invocation, latest):
+            return
         latest += approval(ground, invocation) + contract.deadline_us
         for clause in (*contract.require, *contract.assume):
             at = ground.case(invocation).at
@@ -115,7 +117,7 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
                     labels=[(ground.span(clause), "the contract asks for this")],
                 )
                 return
-        if _unpermitted(ground, step, invocation, latest) or _forbidden(ground, step, invocation, latest):
+        if _forbidden(ground, step, invocation, latest):
             return
         latest += contract.duration_us
 
@@ -140,7 +142,9 @@ def _forbidden(ground: Ground, step: Step, invocation: PreparedInvocation, lates
 
 
 def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
-    """Whether each permit that may cover a step must observe for longer than the flight up to it; reports it."""
+    """Whether each permit that may cover a step must observe for longer than the flight up to its release; reports it.
+    A step does not wait for a permit: it is denied.
+    """
     at, compiler = ground.case(invocation).at, ground.prepared.compiler
     permits = [permit.rule for permit in invocation.candidates.permits if permit.condition(at) & TRUE]
     nodes = [(rule, compiler.when(rule)) for rule in permits]
@@ -151,9 +155,10 @@ def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, lat
     ground.context.report.add(
         codes.NO_RESOLVER,
         step.span,
-        f"nothing permits this step before {_time(least)} were observed, and it begins no later than {_time(latest)} "
-        "after the run began, with which observation begins",
-        help="take a shorter window, or ask for it in a later step",
+        f"nothing permits this step before {_time(least)} were observed, and it is released "
+        + (f"no later than {_time(latest)} after the run began" if latest else "when the run begins")
+        + ", with which observation begins: it is denied then",
+        help="ask for it in a later step, or write a `forbid` of the opposite `within the last`: a step waits for that",
         labels=[(ground.span(rule), f"this permits it after {_time(window)}") for rule, window in needed],
     )
     return True

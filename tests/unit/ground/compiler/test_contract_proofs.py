@@ -204,7 +204,7 @@ RARE = "battery > 20 % within the last {}"
 @rows(
     ("permits", "expected"),
     [
-        ([LONG.format("10 s")], []),
+        ([LONG.format("1 ms")], ["E0717"]),  # no step waits for a permit: the first is denied at once
         ([LONG.format("11 s")], ["E0717"]),
         ([LONG.format("6 min")], ["E0717"]),
         ([f"altitude < 30 m and ({LONG.format('6 min')} or {LONG.format('7 min')})"], ["E0717"]),
@@ -214,7 +214,8 @@ RARE = "battery > 20 % within the last {}"
         ([f"not ({LONG.format('6 min')} and {RARE.format('7 min')})"], []),
         ([LONG.format("6 min"), LONG.format("7 min")], ["E0717"]),
         ([LONG.format("6 min"), f"altitude < 10 m or {LONG.format('7 min')}"], ["E0717"]),
-        ([LONG.format("6 min"), f"altitude < 30 m and {LONG.format('3 s')}"], []),
+        ([LONG.format("6 min"), f"altitude < 30 m and {LONG.format('3 s')}"], ["E0717"]),
+        ([LONG.format("6 min"), f"altitude < 30 m and {RARE.format('3 s')}"], []),
         ([LONG.format("6 min"), f"altitude < 10 m and {LONG.format('3 s')}"], ["E0717"]),  # not of this step
     ],
 )
@@ -226,6 +227,17 @@ def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected:
     about_steps = [each for each in found if each.code.id == "E0717"]
     assert [each.code.id for each in about_steps] == expected
     assert all(each.labels for each in about_steps)
+
+
+@pytest.mark.parametrize(("window", "expected"), [("40 s", []), ("41 s", ["E0717"])])
+def test_a_permit_of_a_later_step_is_known_by_its_release(window: str, expected: list[str]) -> None:
+    goto = f"permit goto by role operator through agent when {LONG.format(window)}"
+    text = (
+        "policy rules version 1 {\n  permit takeoff by role operator through agent\n"
+        f"  {goto}\n  permit hover, return_home, emergency_land by any\n  contingency return_home, emergency_land\n}}\n"
+    )
+    flight = mission("takeoff(altitude = 20 m)", "goto(47.39774 N, 8.54569 E, 20 m)", "return_home()")
+    assert [each.code.id for each in findings(program(text, flight))] == expected
 
 
 # ---------------------------------------------------------------- E1201 to E1203

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace as altered
 from pathlib import Path
+from shutil import rmtree
 from typing import cast
 
 import pytest
@@ -17,7 +18,7 @@ from reference.world import APPROVAL_KEY, LOG_KEY, MISSION_KEY, POLICY_KEY, ROOT
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.files.replay import FileReplayStore, looked_up
 from rtshcua.adapters.files.roots import RootStore, opened
 from rtshcua.adapters.files.signing import fingerprint, read_link_key
 from rtshcua.cli import launch
@@ -254,6 +255,21 @@ def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, w
     store.give_back(of.bundle.mission_digest)
     with pytest.raises(Refused):  # nothing of it is in the air
         launch._trusting(again, Path("old.bundle").read_bytes(), SystemClock())
+
+
+def test_what_flies_comes_down_where_something_else_is_in_the_state_folders_place(fleet: KeyStore) -> None:
+    """Neither what was accepted nor what was opened can be read then: only the vehicle tells whether it flies."""
+    of = launched(order())
+    rmtree(state_folder())
+    state_folder().touch()
+    with pytest.raises(NotADirectoryError):
+        looked_up(state_folder(), QUAD, of.bundle.mission_digest, of.expires_us, "bridge_inspection", 7)
+    trusted, _, loaded = launch._trusting(order(), Path("old.bundle").read_bytes(), SystemClock())
+    assert loaded.bundle.mission_digest == of.bundle.mission_digest
+    assert trusted.settle(resumed=True).endswith("it is brought down all the same")
+    with pytest.raises(Refused) as grounded:
+        trusted.settle(resumed=False)
+    assert grounded.value.code == ExitCode.INPUT
 
 
 class Late(SystemClock):

@@ -96,7 +96,9 @@ class FileReplayStore:
 def looked_up(state: Path, vehicle: str, digest: bytes, expires_us: int, policy: str, version: int) -> Opening:
     """What `open_once` would say; nothing is made, written or used up. Raises OSError."""
     folder = _folder(state, vehicle)
-    if not folder.exists():
+    try:
+        folder.stat()
+    except FileNotFoundError:  # any other error is told: what is in the way of the folder is no absence
         return Opening.OPENED
     with _alone(folder):
         return _refusal(folder, digest, expires_us, policy, version) or Opening.OPENED

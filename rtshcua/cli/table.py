@@ -46,6 +46,7 @@ COMMANDS = (
     Row("recall", "fly", "call a flight home, with your signature"),
     Row("replace", "fly", "hand a flight the mission that takes the place of its own"),
     Row("mcp", "fly", "let an agent's host propose missions to a vehicle that waits (MCP)"),
+    Row("agent-bundle", "fly", "make a plug-in of that for hosts of agents: OpenClaw, Claude"),
     Row("doctor", "fly", "say what a vehicle supports, and what would stop a mission"),
     Row("qualify", "fly", "fly a short test of the autopilot itself, and sign the result"),
     Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station"),

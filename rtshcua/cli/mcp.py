@@ -1,5 +1,6 @@
 """`rtshcua mcp`: an agent proposes missions to a vehicle that waits, over the Model Context Protocol."""
 
+import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,8 +8,9 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.mcp_server.access import HOST, PATH, BadToken, token_of
 from rtshcua.adapters.store.reading import read_regular
-from rtshcua.cli.faults import distrust, fail
+from rtshcua.cli.faults import distrust, fail, say, words_of
 from rtshcua.cli.unlock import check_trusted, unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import cose
@@ -31,21 +33,32 @@ def mcp(
     with_: Annotated[list[Path], typer.Option("--with", help="the sources of that policy (repeatable)")],
     mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    http: Annotated[
+        int | None,
+        typer.Option(metavar="PORT", min=0, max=65_535, help="serve HTTP on this machine alone, 0: any port"),
+    ] = None,
+    token_file: Annotated[
+        Path | None, typer.Option(help="the token that a host has to send, made where missing")
+    ] = None,
 ) -> ExitCode:
-    """Serve an agent's host over the standard streams (MCP): check and propose missions, follow them, replan.
+    """Serve an agent's host (MCP), over the standard streams or HTTP: check and propose missions, follow them, replan.
 
     It signs with one key, the agent's mission key, and has no other. It reaches nothing but SOCKET, and no tool arms,
     sets a parameter, opens a link or takes a key. Needs the extra `mcp`. docs/agents.md says how to set hosts up.
 
-    Ends with 0 with the host, 2 where the command line is wrong or the extra is missing, 3 where a file cannot be read,
-    4 for a key that is not an agent's.
+    With --http it answers at http://127.0.0.1:PORT/mcp whoever sends the token in the file as `Authorization: Bearer`.
+
+    Ends with 0 with the host, 2 where the command line is wrong or the extra is missing, 3 where a file cannot be read
+    or the port is taken, 4 for a key that is not an agent's, or a token that others may read.
     """
     try:
-        from rtshcua.adapters.mcp_server.server import serve
+        from rtshcua.adapters.mcp_server.server import serve, serve_http
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in ("mcp", "anyio"):
             raise
         return fail(ExitCode.USAGE, "the MCP server is not installed", 'in the checkout: `pip install ".[mcp]"`')
+    if (http is None) != (token_file is None):
+        return fail(ExitCode.USAGE, "`--http` and `--token-file` go together", "or neither: the standard streams")
     store = KeyStore(data_folder())
     try:
         envelope, _ = envelopes(read_regular(bundle, MAX_BUNDLE))
@@ -71,7 +84,22 @@ def mcp(
         signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
         return Desk(Missions(with_, str(library.root())), signer, to, Following(to))
 
-    serve(make)
+    if http is None or token_file is None:
+        serve(make)
+        return ExitCode.OK
+    try:
+        token = token_of(token_file)
+    except BadToken as error:
+        return fail(ExitCode.UNTRUSTED, str(error), "`chmod 600`, and a new token")
+    with socket.socket() as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((HOST, http))
+            listener.listen()
+        except OSError as error:
+            return fail(ExitCode.INPUT, f"cannot listen at {HOST}:{http}: {words_of(error)}", "choose another port")
+        say(f"serves http://{HOST}:{listener.getsockname()[1]}{PATH} to whoever sends the token in `{token_file}`")
+        serve_http(make, listener, token)
     return ExitCode.OK
 
 

@@ -1,12 +1,16 @@
 """`rtshcua mcp` as a host has it: the SDK's own client over standard streams, and a vehicle that waits."""
 
 import asyncio
+import http.client
 import json
+import re
+import select
+import socket
 import sys
 import tempfile
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -14,8 +18,10 @@ from typing import Any
 import pytest
 
 pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
+import httpx
 from mcp import ClientSession, McpError, StdioServerParameters, types
 from mcp.client.stdio import stdio_client
+from mcp.client.streamable_http import streamable_http_client
 
 from rtshcua.wire.request import STEP
 
@@ -394,3 +400,91 @@ def test_an_agent_cancels_its_flight_and_the_contingency_brings_it_home(ground: 
     assert kinds[-1] == 2, "the contingency"
     verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
     assert verified.code == 0, verified.events
+
+
+@contextmanager
+def served(ground: Any, base: str, place: Path) -> Iterator[tuple[int, str]]:
+    """A server over HTTP: its port, and the token that it made."""
+    token = ground.folder / "token"
+    run = ground.start(
+        "mcp", base, "--to", str(place), "--with", str(POLICY), "--http", "0", "--token-file", str(token)
+    )
+    assert select.select([run.process.stderr], [], [], 60)[0]
+    said = run.process.stderr.readline().decode()
+    found = re.search(r"http://127\.0\.0\.1:(\d+)/mcp", said)
+    assert found, said
+    assert token.read_text() not in said
+    try:
+        yield int(found[1]), token.read_text().strip()
+    finally:
+        run.process.terminate()
+        run.process.wait(20)
+
+
+def status_of(port: int, **headers: str) -> int:
+    link = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    try:
+        link.request("POST", "/mcp", body=b"{}", headers={"Content-Type": "application/json"} | headers)
+        return link.getresponse().status
+    finally:
+        link.close()
+
+
+def test_over_http_who_has_the_token_is_served_and_nobody_else(ground: Any, base: str, place: Path) -> None:
+    updated: list[str] = []
+
+    async def message(what: Any) -> None:
+        told = what.root if isinstance(what, types.ServerNotification) else None
+        if isinstance(told, types.ResourceUpdatedNotification):
+            updated.append(str(told.params.uri))
+
+    with served(ground, base, place) as (port, token):
+        right = {"Authorization": f"Bearer {token}"}
+        assert status_of(port) == 401
+        assert status_of(port, Authorization=f"Bearer {token}x") == 401
+        assert status_of(port, **right, Origin="https://evil.example") == 403
+        assert status_of(port, **right, Host="evil.example") == 421
+        assert status_of(port, **right) in (400, 406), "the protocol's own answer to what is no request"
+        bound = [line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+        assert [each for each in bound if each.endswith(f":{port:04X}") and not each.startswith("0100007F")] == []
+
+        async def work() -> None:
+            async with (
+                httpx.AsyncClient(headers=right, timeout=30) as client,
+                streamable_http_client(f"http://127.0.0.1:{port}/mcp", http_client=client) as (read, write, _),
+                ClientSession(read, write, message_handler=message) as session,
+            ):
+                await session.initialize()
+                assert (await call(session, "check_mission", mission=PROPOSAL))["accepted"]
+                assert (await call(session, "cancel"))["code"] == "not-flying"
+                await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
+                peers: list[asyncio.StreamWriter] = []
+                door = await asyncio.start_unix_server(lambda _, peer: peers.append(peer), str(place))
+                while not peers:
+                    await asyncio.sleep(0.02)
+                peers[0].write(b'{"type":"hello","vehicle":"quad-07","flight":"ab"}\n')
+                while not updated:
+                    await asyncio.sleep(0.02)
+                with socket.create_connection(("127.0.0.1", port)) as half:  # says nothing more, and hangs up
+                    half.sendall(b"POST /mcp HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1000000\r\n\r\n{")
+                    half.shutdown(socket.SHUT_WR)
+                    assert (await call(session, "describe_vehicle"))["stage"] == "waiting"
+                door.close()
+                peers[0].close()
+
+        asyncio.run(asyncio.wait_for(work(), 100))
+        assert status_of(port, **right, **{"Mcp-Session-Id": "0" * 32}) in (404, 406), "a session of nobody"
+
+
+def test_a_token_that_others_may_read_serves_nobody(ground: Any, base: str, place: Path) -> None:
+    token = ground.folder / "token"
+    token.write_text("a" * 40)
+    token.chmod(0o644)
+    words = ("mcp", base, "--to", str(place), "--with", str(POLICY))
+    run = ground.start(*words, "--http", "0", "--token-file", str(token))
+    _, err = run.process.communicate()
+    assert run.process.returncode == 4, err
+    assert b"not private" in err
+    run = ground.start(*words, "--http", "0")
+    _, err = run.process.communicate()
+    assert run.process.returncode == 2, err

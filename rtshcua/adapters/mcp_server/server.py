@@ -1,8 +1,11 @@
-"""The Model Context Protocol over standard streams: tools, resources and progress. The only module that has the SDK."""
+"""The Model Context Protocol over standard streams and HTTP: tools, resources, progress and subscriptions. The only
+module that has the SDK.
+"""
 
 import json
 import logging
 import os
+import socket
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -10,6 +13,7 @@ from functools import partial
 from typing import Any, Final
 
 import anyio
+import uvicorn
 from anyio.abc import TaskGroup
 from anyio.to_thread import run_sync
 from mcp import types
@@ -17,9 +21,11 @@ from mcp.server.lowlevel import Server
 from mcp.server.lowlevel.helper_types import ReadResourceContents
 from mcp.server.session import ServerSession
 from mcp.server.stdio import stdio_server
+from mcp.server.streamable_http_manager import StreamableHTTPSessionManager
 from pydantic import AnyUrl
 
 from rtshcua import __version__
+from rtshcua.adapters.mcp_server.access import refusal
 
 INSTRUCTIONS: Final = (
     "Propose missions to a drone that waits. Read describe_policy first; check_mission costs nothing; a rejection "
@@ -43,6 +49,10 @@ _ENDS: Final = types.ToolAnnotations(readOnlyHint=False, destructiveHint=True, i
 _RESOURCES: Final = {"policy": "describe_policy", "schema": "schema", "log": "read_evidence", "flight": "flight"}
 #: those that change, and of which a host may be told when they do
 _CHANGING: Final = frozenset({"log", "flight"})
+#: sessions over HTTP at a time, how long one may be idle, in seconds, and connections at a time
+_MOST_SESSIONS: Final = 8
+_IDLE_S: Final = 1_800.0
+_MOST_CONNECTIONS: Final = 64
 #: how many resources may be followed at once, by all hosts together; one more takes the place of the oldest
 _MOST_FOLLOWED: Final = 32
 
@@ -135,6 +145,38 @@ async def _speak(opening: Opening) -> None:
         others.start_soon(_warm, opening)
         server = made(opening, others)
         await server.run(incoming, outgoing, server.create_initialization_options())
+        others.cancel_scope.cancel()
+
+
+def serve_http(make: Callable[[], Any], listener: socket.socket, token: bytes) -> None:
+    """Speak over streamable HTTP at a socket that listens on this machine alone, until a signal ends it."""
+    logging.getLogger("mcp").setLevel(logging.CRITICAL)
+    anyio.run(_speak_http, Opening(make), listener, token)
+
+
+async def _speak_http(opening: Opening, listener: socket.socket, token: bytes) -> None:
+    opening.begin()
+    port = listener.getsockname()[1]
+    async with anyio.create_task_group() as others:
+        manager = StreamableHTTPSessionManager(
+            made(opening, others), max_sessions=_MOST_SESSIONS, session_idle_timeout=_IDLE_S
+        )
+
+        async def answer(scope: dict[str, Any], receive: Any, send: Any) -> None:
+            refused = refusal(scope["path"], scope["headers"], token, port)
+            if refused is None:
+                await manager.handle_request(scope, receive, send)
+                return
+            headers = [(b"content-length", b"0"), *([(b"www-authenticate", b"Bearer")] if refused == 401 else [])]
+            await send({"type": "http.response.start", "status": refused, "headers": headers})
+            await send({"type": "http.response.body", "body": b""})
+
+        settings = uvicorn.Config(
+            answer, lifespan="off", ws="none", log_config=None, access_log=False, server_header=False,
+            limit_concurrency=_MOST_CONNECTIONS, timeout_graceful_shutdown=1,
+        )  # fmt: skip
+        async with manager.run():
+            await uvicorn.Server(settings).serve(sockets=[listener])
         others.cancel_scope.cancel()
 
 

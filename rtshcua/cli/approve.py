@@ -26,7 +26,7 @@ from rtshcua.cli.documents import (
 )
 from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
-from rtshcua.cli.subject import prepared
+from rtshcua.cli.shown import shorten
 from rtshcua.cli.unlock import terminal, unlock_person
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -35,6 +35,9 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.untrusted import Untrusted
+
+#: how much of a mission's name is shown
+NAME_SHOWN: Final = 80
 
 app = typer.Typer(add_completion=False)
 
@@ -102,10 +105,9 @@ def approve(
             issued_at_us=now_us,
             expires_at_us=now_us + seconds * 1_000_000,
         )
-        if isinstance(sound := prepared(flying.policy, flying.mission), ExitCode):
-            return sound
         told = words.step(flying.policy, steps[step])
-        say(f"step {step} of `{flying.mission.name}` on `{said.vehicle}`: `{told}`")
+        mission = shorten(flying.mission.name, NAME_SHOWN)  # the proposer's word: it pushes nothing out of sight
+        say(f"step {step} of `{mission}` on `{said.vehicle}`: `{told}`")
         planned = planned_otherwise(flying.policy, steps[step])
         if planned is not None:
             told += ", a path that is not the planner's"

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -19,11 +19,15 @@ from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.cli.faults import fail
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.trusting import LAPSED, REVOKED
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import cose
-from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, open_bundle
+from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, BundleError, open_bundle
 from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
@@ -70,11 +74,27 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
             raise
         found = _of_before(data, trusted if root is not None else None, error)
     vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
+    missions = [found.mission]
     for path in replacements:
         document = read_regular(path, MAX_DOCUMENT)
         newer = open_replacement(document, root=trusted, vehicle=vehicle, flight=None, bundle=found, now=now)
         found = fit_replacement(newer, found, released=0)
+        missions.append(newer.mission)
+    if not stops:
+        _expect_sense(found.policy, missions)
     return found
+
+
+def _expect_sense(policy: Policy, missions: Sequence[Mission]) -> None:
+    """What a vehicle would not take is not signed for it: whoever signed a mission may say there what does not fly.
+
+    Raises `BundleError`.
+    """
+    ready = prepare(policy)
+    for mission in missions:
+        wrong = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
+        if isinstance(wrong, Refusal):
+            raise BundleError("malformed", f"this would be refused on board: {wrong.text}")
 
 
 def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bundle:

@@ -5,7 +5,11 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.roots import opened
 from rtshcua.cli.app import main
 from rtshcua.cli.documents import deliver
 from rtshcua.cli.faults import say
@@ -21,6 +25,9 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.specification import parse_specification
 from rtshcua.ground.language.parse import parse
 from rtshcua.library import root
+from rtshcua.wire.binding import bind
+from rtshcua.wire.bundle import envelopes, mission_payload, open_bundle, seal_under
+from rtshcua.wire.keys import Duty
 
 ESCAPES = "\x1b[2K\r\x9b1mapproved\u202e\u2066\u200b\u00ad\ufe0f\U000e0041\u3164\nerror: none"
 PROPOSAL = (root() / "missions" / "proposal.json").read_bytes()
@@ -92,6 +99,26 @@ def test_what_is_approved_is_told_before_it_is_signed(
     assert "may be flown as supervisor? [y/N]" in err
     assert err.index("inspect_area(") < err.index("[y/N]")
     assert (low / "yes").exists() == bool(seen) == (code is ExitCode.OK)
+
+
+def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whoever has a mission key signs what no compiler would: a name that reads as the step, and pushes ours away."""
+    store = KeyStore(data_folder())
+    trusted, data = opened(store.root()), (low / "low.bundle").read_bytes()
+    bundle = open_bundle(data, root=trusted, vehicle=None, now_us=0)
+    key = store.signing_key(Duty.MISSION, whose="agent")
+
+    def named(name: str) -> ExitCode:
+        mission = bind(replace(bundle.mission, name=name), bundle.policy_digest)
+        (low / "low.bundle").write_bytes(seal_under(envelopes(data)[0], mission_payload(mission), mission_key=key))
+        capsys.readouterr()
+        return main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT])
+
+    assert named(f"low` on `quad-07`: `hover(time = 5 s)`{' ' * 4000}`") == ExitCode.INPUT
+    assert "would be refused on board: the name of the mission is no name" in capsys.readouterr().err
+    assert not (low / "yes").exists()
+    assert named("hover_5_s_above_home" * 400) == ExitCode.OK
+    assert len(capsys.readouterr().err.split("`inspect_area(")[0]) < 160
 
 
 def test_a_script_at_a_terminal_is_not_asked(

@@ -26,6 +26,9 @@ def mission(mission: Mission, policy: Policy) -> Iterator[str]:
     ):
         if mine != policys:
             yield f"{name} `{mine}` is not the policy's, `{policys}`"
+    for what, name in (("mission", mission.name), *(("phase", phase) for phase in mission.phases)):
+        if not _is_name(name):  # people are shown it beside what they sign and what flies: it is no place for sentences
+            yield f"the name of the {what} is no name: letters of ASCII, digits, `_` and `.` make one"
     yield from within("number of invocations", len(mission.invocations), 0, MAX_INVOCATIONS)
     yield from within("number of phases", len(mission.phases), 0, MAX_PHASES)
     if len(set(mission.phases)) != len(mission.phases):
@@ -51,6 +54,11 @@ def _rules_words(mission: Mission, policy: Policy) -> Iterator[str]:
         found = worded.get(one_line(decisive.text))
         if found is not None:
             yield posing(found)
+
+
+def _is_name(name: str) -> bool:
+    """Whether a text is a name as sources have it."""
+    return name.isascii() and all(part.isidentifier() for part in name.split("."))
 
 
 def _phases(contract: Contract, mission: Mission) -> int:

@@ -408,11 +408,19 @@ def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: i
     assert isinstance(prepare_mission(phases(step, bits), POLICY), tuple)
 
 
+NO_NAME = "no name: letters of ASCII, digits, `_` and `.` make one"
+
+
 @rows(
     ("mission", "what"),
     [
         (replace(MISSION, policy="other"), "policy `other` is not the policy's, `bridge_inspection`"),
         (replace(MISSION, policy_version=8), "policy version `8` is not the policy's, `7`"),
+        *(
+            (replace(MISSION, name=name), f"the name of the mission is {NO_NAME}")
+            for name in ("", "low` on `quad-07`: `hover()", "a.", "1st", "caf\u00e9", "a b", "a\n")
+        ),
+        (replace(MISSION, phases=("departure", "x y", "recovery")), f"the name of the phase is {NO_NAME}"),
         (replace(MISSION, vehicle="quad-08"), "vehicle `quad-08` is not the policy's, `quad-07`"),
         (replace(MISSION, invocations=MISSION.invocations * 4097), "number of invocations 16388 is not in 0..16384"),
         (replace(MISSION, phases=("p",) * 65), "number of phases 65 is not in 0..64"),

@@ -135,6 +135,7 @@ def launch(order: Launch) -> ExitCode:
     clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
     utc = _utc(order, clock)
     trust, log_key, loaded = _trusting(order, bundle, clock)
+    log_kid = log_key.kid
     witnesses = Witnessing(order.witnesses, trust.root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
     with ExitStack() as view:  # it may still be shown when everything else is over
@@ -148,7 +149,7 @@ def launch(order: Launch) -> ExitCode:
             if order.wait_s is not None:
                 transport, agents = _stand_by(order, loaded, stack)
                 (bundle, loaded), trust = _wait(
-                    order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents
+                    order, loaded, trust, log_kid, past, clock, interrupts, slack, transport, agents
                 )
             root, signed_root = trust.root, trust.signed
             loaded.preparation.owes(debts.left)
@@ -170,7 +171,7 @@ def launch(order: Launch) -> ExitCode:
             vehicle.driver.asks_utc = utc.waits
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
-            lapsed = _lapsed(bundle, signed_root, loaded, clock)
+            lapsed = _lapsed(bundle, signed_root, log_kid, loaded, clock)
             _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
             if order.sortie is not None:
                 events += order.sortie.before(vehicle, clock)
@@ -200,7 +201,7 @@ def launch(order: Launch) -> ExitCode:
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
                 past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
-                lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, loaded, clock),
+                lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, log_kid, loaded, clock),
                 simulated=simulation.told(order.speed, own=order.link is None),
             )  # fmt: skip
             del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
@@ -265,7 +266,7 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 
 
 def _wait(
-    order: Launch, base: Loaded, trusted: Trusted, log_key: SigningKey, past: Past | None, clock: LinkClock,
+    order: Launch, base: Loaded, trusted: Trusted, log_key: bytes, past: Past | None, clock: LinkClock,
     interrupts: Interrupts, slack: int, transport: Transport, agents: Agents,
 ) -> tuple[Admitted, Trusted]:  # fmt: skip
     """Wait, connected, for the bundle that flies, and under what it is trusted; the one of a flight that broke off in
@@ -320,7 +321,7 @@ def _broken_off(
 
 
 def _admit(
-    order: Launch, data: bytes, base: Loaded, trusted: Trusted, log_key: SigningKey, signing: Signing, clock: LinkClock
+    order: Launch, data: bytes, base: Loaded, trusted: Trusted, log_key: bytes, signing: Signing, clock: LinkClock
 ) -> Loaded | Refusal:
     """What `run` asks of a bundle before it connects, of one that was handed in; and that its policy is the one that is
     waited under. It flies as the flight that the sockets tell of.
@@ -333,11 +334,10 @@ def _admit(
                 f"it is under {theirs.name}@{theirs.version}, and this vehicle waits under {ours.name}@{ours.version}"
             )
             return Refusal("other-policy", text, "the policy's envelope is that of the bundle that is waited with")
-        _expect_log_key_speaks(log_key, trusted.root, loaded, clock.now())
         if loaded.bundle.mission_digest == base.bundle.mission_digest:  # an agent has it; a person may have signed
             text = "it is the bundle that is waited with: that says the policy, and its own mission does not fly"
             return Refusal("waited-with", text, "sign a mission of your own under its policy")
-        _expect_current(_lapsed(data, trusted.signed, loaded, clock), resumed=False)
+        _expect_current(_lapsed(data, trusted.signed, log_key, loaded, clock), resumed=False)
         _hear(order, loaded, signing)
     except Refused as refused:
         return Refusal(refused.slug, str(refused), refused.help or "")
@@ -416,18 +416,17 @@ def _loading(
         now = Now(now.monotonic_us, 0, now.utc_error_us)
     _expect_log_key(key, trusted.root)
     loaded = _load(order, bundle, trusted.root, now, flight)
-    _expect_log_key_speaks(key, trusted.root, loaded, now)
+    _expect_current(_unverifiable(trusted.root, key.kid, loaded.vehicle, now.utc_us), resumed=False)
     return loaded
 
 
-def _expect_log_key_speaks(key: SigningKey, root: TrustRoot, loaded: Loaded, now: Now) -> None:
-    """Raises `Refused` for a log key that may not speak for the vehicle at that moment."""
-    refusal = key_refusal(root.keys_for(Duty.LOG)[key.kid], vehicle=loaded.vehicle, now_us=now.utc_us)
-    if refusal is not None:
-        text = f"the log key {key.kid.hex()} may not speak for `{loaded.vehicle}` now: nobody could verify the log"
-        raise Refused(
-            code_of(refusal), refusal, text, "`--log-key` gives one that may; `rtshcua keys replace` makes it"
-        )
+def _unverifiable(root: TrustRoot, log_key: bytes, vehicle: str, now_us: int) -> Refused | None:
+    """Why nobody could verify a log that the key of this name signs now; None where they could."""
+    refusal = key_refusal(root.keys_for(Duty.LOG)[log_key], vehicle=vehicle, now_us=now_us)
+    if refusal is None:
+        return None
+    text = f"the log key {log_key.hex()} may not speak for `{vehicle}` now: nobody could verify the log"
+    return Refused(code_of(refusal), refusal, text, "`--log-key` gives one that may; `rtshcua keys replace` makes it")
 
 
 def _may_have_flown(order: Launch, loaded: Loaded) -> bool:
@@ -463,15 +462,17 @@ def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
     return UtcWatch.simulated(clock)
 
 
-def _lapsed(bundle: bytes, signed_root: bytes, loaded: Loaded, clock: LinkClock) -> Refused | None:
-    """Why what was verified by this machine's time of day does not hold by the vehicle's; None where it does."""
+def _lapsed(bundle: bytes, signed_root: bytes, log_key: bytes, loaded: Loaded, clock: LinkClock) -> Refused | None:
+    """Why what was verified by this machine's time of day, or before a wait, does not hold by the vehicle's now; None
+    where it does. `log_key` names the one that signs the log.
+    """
     now_us = clock.now().utc_us
     try:
         root = open_root(signed_root, pinned=cose.unverified(signed_root, limit=MAX_ROOT).kid, now_us=now_us)
         open_bundle(bundle, root=root, vehicle=loaded.vehicle, now_us=now_us)
     except Untrusted as error:
         return Refused(code_of(error.slug), *untrusted(error))
-    return None
+    return _unverifiable(root, log_key, loaded.vehicle, now_us)
 
 
 def _expect_current(lapsed: Refused | None, *, resumed: bool) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace as altered
 from pathlib import Path
 from shutil import rmtree
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
@@ -298,10 +299,13 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
     if not accepted:
         RootStore(state_folder(), QUAD).path.unlink()
     of = launched(order())
-    assert launch._lapsed(bundle, fleet.root(), of, SystemClock()) is None
+    log_key = fleet.signing_key(Duty.LOG).kid
+    assert launch._lapsed(bundle, fleet.root(), log_key, of, SystemClock()) is None
+    lapsed = launch._lapsed(bundle, fleet.root(), log_key, of, Late())  # by the vehicle's clock, or after a long wait
+    assert lapsed is not None
     with pytest.raises(Refused) as fresh:  # nothing of it flew
         launch._trusting(order(), bundle, Late())
-    assert fresh.value.slug == ("expired" if duty is Duty.ROOT else "key-expired")
+    assert fresh.value.slug == lapsed.slug == ("expired" if duty is Duty.ROOT else "key-expired")
     store = FileReplayStore(state_folder(), QUAD)
     store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
     trusted, _, loaded = launch._trusting(order(), bundle, Late())
@@ -315,11 +319,19 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
         launch._trusting(order(dry_run=True), bundle, Late())
 
 
+def replace_mission(base: Loaded) -> Loaded:
+    """Another mission is waited with."""
+    flight = SimpleNamespace(flight=base.in_force.flight)
+    bundle = SimpleNamespace(policy_digest=base.bundle.policy_digest, mission_digest=b"")
+    return cast("Loaded", SimpleNamespace(bundle=bundle, in_force=flight))
+
+
 def test_no_bundle_is_admitted_once_the_log_key_has_expired_that_the_wait_began_with(fleet: KeyStore) -> None:
     expiring(fleet, Duty.LOG)
     bundle = Path("old.bundle").read_bytes()
     trusted, key, base = launch._trusting(order(), bundle, SystemClock())
-    refusal = launch._admit(order(), bundle, base, trusted, key, cast("Signing", None), Late())
+    other = replace_mission(base)
+    refusal = launch._admit(order(), bundle, other, trusted, key.kid, cast("Signing", None), Late())
     assert isinstance(refusal, Refusal)
     assert (refusal.slug, "the log key" in refusal.text) == ("key-expired", True)
 

@@ -52,7 +52,7 @@ def hand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     )  # fmt: skip
     waits = launch._load(order, base.read_bytes(), trusted.root, clock.now(), secrets.token_bytes(16))
     signing: Any = SimpleNamespace(unheard=frozenset())
-    log_key = KeyStore(data_folder()).signing_key(Duty.LOG)
+    log_key = KeyStore(data_folder()).signing_key(Duty.LOG).kid
 
     def handed(name: str) -> str:
         outcome = launch._admit(order, Path(name).read_bytes(), waits, trusted, log_key, signing, clock)

@@ -12,6 +12,7 @@ enforcement boundary says whether it is to be trusted.
 
 import errno
 import os
+import re
 import socket
 import struct
 import time
@@ -25,7 +26,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from rtshcua.onboard.ports import Presented
-from rtshcua.wire.document import MAX_DOCUMENT
+from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
 
 #: how many may follow a flight at once at one socket; one more takes the place of whoever was quiet for longest
 MOST_READERS: Final = 8
@@ -352,6 +353,9 @@ class _Line(msgspec.Struct):
 
 _read_line = msgspec.json.Decoder(_Line).decode
 _NUMBER = 1
+_FLIGHT = re.compile(rf"[0-9a-f]{{{2 * FLIGHT_BYTES}}}")
+#: the longest line that a client waits for the end of, in bytes: a flight tells of a mission in one
+LONGEST_TOLD: Final = 16 << 20
 
 
 def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answered:
@@ -364,10 +368,9 @@ def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answere
 def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
     """The id of the flight that listens at `path`, as it says itself. Raises OSError."""
     said = _asked(path, b"", lambda said: said.type == "hello", patience_s)
-    try:
-        return bytes.fromhex(said.flight)
-    except ValueError:
-        raise ConnectionError(f"what listens at `{path}` says no id of a flight") from None
+    if _FLIGHT.fullmatch(said.flight) is None:
+        raise ConnectionError(f"what listens at `{path}` says no id of a flight")
+    return bytes.fromhex(said.flight)
 
 
 def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s: float) -> _Line:
@@ -411,7 +414,17 @@ def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_
                 raise ConnectionResetError("the flight hung up: it is over, or it did not take the document")
             *lines, waiting = (waiting + chunk).split(b"\n")
             for each in lines:
-                said = _read_line(each)
+                said = _told(each)
                 if wanted(said):
                     return said
+            if len(waiting) > LONGEST_TOLD:
+                raise ConnectionError("what listens there is no flight: its line does not end")
     raise TimeoutError("the flight did not answer")
+
+
+def _told(line: bytes) -> _Line:
+    """A line, of whoever listens there. Raises OSError for what is none of a flight's."""
+    try:
+        return _read_line(line)
+    except (ValueError, msgspec.DecodeError, RecursionError):
+        raise ConnectionError("what listens there is no flight: it says what no flight says") from None

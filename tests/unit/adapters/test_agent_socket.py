@@ -7,6 +7,7 @@ import stat
 import threading
 from base64 import b64encode
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import count, repeat
 from pathlib import Path
 
@@ -354,6 +355,38 @@ def test_a_client_hands_in_and_waits_for_its_answer(agents: AgentSocket) -> None
             agents.answer(event.sender, "expired", event.document.decode())
         client.join(0.001)
     assert said == [("expired", "paper")]
+
+
+@pytest.mark.parametrize(
+    ("says", "found"),
+    [
+        (b"\xff\xfeno JSON\n", "says what no flight says"),
+        (b"[" * 100_000 + b"\n", "says what no flight says"),
+        (b'{"type":"hello","x":' + b"[" * 100_000 + b"\n", "says what no flight says"),
+        (b'{"type":5}\n', "says what no flight says"),
+        (b'{"type":"hello","flight":"abcd"}\n', "says no id of a flight"),
+        (b'{"type":"hello","flight":"' + b"zz" * 16 + b'"}\n', "says no id of a flight"),
+        (b"x" * 400_000, "its line does not end"),
+    ],
+)
+def test_a_client_of_what_is_no_flight(folder: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, found: str) -> None:
+    """Whoever listens at a path may say anything; who recalls a flight there is told so."""
+    monkeypatch.setattr(agent_socket, "LONGEST_TOLD", 200_000)
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(folder / "s"))
+        listener.listen()
+
+        def serve() -> None:
+            link, _ = listener.accept()
+            with link, suppress(OSError):
+                link.sendall(says)
+                link.recv(1)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(ConnectionError, match=found):
+            flight_at(folder / "s")
+        thread.join(10)
 
 
 def test_a_client_of_nobody(folder: Path) -> None:

@@ -71,8 +71,8 @@ def agent_bundle(
         )
         return fail(ExitCode.INPUT, text, "compile BUNDLE from these sources", slug="wrong-policy")
     words = ["mcp", _whole(bundle), "--to", _whole(to), *(word for path in with_ for word in ("--with", _whole(path)))]
-    for option, path in (("--mission-key", mission_key), ("--passphrase-file", passphrase_file)):
-        words += [] if path is None else [option, _whole(path)]
+    for option, key in (("--mission-key", mission_key), ("--passphrase-file", passphrase_file)):
+        words += [] if key is None else [option, _whole(key)]
     files = plugin(words, _whole(to), f"{policy.name}@{policy.version}", policy.vehicle.name)
     try:
         taken = lay(files, directory, replace=force)

@@ -9,7 +9,7 @@ from rtshcua.simulation.place import Point
 
 LEAD_S = 0.4
 """How much earlier it begins to slow down than the plan says: what leaning back takes."""
-_SPARE = 1.4
+SPARE = 1.4
 """How much harder than planned it may brake, to keep to the plan."""
 ARRIVED_M, ARRIVED_M_S = 0.5, 0.4
 """Nearer and slower than this, it is there."""
@@ -76,7 +76,7 @@ def past(here: Point, target: Point, speed: float, agility: Agility) -> Past | N
 
 def hardest(agility: Agility) -> float:
     """The most that it may accelerate on its way to a target, in m/s^2."""
-    return max(agility.acceleration, agility.approach.braking * _SPARE)
+    return max(agility.acceleration, agility.approach.braking * SPARE)
 
 
 def is_above(body: Body, north: float, east: float, within: float) -> bool:

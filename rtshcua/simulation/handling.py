@@ -87,6 +87,10 @@ class Handling:
     descent: float = 1.5
     return_up: float = 30.0
     """The height of the way home."""
+    return_speed: float = 0.0
+    """The speed of the way home; 0: as it flies else."""
+    acceleration: float = 3.0
+    """The most that it gains and loses of its speed in a second, m/s, where it flies to a target."""
     takeoff_up: float = 2.5
     """The height of a takeoff that names none."""
     idle_disarm_s: float = 10.0

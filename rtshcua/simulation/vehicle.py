@@ -3,6 +3,7 @@
 It is the same for both flavours; `Handling` and the mode table hold what differs.
 """
 
+from dataclasses import replace
 from enum import Enum, IntEnum, auto
 from math import copysign, hypot, inf
 
@@ -133,8 +134,10 @@ class Vehicle:
     @property
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
-        wanted, most = self.handling.cruise if self._speed is None else self._speed, self.handling.max_speed
-        return min(wanted, most)
+        handling = self.handling
+        if self.mode is Mode.RETURN and handling.return_speed > 0:
+            return min(handling.return_speed, handling.max_speed)
+        return min(handling.cruise if self._speed is None else self._speed, handling.max_speed)
 
     @speed.setter
     def speed(self, value: float) -> None:
@@ -369,8 +372,10 @@ class Vehicle:
         self._comes_back = False
 
     def _steer_to_target(self) -> None:
-        agility = self.handling.agility
-        self._approach, self._hardest = agility.approach, guidance.hardest(agility)
+        agility, most = self.handling.agility, self.handling.acceleration
+        self._approach, self._hardest = agility.approach, min(guidance.hardest(agility), most)
+        if most < agility.approach.braking * guidance.SPARE:
+            self._approach = replace(agility.approach, braking=most / guidance.SPARE)
 
     def _fly(self, dt: float, wind: tuple[float, float], error: tuple[float, float], sees: bool) -> None:
         body, agility = self.body, self.handling.agility

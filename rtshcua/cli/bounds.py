@@ -3,6 +3,19 @@
 from rtshcua.ground.compiler.bounds import Bounds, rounded_energy, rounded_time
 
 
+def steps_told(bounds: Bounds) -> list[str]:
+    """A line for each step: what it is proved to take at most."""
+    return [
+        f"  {number} {each.skill}: at most {rounded_time(each.time_us)}, {each.energy / 100:.1f} % of a full charge"
+        for number, each in enumerate(bounds.steps, 1)
+    ]
+
+
+def bounds_dict(bounds: Bounds) -> dict[str, object]:
+    """The same for a program."""
+    return bounds._asdict() | {"steps": [each._asdict() for each in bounds.steps]}
+
+
 def bounds_told(bounds: Bounds) -> str:
     """The line for a person; times rounded up to the second, energy to the percent."""
     steps = f"{bounds.invocations} step{'s' * (bounds.invocations != 1)}"

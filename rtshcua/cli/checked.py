@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rtshcua.cli.asked import SPECIFICATION, unfolded
-from rtshcua.cli.bounds import bounds_told
+from rtshcua.cli.bounds import bounds_dict, bounds_told, steps_told
 from rtshcua.cli.checking import Mission, check_all
 from rtshcua.cli.earlier import Earlier, earlier_policies
 from rtshcua.cli.faults import say
@@ -49,6 +49,8 @@ def check_sources(
         out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
         for mission in found.missions:
             out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
+            for line in steps_told(mission.bounds):
+                out(line)
         for left_out in found.left_out:
             out(left_out.told())
         for each in found.versions:
@@ -64,7 +66,7 @@ def check_sources(
             out(drawn)
     return findings.finish(
         code,
-        missions=[{"mission": each.name, "file": each.file} | each.bounds._asdict() for each in found.missions],
+        missions=[{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
         versions=[{"policy": each.name, "version": each.version, "earlier": each.earlier} for each in found.versions],
         left_out=[each._asdict() for each in found.left_out],
     )

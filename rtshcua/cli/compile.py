@@ -9,7 +9,7 @@ import typer
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import replace
-from rtshcua.cli.bounds import bounds_told
+from rtshcua.cli.bounds import bounds_dict, bounds_told
 from rtshcua.cli.faults import untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
@@ -121,7 +121,7 @@ def compile(
     return findings.finish(
         ExitCode.OK,
         bundle=_described(compiled.policy, compiled.mission, target, data, signers),
-        bounds=None if compiled.bounds is None else compiled.bounds._asdict(),
+        bounds=None if compiled.bounds is None else bounds_dict(compiled.bounds),
     )
 
 

@@ -2,7 +2,8 @@
 needs.
 """
 
-from rtshcua.decision.values import ABSENT, FALSE, TRUE, UNKNOWN, Truth, Value
+from rtshcua.decision.flying import SECOND, charge, home_us
+from rtshcua.decision.values import ABSENT, FALSE, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.volume import Volume
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, Parameter
 from rtshcua.model.flat.limits import FULL
@@ -37,39 +38,45 @@ def longest(contract: Contract, vehicle: Vehicle, limit_us: int = 0) -> int:
     return limit_us or contract.duration_us or vehicle.endurance_us
 
 
-SECOND = 1_000_000  # us
-
-
 class Energy:
     """What one contract needs of the charge, in 1/10000 of a full battery: to finish, to come home from the farthest
     planned place, and the vehicle's reserve.
 
     A skill that ends on the ground needs no way home, and it is what the reserve is kept for; the others are those that
-    `stays` is true of.
+    `stays` is true of. `asked` is the speed that the step asks for, 0 if none.
     """
 
-    __slots__ = ("_fixed", "_range", "stays")
+    __slots__ = ("_asked", "_fixed", "_vehicle", "stays")
 
-    def __init__(self, contract: Contract, vehicle: Vehicle) -> None:
+    def __init__(self, contract: Contract, vehicle: Vehicle, asked: int = 0) -> None:
         self.stays = contract.motion.kind not in (MotionKind.HOME, MotionKind.LAND)
         self._fixed = contract.energy + (vehicle.reserve if self.stays else 0)
-        self._range = vehicle.speed * vehicle.endurance_us  # mm that a full charge flies, times SECOND
+        self._vehicle, self._asked = vehicle, asked
 
-    def needed(self, distance: int) -> int:
+    def way_home(self, distance: int, heights: tuple[int, int]) -> int:
+        """The charge for the way home from `distance` mm away and anywhere between two heights, rounded up."""
+        vehicle, speeds = self._vehicle, self._vehicle.speeds
+        if speeds is None:
+            return -(-distance * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
+        return charge(speeds, home_us(vehicle, speeds, distance, heights, self._asked))
+
+    def needed(self, distance: int, heights: tuple[int, int] = (0, 0)) -> int:
         """The charge needed when the farthest planned place is `distance` mm from home, rounded up."""
-        return self._fixed - (-distance * SECOND * FULL // self._range) if self.stays else self._fixed
+        return self._fixed + self.way_home(distance, heights) if self.stays else self._fixed
 
     def suffices(self, battery: Value, volume: Volume) -> Truth:
         """Whether the battery holds what is needed; unknown when the charge is, or the place that counts."""
         low, high, gap, _ = battery
-        if self.stays and volume.place.located > gap:
-            gap = volume.place.located
+        if self.stays:
+            gap = max(gap, volume.place.located, volume.height[2] if self._vehicle.speeds else PRESENT)
         if gap == ABSENT:
             return UNKNOWN
         nearest, farthest = volume.farthest
-        most = self.needed(farthest)
+        lowest, highest = volume.height[0], volume.height[1]
+        most = self.needed(farthest, (lowest, highest))
         if low >= most:
             truth = TRUE
         else:
-            truth = FALSE if high < (most if nearest == farthest else self.needed(nearest)) else TRUE | FALSE
+            same = nearest == farthest and lowest == highest
+            truth = FALSE if high < (most if same else self.needed(nearest, (highest, lowest))) else TRUE | FALSE
         return truth | UNKNOWN if gap else truth

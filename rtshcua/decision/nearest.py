@@ -298,7 +298,7 @@ def _slower(invocation: PreparedInvocation, policy: PreparedPolicy) -> tuple[Nea
 
 def _charged(invocation: PreparedInvocation, policy: PreparedPolicy, at: Environment) -> tuple[Nearest, ...]:
     volume = invocation.planner.volume(at.slots, policy.tables.known)
-    needed = invocation.energy.needed(volume.farthest[1])
+    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
     return tuple(
         Nearest(signal.name, signal.dimension, needed, ())
         for signal in policy.policy.signals

@@ -361,7 +361,7 @@ def prepare_invocation(
             flown_at(contract.motion, plan.altitude, policy.policy.vehicle),
             policy.policy.vehicle.position_error,
         ),
-        energy=Energy(contract, policy.policy.vehicle),
+        energy=Energy(contract, policy.policy.vehicle, plan.speed),
         reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),
         phase=_phase(invocation, policy.policy, phases),
         rests_us=MAX_GAP if monitored(clauses) else MAX_DURATION,

@@ -14,14 +14,14 @@ from math import isqrt
 from typing import NamedTuple
 
 from rtshcua.decision.case import environment, situation
-from rtshcua.decision.contracts import SECOND
 from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.flying import SECOND
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume, distance
 from rtshcua.decision.zones import Place, Sweep
-from rtshcua.model.flat.limits import FULL, MAX_SPEED
+from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.situation import Now, State
 
 
@@ -104,20 +104,20 @@ def holding(invocation: PreparedInvocation, state: State, policy: PreparedPolicy
     if policy.airspace is not None:
         truth = policy.airspace.keeps(volume.place, at, lasts_us)
         checks.append(Unkept(policy.airspace.airspace.text, EVERYWHERE[truth]))
-    checks.append(Unkept(WAY_HOME, way_home(at, volume, policy)))
+    checks.append(Unkept(WAY_HOME, way_home(at, volume, invocation)))
     return tuple(check for check in checks if check.truth != TRUE)
 
 
-def way_home(at: Environment, volume: Volume, policy: PreparedPolicy) -> Truth:
+def way_home(at: Environment, volume: Volume, invocation: PreparedInvocation) -> Truth:
     """Whether the battery holds the reserve and the way home from anywhere in a volume, position error aside.
 
-    The way is counted as when a skill is admitted (`energy`): its length at the vehicle's speed, rounded up.
+    The way is counted as when a skill is admitted (`Energy`), rounded up.
     """
-    vehicle = policy.policy.vehicle
+    policy, vehicle = invocation.policy, invocation.policy.policy.vehicle
     charge, _, gap, _ = at.slots[policy.tables.known.battery]
-    if gap != PRESENT or volume.place.located != PRESENT:
+    if gap != PRESENT or volume.place.located != PRESENT or (vehicle.speeds and volume.height[2] != PRESENT):
         return UNKNOWN
-    home = -(-volume.farthest[1] * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
+    home = invocation.energy.way_home(volume.farthest[1], volume.height[:2])
     return TRUE if charge >= vehicle.reserve + home else FALSE
 
 
@@ -154,6 +154,6 @@ def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
         if truth != TRUE:
             yield Unkept(policy.airspace.airspace.text, truth)
     if invocation.energy.stays:
-        truth = way_home(at, volume, policy)
+        truth = way_home(at, volume, invocation)
         if truth != TRUE:
             yield Unkept(WAY_HOME, truth)

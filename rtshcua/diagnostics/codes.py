@@ -214,6 +214,7 @@ MISSION_TIME = _code("E0809", "mission-time", "a mission may last longer than it
 MISSION_STEPS = _code("E0810", "mission-steps", "a mission has more steps than it says, or than fit on board")
 MISSION_ENERGY = _code("E0811", "mission-energy", "a mission may need more energy than it says")
 OVER_CHARGE = _code("E0812", "over-charge", "a mission may need more energy than a full charge")
+STEP_ENERGY = _code("E0814", "step-energy", "a step may take more of the charge than its skill says")
 
 # E09: mission specifications (structured input of an agent)
 NOT_JSON = _code("E0901", "not-json", "the specification is not JSON")

@@ -8,6 +8,9 @@ from rtshcua.simulation.config import HOME, Extra, SimulationConfig
 from rtshcua.simulation.place import Home
 
 _CRUISE_MM_S = 5_000
+#: what a simulated vehicle flies at most, if nothing is chosen, and at all
+_MOST_MM_S = 12_000
+_FASTEST_MM_S = 15_000
 _TOLD_IN = {
     "RADIO_STATUS": Extra.RADIO, "DISTANCE_SENSOR": Extra.RANGE, "OBSTACLE_DISTANCE": Extra.RANGE,
     "WIND": Extra.WIND, "WIND_COV": Extra.WIND,
@@ -23,15 +26,18 @@ def _extras(policy: Policy) -> frozenset[Extra]:
 
 
 def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
-    """A vehicle with a policy's home, its endurance, its return, no faster than it, with the sensors that it reads;
-    `chosen` is what else it is.
+    """A vehicle with a policy's home, its endurance, its return, as fast as it says at least, with the sensors that it
+    reads; `chosen` is what else it is.
     """
     vehicle, projection = policy.vehicle, policy.projection
+    kept = _CRUISE_MM_S if vehicle.speeds is None else max(vehicle.speeds.cruise, vehicle.speeds.homeward)
+    cruise = min(kept, vehicle.speed or kept, _FASTEST_MM_S)
     fits: dict[str, Any] = {
         "home": Home(projection.latitude, projection.longitude, HOME.amsl_mm),
         "hover_us": vehicle.endurance_us,
         "extras": _extras(policy),
-        "cruise_mm_s": min(_CRUISE_MM_S, vehicle.speed or _CRUISE_MM_S),
+        "cruise_mm_s": cruise,
+        "max_speed_mm_s": max(cruise, _MOST_MM_S),
     }
     if vehicle.return_altitude:
         fits["return_mm"] = vehicle.return_altitude

@@ -171,12 +171,14 @@ def test_a_survey_stops_before_what_stands_in_its_way(flavour: str) -> None:
 
 
 JUMP = "gps-jump,at=50s,north=300m,east=0m"
+#: farther than a return comes in its time
+FAR_JUMP = "gps-jump,at=50s,north=1000m,east=0m"
 JUMPED = ["takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_land"]
 
 
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str) -> None:
-    flown = fly_on(flavour, JUMP, fence=False)
+    flown = fly_on(flavour, FAR_JUMP, fence=False)
     assert flown.ending is Ending.ABORTED
     assert flown.dispatched() == JUMPED
 

@@ -20,8 +20,8 @@ DAY = 86_400
 #: 2026-06-01T00:00Z, seconds
 MIDNIGHT = 20_605 * DAY
 #: seconds: from the issue to the first step; deadline and longest duration of the steps; a link home lasts so long
-WAIT, TAKEOFF, FLY, RETURN = 300, (10, 30), (5, 60), (10, 120)
-HOVER, HOMEWARD, ALL_LINKS = 10, 120, 1_500
+WAIT, TAKEOFF, FLY, RETURN = 300, (10, 60), (5, 120), (10, 240)
+HOVER, HOMEWARD, ALL_LINKS = 10, 240, 1_500
 
 
 def _scale() -> tuple[float, float]:
@@ -194,7 +194,7 @@ def _text(
             "skill fly(target: position, altitude: altitude in 5 m .. 60 m) {\n  motion fly to target at altitude\n",
             f"  class tactical\n  deadline {FLY[0]} s\n  valid for 40 min\n  lasts at most {FLY[1]} s\n",
             f"  maintain position {_side(maintain)}\n" if maintain else "",
-            f"  fallback hover for {HOVER} s, return_home, emergency_land\n  energy at most 6 %\n}}\n",
+            f"  fallback hover for {HOVER} s, return_home, emergency_land\n  energy at most 15 %\n}}\n",
             "policy rules version 1 {\n  permit takeoff, hover, return_home, emergency_land by any\n",
             "  permit fly by any",
             f" when target {_side(permit)}\n" if permit else "\n",

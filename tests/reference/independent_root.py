@@ -113,7 +113,7 @@ def _bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) 
     policy_payload, _ = _envelope(first, root, "policy", vehicle, now_us)
     mission_payload, key = _envelope(second, root, "mission", vehicle, now_us)
     match _whole(policy_payload), _whole(mission_payload):
-        case ["rtshcua/policy", 5, [*policy]], ["rtshcua/mission", 1, [*flown]]:
+        case ["rtshcua/policy", 6, [*policy]], ["rtshcua/mission", 1, [*flown]]:
             pass
         case _:
             raise Untrusted("not a policy, version 5, and a mission, version 1")

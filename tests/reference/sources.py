@@ -43,7 +43,7 @@ def skill(name: str, **parts: str) -> str:
         "valid": "for 40 min",
         "lasts": "at most 1 min",
         "fallback": "return_home, emergency_land",
-        "energy": "at most 5 %",
+        "energy": "at most 9 %",
         **parts,
     }
     return f"skill {name} {{\n" + "".join(f"  {key} {value}\n" for key, value in written.items() if value) + "}\n"

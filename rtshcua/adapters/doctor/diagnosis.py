@@ -298,6 +298,7 @@ def _qualification(
 
 # ---------------------------------------------------------------- the vehicle as it stands, whatever it is to fly
 
+_METRE: Final = 1_000  # mm
 _ACCURATE_MM: Final = 5_000
 
 
@@ -452,7 +453,8 @@ def settings_told(
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
     for setting in told:
         name = setting.parameter
-        yield _setting(setting, values[name], setting.needs(policy, reach), meant.get(name))
+        other = meant.get(setting.otherwise, values.get(setting.otherwise))
+        yield _setting(setting, values[name], setting.needs(policy, reach), meant.get(name), other)
     for name in meant:
         if name not in values:
             found = f"it does not tell `{name}`, which `--set` names: a run would be refused"
@@ -466,10 +468,12 @@ def _words(setting: Setting, value: float) -> str:
     return f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
 
 
-def _setting(setting: Setting, value: float, need: Need | None, meant: float | None) -> VehicleFinding:
+def _setting(
+    setting: Setting, value: float, need: Need | None, meant: float | None, otherwise: float | None
+) -> VehicleFinding:
     """What it is, what is needed, and how to change it. What a mission cannot fly with is said as `mission/unready`.
 
-    `meant` is what a run with the same `--set` would set it to; then that is judged.
+    `meant` is what a run with the same `--set` would set it to; then that is judged. `otherwise` counts if it is 0.
     """
     slug, name = f"settings/{setting.parameter.lower()}", setting.parameter
     found = f"{setting.about}: {_words(setting, value)} ({name} = {value:g})"
@@ -482,14 +486,17 @@ def _setting(setting: Setting, value: float, need: Need | None, meant: float | N
         better = setting.better
         how = f"; set `{name}` to {better:g}" if better is not None else ""
         return _graded(slug, found, setting.words.get(better, "") if better is not None else "", why + how, warns=True)
-    if need is None or setting.mm == 0 or (value == 0 and "0: nowhere" in setting.about):
+    if value == 0 and otherwise is not None:
+        value = otherwise
+    if need is None or setting.mm == 0 or (value == 0 and "(0: " in setting.about):
         return VehicleFinding(slug, OK, found)
     has = value * setting.mm
+    exact = setting.mm == _METRE and "speed" in setting.about  # a number with decimals, of which they count
     if need.least is not None and has < need.least - SAME_MM:
-        wanted, should = "at least", -(-need.least // setting.mm)
+        wanted, should = "at least", need.least / _METRE if exact else -(-need.least // setting.mm)
     elif need.most is not None and has > need.most + SAME_MM:
-        wanted, should = "at most", need.most // setting.mm
+        wanted, should = "at most", need.most / _METRE if exact else need.most // setting.mm
     else:
         return VehicleFinding(slug, OK, found)
-    bound = should * setting.mm / 1_000
-    return _graded(slug, found, f"{wanted} {bound:g}{setting.unit}", f"set `{name}` to {should}", warns=True)
+    bound = should * setting.mm / _METRE
+    return _graded(slug, found, f"{wanted} {bound:g}{setting.unit}", f"set `{name}` to {should:.10g}", warns=True)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.policy import Policy
 
 
@@ -23,7 +24,8 @@ class Setting(NamedTuple):
     """A parameter, what it is about, its values in words, and why some of them are worth a warning.
 
     `better` is a value to set in place of those. For a number, `mm` is how many mm, or mm/s, one of it is, and `needs`
-    what a policy and the reach of a mission need of it; None where nothing does.
+    what a policy and the reach of a mission need of it; None where nothing does. Where it is 0, `otherwise` names the
+    parameter that counts in its place.
     """
 
     parameter: str
@@ -33,6 +35,7 @@ class Setting(NamedTuple):
     better: float | None = None
     mm: int = 0
     needs: Callable[[Policy, Reach], Need | None] = lambda _policy, _reach: None
+    otherwise: str = ""
 
     @property
     def unit(self) -> str:
@@ -41,11 +44,58 @@ class Setting(NamedTuple):
 
 
 def _speed(policy: Policy, _: Reach) -> Need | None:
-    return Need(most=policy.vehicle.speed) if policy.vehicle.speed else None
+    vehicle = policy.vehicle
+    return Need(vehicle.speeds.cruise if vehicle.speeds else None, vehicle.speed) if vehicle.speed else None
+
+
+def _speed_and_return(policy: Policy, _: Reach) -> Need | None:
+    vehicle = policy.vehicle
+    least = max(vehicle.speeds.cruise, vehicle.speeds.homeward) if vehicle.speeds else None
+    return Need(least, vehicle.speed) if vehicle.speed else None
 
 
 def _climb(policy: Policy, _: Reach) -> Need | None:
-    return Need(most=policy.vehicle.climb) if policy.vehicle.climb else None
+    vehicle = policy.vehicle
+    return Need(vehicle.speeds.climb if vehicle.speeds else None, vehicle.climb) if vehicle.climb else None
+
+
+def _descent(policy: Policy, _: Reach) -> Need | None:
+    vehicle = policy.vehicle
+    return Need(vehicle.speeds.descent if vehicle.speeds else None, vehicle.climb) if vehicle.climb else None
+
+
+def _takeoff(policy: Policy, _: Reach) -> Need | None:
+    return Need(policy.vehicle.speeds.climb) if policy.vehicle.speeds else None
+
+
+def _homeward(policy: Policy, _: Reach) -> Need | None:
+    return Need(policy.vehicle.speeds.homeward) if policy.vehicle.speeds else None
+
+
+def _landing(policy: Policy, _: Reach) -> Need | None:
+    return Need(policy.vehicle.speeds.landing) if policy.vehicle.speeds else None
+
+
+def _slow_below(policy: Policy, _: Reach) -> Need | None:
+    return Need(most=policy.vehicle.speeds.landing_below) if policy.vehicle.speeds else None
+
+
+def _gains(slows: int) -> Callable[[Policy, Reach], Need | None]:
+    """What it must gain of speed in a second to keep its acceleration on a whole leg, slowing down by no more than
+    `slows` mm/s in a second before a target, as recorded.
+    """
+
+    def needs(policy: Policy, _: Reach) -> Need | None:
+        if policy.vehicle.speeds is None:
+            return None
+        kept = policy.vehicle.speeds.acceleration
+        if kept <= slows:
+            return Need(kept)
+        # speeding up to v and slowing down again takes v / gains / 2 + v / slows / 2 longer than the way at v, and may
+        # take v / kept; where slowing down alone takes more, nothing is enough
+        return Need(-(-kept * slows // (2 * slows - kept)) if kept < 2 * slows else MAX_SPEED)
+
+    return needs
 
 
 def _returns(policy: Policy, _: Reach) -> Need | None:
@@ -94,10 +144,14 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("GF_MAX_HOR_DIST", "its own fence ends, from home (0: nowhere)", mm=1_000, needs=_far),
         Setting("GF_MAX_VER_DIST", "its own fence ends, above home (0: nowhere)", mm=1_000, needs=_high),
         Setting("RTL_RETURN_ALT", "height of a return", mm=1_000, needs=_returns),
-        Setting("MPC_XY_CRUISE", "speed across where a step says none", mm=1_000, needs=_speed),
+        Setting("MPC_XY_CRUISE", "speed across where a step says none", mm=1_000, needs=_speed_and_return),
         Setting("MPC_XY_VEL_MAX", "greatest speed across", mm=1_000),
         Setting("MPC_Z_VEL_MAX_UP", "greatest speed up", mm=1_000, needs=_climb),
-        Setting("MPC_Z_VEL_MAX_DN", "greatest speed down", mm=1_000, needs=_climb),
+        Setting("MPC_Z_VEL_MAX_DN", "greatest speed down", mm=1_000, needs=_descent),
+        Setting("MPC_TKO_SPEED", "speed up at a takeoff", mm=1_000, needs=_takeoff),
+        Setting("MPC_LAND_SPEED", "speed down at the end of a landing", mm=1_000, needs=_landing),
+        Setting("MPC_LAND_ALT1", "above home a landing gets slow", mm=1_000, needs=_slow_below),
+        Setting("MPC_ACC_HOR", "speed gained across in a second", mm=1_000, needs=_gains(750)),
         Setting(
             "CP_DIST", "collision prevention keeps away, in position flight (below 0: off)", mm=1_000,
         ),
@@ -169,10 +223,22 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         ),
         Setting("WPNAV_SPEED", "speed across where a step says none", mm=10, needs=_speed),
         Setting("WPNAV_SPEED_UP", "speed up", mm=10, needs=_climb),
-        Setting("WPNAV_SPEED_DN", "speed down", mm=10, needs=_climb),
+        Setting("WPNAV_SPEED_DN", "speed down", mm=10, needs=_descent),
+        Setting("WPNAV_ACCEL", "speed gained across in a second", mm=10, needs=_gains(1_250)),
+        Setting(
+            "RTL_SPEED", "speed across on a return (0: as elsewhere)", mm=10, needs=_homeward, otherwise="WPNAV_SPEED"
+        ),
+        Setting("LAND_SPEED", "speed down at the end of a landing", mm=10, needs=_landing),
+        Setting("LAND_ALT_LOW", "above home a landing gets slow", mm=10, needs=_slow_below),
         Setting("WP_SPD", "speed across where a step says none", mm=1_000, needs=_speed),
         Setting("WP_SPD_UP", "speed up", mm=1_000, needs=_climb),
-        Setting("WP_SPD_DN", "speed down", mm=1_000, needs=_climb),
+        Setting("WP_SPD_DN", "speed down", mm=1_000, needs=_descent),
+        Setting("WP_ACC", "speed gained across in a second", mm=1_000, needs=_gains(1_250)),
+        Setting(
+            "RTL_SPEED_MS", "speed across on a return (0: as elsewhere)", mm=1_000, needs=_homeward, otherwise="WP_SPD"
+        ),
+        Setting("LAND_SPD_MS", "speed down at the end of a landing", mm=1_000, needs=_landing),
+        Setting("LAND_ALT_LOW_M", "above home a landing gets slow", mm=1_000, needs=_slow_below),
         Setting(
             "FENCE_ACTION", "at the fence",
             {0: "reports only", 1: "return or land", 2: "land", 3: "SmartRTL, return or land", 4: "brake or land",

@@ -30,6 +30,10 @@ def show_policy(page: Page, policy: Policy) -> None:
     home = words.geographic(projection.latitude, projection.longitude)
     page.row("home", f"{home}, within {words.length(vehicle.home_within)}")
     page.row("moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}")
+    if vehicle.speeds is not None:
+        kept, wind = vehicle.speeds, words.speed(vehicle.speeds.wind)
+        up, down = words.speed(kept.climb), words.speed(kept.descent)
+        page.row("keeps", f"at least {words.speed(kept.cruise)}, {up} up, {down} down, in at most {wind} of wind")
     if vehicle.return_altitude:
         page.row("returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower")
     if vehicle.braking:

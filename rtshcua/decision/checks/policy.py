@@ -17,6 +17,7 @@ from rtshcua.model.flat.policy import (
     Policy,
     Rule,
     RuleKind,
+    Speeds,
     Vehicle,
     WithoutEvidence,
 )
@@ -99,6 +100,16 @@ def _numbers(vehicle: Vehicle) -> Iterator[str]:
     yield from within("reaction", vehicle.reaction_us, 0, MAX_REACTION)
     if vehicle.braking and -1 in (vehicle.north, vehicle.east, vehicle.down):
         yield "brakes, and has no signal of its velocity"
+    if vehicle.speeds is not None:
+        yield from _speeds(vehicle.speeds)
+
+
+def _speeds(speeds: Speeds) -> Iterator[str]:
+    for name in ("cruise", "climb", "descent", "landing", "homeward", "acceleration", "air"):
+        yield from within(f"{name} of its speeds", getattr(speeds, name), 1, limits.MAX_SPEED)
+    yield from within("wind of its speeds", speeds.wind, 0, limits.MAX_SPEED)
+    yield from within("height of its landing speed", speeds.landing_below, 0, HIGHEST)
+    yield from within("time of flight", speeds.flight_us, 1, limits.MAX_DURATION)
 
 
 def monitors(policy: Policy, scope: Scope) -> Iterator[str]:

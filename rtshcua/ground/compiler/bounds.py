@@ -11,11 +11,13 @@ from math import isqrt
 from typing import NamedTuple
 
 from rtshcua.decision.contracts import longest
+from rtshcua.decision.flying import charge, home_us
 from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.compiler.proofs.durations import StepBound
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.compiler.proofs.timing import START_WINDOW_US
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
@@ -29,26 +31,41 @@ SECOND_US = 1_000_000
 
 #: what brings the vehicle down is not given up for the contingency: only its own chain follows
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
+#: what leads to a height
+_ALOFT = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
 
 #: so many of the largest contributions are shown
 SHOWN = 3
 
 
 class Bounds(NamedTuple):
-    """At most so many invocations, so long from the issue to the end (us), and so much energy (1/10000)."""
+    """At most so many invocations, so long from the issue to the end (us), and so much energy (1/10000); and what each
+    step is proved to take of its own.
+    """
 
     invocations: int
     time_us: int
     energy: int
+    steps: tuple[StepBound, ...] = ()
 
 
 def most(one: Bounds, other: Bounds | None) -> Bounds:
     """What is within both."""
-    return one if other is None else Bounds(*map(max, one, other))
+    if other is None:
+        return one
+    steps = one.steps
+    if [each.skill for each in one.steps] == [each.skill for each in other.steps]:
+        pairs = zip(one.steps, other.steps, strict=True)
+        steps = tuple(StepBound(a.skill, max(a.time_us, b.time_us), max(a.energy, b.energy)) for a, b in pairs)
+    return Bounds(
+        max(one.invocations, other.invocations), max(one.time_us, other.time_us), max(one.energy, other.energy), steps
+    )
 
 
-def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission) -> Bounds:
-    """The bounds of a mission; reports where they exceed what it says."""
+def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission, flown: tuple[StepBound, ...] = ()) -> Bounds:
+    """The bounds of a mission, of which `flown` is what each step is proved to take; reports where they exceed what it
+    says.
+    """
     policy = ground.prepared.policy
     steps = [step for phase in declared.phases for step in phase.steps]
     times = [_time(ground, mission, invocation) for invocation in mission.invocations]
@@ -57,7 +74,8 @@ def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission) -> Bounds
     found = Bounds(
         len(mission.invocations),
         START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains),
-        _energy(mission, policy),
+        _energy(ground, mission),
+        flown,
     )
     _count(ground, declared, found.invocations)
     _within(ground, declared, found, steps, times, energies)
@@ -91,9 +109,10 @@ def _taken(contract: Contract, way_home: int) -> int:
     return max(contract.energy, way_home) if contract.motion.kind == MotionKind.HOME else contract.energy
 
 
-def _energy(mission: Mission, policy: Policy) -> int:
+def _energy(ground: Ground, mission: Mission) -> int:
     """What the steps take up to the one that a chain follows, and that chain: after it no step is flown."""
-    way_home = _way_home(mission, policy)
+    policy = ground.prepared.policy
+    way_home = _way_home(ground, mission)
 
     def chain_energy(chain: Iterable[Link]) -> int:
         return sum(_taken(policy.contracts[link.skill], way_home) for link in chain)
@@ -109,15 +128,18 @@ def _energy(mission: Mission, policy: Policy) -> int:
     return largest
 
 
-def _way_home(mission: Mission, policy: Policy) -> int:
-    """The energy of the way home from the farthest planned place, rounded up."""
-    squares = (
-        x * x + y * y
-        for invocation in mission.invocations
-        for x, y in zip(invocation.plan.path[::2], invocation.plan.path[1::2], strict=True)
-    )
-    distance = isqrt(max(squares, default=0)) + 1 + policy.vehicle.position_error
-    return -(-distance * SECOND_US * FULL // (policy.vehicle.speed * policy.vehicle.endurance_us))
+def _way_home(ground: Ground, mission: Mission) -> int:
+    """The energy of the way home from the farthest and highest planned place, rounded up; low it is only near home."""
+    vehicle, plans = ground.prepared.policy.vehicle, [invocation.plan for invocation in mission.invocations]
+    speeds = vehicle.speeds
+    assert speeds is not None  # the compiler writes them
+    squares = (x * x + y * y for plan in plans for x, y in zip(plan.path[::2], plan.path[1::2], strict=True))
+    distance = isqrt(max(squares, default=0)) + 1 + vehicle.position_error
+    slowest = min((plan.speed for plan in plans if plan.speed), default=0)
+    heights = [plan.altitude for plan in plans if plan.kind in _ALOFT] or [0]
+    near = home_us(vehicle, speeds, vehicle.position_error, (0, max(heights)), slowest)
+    far = home_us(vehicle, speeds, distance, (min(heights), max(heights)), slowest)
+    return charge(speeds, max(near, far))
 
 
 def _count(ground: Ground, declared: MissionDecl, steps: int) -> None:

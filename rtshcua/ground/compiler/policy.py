@@ -22,6 +22,7 @@ from rtshcua.ground.compiler.limits import fits
 from rtshcua.ground.compiler.projection import projection_at
 from rtshcua.ground.compiler.rules import Rules
 from rtshcua.ground.compiler.slots import Slots
+from rtshcua.ground.compiler.speeds import speeds_of
 from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.model.flat.policy import SILENCE_US, AfterSilence, Airspace, Policy, Rule, Vehicle, WithoutEvidence
 from rtshcua.model.ir.places import GeoJson, VehicleDecl
@@ -221,4 +222,5 @@ def _vehicle(
         east=east,
         down=down,
         without=tuple(sorted({name.text for name in vehicle.without})),
+        speeds=speeds_of(vehicle),
     )

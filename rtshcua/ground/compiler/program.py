@@ -236,8 +236,7 @@ class Compilation:
         under = replace(under, lowered=replace(under.lowered, files=lowered.files))
         flat = lowered.mission
         self.planned.setdefault(mission.name.text, Planned(under.lowered, flat, mission))
-        prove_mission(under, mission, flat)
-        bounds = bounds_of(under, mission, flat)
+        bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat))
         self.bounds[mission.name.text] = most(bounds, self.bounds.get(mission.name.text))
         tested = Tested(under.lowered, under.prepared)
         self._flown.setdefault(mission.name.text, UnderScenario(tested, flat, mission))  # the first has the defaults

@@ -80,6 +80,9 @@ ITEMS = {
     "elevation": _PART,
     "return_at": _PART,
     "brakes": _PART,
+    "speeds": _PART,
+    "accelerates": _PART,
+    "wind": _PART,
     "not_fitted": _PART,
     # of skills and steps
     "climb_to": _PART,

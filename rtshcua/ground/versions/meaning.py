@@ -56,6 +56,7 @@ class Meaning:
             "local time": vehicle.utc_offset_us,
             "brakes": (vehicle.braking, vehicle.reaction_us),
             "return": vehicle.return_altitude,
+            "speeds": vehicle.speeds,
         }
 
     def zones(self) -> Mapping[str, Fields]:

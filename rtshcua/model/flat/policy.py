@@ -90,6 +90,26 @@ class Airspace(Flat, frozen=True):
     end: int
 
 
+class Speeds(Flat, frozen=True):
+    """What a vehicle keeps at least, by which durations and charges are proved. Speeds mm/s over ground.
+
+    `cruise` is flown across where a step says no speed, `homeward` on a return. `landing` is the descent below
+    `landing_below` (mm above home). `acceleration`, mm/s in a second, is what it gains and loses on a leg. `air` is its
+    speed through the air, `wind` the most that it is flown in. A full battery flies for `flight_us`, whatever it flies.
+    """
+
+    cruise: int
+    climb: int
+    descent: int
+    landing: int
+    landing_below: int
+    homeward: int
+    acceleration: int
+    air: int
+    wind: int
+    flight_us: int
+
+
 class Vehicle(Flat, frozen=True):
     """The one aircraft this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
 
@@ -98,6 +118,7 @@ class Vehicle(Flat, frozen=True):
     Told to stop, it goes on for at most `reaction_us` and then loses at least `braking` mm/s of its speed in a second;
     with `braking` 0 that is not declared. `north`, `east`, `down` are the slots of the signals of its velocity over
     ground, -1 each without `braking`. `without` are the names of the signals whose sensors are not fitted, ascending.
+    Without `speeds`, the way home is counted at the greatest `speed`; the compiler always writes them.
     """
 
     name: str
@@ -119,6 +140,7 @@ class Vehicle(Flat, frozen=True):
     east: int = -1
     down: int = -1
     without: tuple[str, ...] = ()
+    speeds: Speeds | None = None
 
 
 class LeftOut(Flat, frozen=True):

@@ -88,13 +88,31 @@ class Braking(Node):
     reaction: Quantity
 
 
+class NamedSpeed(Node):
+    """`landing 0.5 m/s below 10 m`: a speed that a vehicle keeps at least; `below` is the height where the last part of
+    a landing begins, which no other speed has.
+    """
+
+    name: Name
+    speed: Quantity
+    below: Quantity | None = None
+
+
+class Acceleration(Node):
+    """`accelerates to 5 m/s in 5 s`: so it gains and loses speed, at least, on a leg from place to place."""
+
+    speed: Quantity
+    time: Quantity
+
+
 class VehicleDecl(Node):
     """What the checks, the simulation and "wrong vehicle" need to know of one aircraft; signed with the policy.
 
     `endurance` is the hover time of a full battery, `reserve` the charge that must remain after landing at home,
     `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC.
     `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by. `without` are the
-    signals of sensors that are not fitted on it.
+    signals of sensors that are not fitted on it. `speeds`, `acceleration`, `wind` and `flight` are what durations and
+    charges are proved by; what is not written of them has a default (`rtshcua.ground.compiler.speeds`).
     """
 
     name: Name
@@ -112,3 +130,7 @@ class VehicleDecl(Node):
     return_altitude: Quantity | None = None  # `return at 30 m`: the autopilot's return climbs to it before it flies
     braking: Braking | None = None
     without: tuple[Name, ...] = ()
+    speeds: tuple[NamedSpeed, ...] = ()
+    acceleration: Acceleration | None = None
+    wind: Quantity | None = None  # the most that it is flown in
+    flight: Quantity | None = None  # how long a full battery flies, whatever it flies

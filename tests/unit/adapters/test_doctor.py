@@ -14,7 +14,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.faults import GpsLoss, LinkLoss, MessageSilence
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, Speeds
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
 from rtshcua.simulation.config import EQUIPPED, Extra, SimulationConfig
@@ -107,6 +107,48 @@ def test_a_parameter_that_interferes_says_what_is_needed_and_how_to_change_it(
     assert name in finding.found
     beyond = name in ("FENCE_RADIUS", "FENCE_ALT_MAX", "GF_MAX_HOR_DIST")
     assert ("mission/unready" in stops(found)) is beyond, "where it cannot fly at all, that is said"
+
+
+SPEEDS = Speeds(
+    cruise=5_000, climb=1_500, descent=1_000, landing=500, landing_below=10_000, homeward=6_000, acceleration=1_000,
+    air=12_000, wind=5_000, flight_us=1_000 * SECOND,
+)  # fmt: skip
+#: what is too slow, in the units of the parameter, and what it is to be
+SLOW = {
+    "px4": {
+        "MPC_XY_CRUISE": (5.5, 6), "MPC_Z_VEL_MAX_UP": (1, 1.5), "MPC_Z_VEL_MAX_DN": (0.5, 1),
+        "MPC_TKO_SPEED": (1, 1.5), "MPC_LAND_SPEED": (0.3, 0.5), "MPC_LAND_ALT1": (20, 10), "MPC_ACC_HOR": (1, 1.5),
+    },
+    "ardupilot": {
+        "WPNAV_SPEED": (450, 500), "WPNAV_SPEED_UP": (100, 150), "WPNAV_SPEED_DN": (50, 100), "WPNAV_ACCEL": (50, 100),
+        "RTL_SPEED": (550, 600), "LAND_SPEED": (30, 50), "LAND_ALT_LOW": (2_000, 1_000),
+    },
+}  # fmt: skip
+
+
+@FLAVOURS
+def test_what_is_slower_than_the_vehicle_says_is_told(flavour: str) -> None:
+    policy = case.policy()
+    policy = replace(policy, vehicle=replace(policy.vehicle, speeds=SPEEDS))
+    parameters = tuple((name, float(value)) for name, (value, _) in SLOW[flavour].items())
+    found = examine(case.simulated(flavour, parameters=parameters), policy)
+    for name, (_, better) in SLOW[flavour].items():
+        finding = found[f"settings/{name.lower()}"]
+        assert finding.verdict is MissionVerdict.WARN, name
+        assert finding.needed.startswith("at most " if "ALT" in name else "at least "), name
+        assert f"set `{name}` to {better:g}" in finding.advice, name
+
+
+def test_a_return_as_fast_as_anything_else_is_compared_as_that() -> None:
+    """RTL_SPEED 0 is the speed of WPNAV_SPEED."""
+    policy = case.policy()
+    policy = replace(policy, vehicle=replace(policy.vehicle, speeds=SPEEDS))
+    slow = examine(case.simulated("ardupilot", parameters=(("WPNAV_SPEED", 550.0),)), policy)["settings/rtl_speed"]
+    assert (slow.verdict, slow.needed) == (MissionVerdict.WARN, "at least 6 m/s")
+    assert "set `RTL_SPEED` to 600" in slow.advice
+    own = (("WPNAV_SPEED", 550.0), ("RTL_SPEED", 600.0))
+    found = examine(case.simulated("ardupilot", parameters=own), policy)
+    assert {found[f"settings/{name}"].verdict for name in ("wpnav_speed", "rtl_speed")} == {MissionVerdict.OK}
 
 
 @FLAVOURS

@@ -48,7 +48,7 @@ def test_other_values_give_another_bundle_under_the_same_policy(look: Path, caps
         assert main(["compile", "look.rts", "--set", f"top={top}", "-o", target, "--json", *AT]) == ExitCode.OK
         found = json.loads(capsys.readouterr().out)
         digests.add(found["bundle"]["digest"])
-        assert set(found["bounds"]) == {"invocations", "time_us", "energy"}
+        assert set(found["bounds"]) == {"invocations", "time_us", "energy", "steps"}
         assert found["bounds"]["invocations"] == 4
     assert len(digests) == 2
 

@@ -1,15 +1,17 @@
-"""E0106, E0201, E0204, E0310, E0319, E0414, E0502, E1003: what a vehicle declares of itself."""
+"""E0101, E0106, E0201, E0204, E0310, E0319, E0414, E0502, E1003: what a vehicle declares of itself."""
 
 from rtshcua.decision.checks.policy import MAX_POSITION_ERROR, MAX_REACTION
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import elevation, on_globe, quantity
 from rtshcua.ground.checker.lookup import find_signal
+from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.well_known import WELL_KNOWN, read_by_all
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
-from rtshcua.model.ir.places import Braking, VehicleDecl
-from rtshcua.model.quantity import Dimension
+from rtshcua.model.ir.places import Acceleration, Braking, VehicleDecl
+from rtshcua.model.quantity import Dimension, display
 
 MAX_OFFSET_US = 14 * 3_600_000_000  # local times are at most 14 h from UTC
 
@@ -35,6 +37,7 @@ def check(context: Context) -> None:
         quantity(context, vehicle.return_altitude, Dimension.ALTITUDE, positive=False)
         if vehicle.braking is not None:
             _braking(context, vehicle.braking)
+        _speeds(context, vehicle)
         _without(context, vehicle)
         offset = vehicle.utc_offset
         if offset is not None and abs(offset.value) > MAX_OFFSET_US:
@@ -65,6 +68,78 @@ def _without(context: Context, vehicle: VehicleDecl) -> None:
             )
         else:
             find_signal(context, name)
+
+
+#: the speeds that a vehicle may declare
+SPEEDS = ("cruise", "climb", "descent", "landing", "return", "air")
+
+
+def _speeds(context: Context, vehicle: VehicleDecl) -> None:
+    """Its speeds are known ones, each written once and no more than the most; the wind leaves it some."""
+    quantity(context, vehicle.flight, Dimension.DURATION)
+    quantity(context, vehicle.wind, Dimension.SPEED, positive=False)
+    gains = vehicle.acceleration
+    if gains is not None:
+        before = len(context.report.found)
+        quantity(context, gains.speed, Dimension.SPEED)
+        quantity(context, gains.time, Dimension.DURATION)
+        if len(context.report.found) == before and not 1 <= gained(gains) <= MAX_SPEED:
+            context.report.add(
+                codes.NUMBER_SIZE, gains.span, "what it gains in a second must be from 1 mm/s to 1000 m/s"
+            )
+    first: dict[str, Span] = {}
+    for each in vehicle.speeds:
+        name = each.name.text
+        quantity(context, each.speed, Dimension.SPEED)
+        quantity(context, each.below, Dimension.ALTITUDE, positive=False)
+        if name in first:
+            context.report.add(
+                codes.WRITTEN_TWICE,
+                each.name.span,
+                f"`{name}` is written twice in the speeds of `{vehicle.name.text}`",
+                help="keep one of them",
+                labels=[(first[name], "first written here")],
+            )
+        elif name not in SPEEDS:
+            context.report.add(
+                codes.UNKNOWN_NAME,
+                each.name.span,
+                f"a vehicle has no speed `{name}`",
+                help=suggestion(name, SPEEDS) or f"its speeds are {listed(SPEEDS)}",
+                fix=correction(context.report, each.name.span, name, SPEEDS),
+            )
+        if each.below is not None and name != "landing":
+            context.report.add(
+                codes.SYNTAX, each.below.span, f"a height stands with the speed of a `landing` alone, not with `{name}`"
+            )
+        first.setdefault(name, each.name.span)
+        most = {"cruise": vehicle.speed, "return": vehicle.speed, "climb": vehicle.climb}.get(name)
+        if most is not None and each.speed.dimension is most.dimension and each.speed.value > most.value:
+            context.report.add(
+                codes.NUMBER_SIZE,
+                each.speed.span,
+                f"`{name}` is more than the vehicle does at most, {display(most.value, Dimension.SPEED)}",
+                labels=[(most.span, "declared here")],
+            )
+    _against_wind(context, vehicle)
+
+
+def _against_wind(context: Context, vehicle: VehicleDecl) -> None:
+    wind = vehicle.wind
+    air = next((each.speed for each in vehicle.speeds if each.name.text == "air"), vehicle.speed)
+    if wind is not None and wind.dimension is air.dimension is Dimension.SPEED and wind.value >= air.value > 0:
+        context.report.add(
+            codes.NUMBER_SIZE,
+            wind.span,
+            f"against so much wind it gets nowhere: through the air it flies {display(air.value, Dimension.SPEED)}",
+            help="write how fast it is through the air, as in `speeds air 16 m/s`, or fly it in less wind",
+            labels=[(air.span, "declared here")],
+        )
+
+
+def gained(gains: Acceleration) -> int:
+    """What it gains of speed, in mm/s in a second, rounded down; 0 where that is nothing."""
+    return gains.speed.value * 1_000_000 // gains.time.value if gains.time.value > 0 else 0
 
 
 def deceleration(braking: Braking) -> int:

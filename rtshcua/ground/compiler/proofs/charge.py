@@ -51,7 +51,7 @@ def _lacks(ground: Ground, invocation: PreparedInvocation, places: Sequence[Plac
     battery = ground.prepared.tables.known.battery
     for place in places:
         at, volume = planned(ground, invocation, place)
-        needed = invocation.energy.needed(volume.farthest[1])
+        needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
         if needed > left:
             yield _needs(ground, invocation, needed), ((ground.lowered.vehicle.reserve.span, "what must be left"),)
         slots = list(at.slots)

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
-from rtshcua.ground.compiler.proofs import chaining, charge, last_link, path, starting
+from rtshcua.ground.compiler.proofs import chaining, charge, durations, last_link, path, starting
+from rtshcua.ground.compiler.proofs.durations import Slowest, StepBound
 from rtshcua.ground.compiler.proofs.period import Period
 from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after, may_be_skipped
 from rtshcua.ground.compiler.proofs.situation import Ground
@@ -19,24 +20,30 @@ def prove(
     invocations: Sequence[PreparedInvocation],
     comes: Sequence[Period],
     permitted: Sequence[bool],
-) -> None:
-    """Report what is wrong with the way of a mission, up to the first step that cannot be flown.
+) -> tuple[StepBound, ...]:
+    """Report what is wrong with the way of a mission, up to the first step that cannot be flown; what each step takes
+    at most, where all are proved.
 
     What comes after such a step would begin at a place that is never reached.
     """
     ways = Ways(ground)
     starts: list[tuple[Place, ...]] = []
     places: tuple[Place, ...] = (AT_HOME,)
-    decided = True
+    decided, slowest = True, Slowest()
+    bounds: list[StepBound] = []
     for number, (step, one, period) in enumerate(zip(steps, invocations, comes, strict=True)):
         able = places if permitted[number] and one.invocation.skill not in ground.impossible else ()
         if (able and not may_be_skipped(one)) or not any(place.aloft for place in places):
             able = chaining.aloft(ground, step, one, able, steps[:number])
         able = path.prove(ground, step, one, period, able, steps[:number]) if able else ()
         able = chaining.aloft(ground, step, one, able, steps[:number])
+        slowest = slowest.after(one.invocation.plan.speed)
+        bound = durations.prove(ground, step, one, able, slowest) if able else None
         able = chaining.prove(ground, step, one, able, steps[:number]) if able else ()
         if not able or not (number or starting.prove(ground, step, comes)):
-            return
+            return ()
+        if bound is not None:
+            bounds.append(bound)
         ways.prove(step, one, period, able)
         starts.append(able)
         places = after(one, places, able)
@@ -48,6 +55,7 @@ def prove(
     chaining.ending(ground, mission, steps[-1], places)
     charge.prove(ground, steps, invocations, starts)
     last_link.prove_height(ground, steps, invocations)
+    return tuple(bounds) if len(bounds) == len(steps) else ()
 
 
 def _undecided(ground: Ground, step: Step) -> None:

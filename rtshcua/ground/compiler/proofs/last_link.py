@@ -9,13 +9,14 @@ nothing, and has no time limit as a link, is E0612.
 from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.flying import BEGINS, SETTLES, charge, landing_us
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import MISSING, TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
@@ -63,27 +64,40 @@ def _lacks(ground: Ground, link: Link) -> Iterator[tuple[str, str, Span, str]]:
 
 
 def prove_height(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
-    """Report the last links that may not be down in time from the highest step, even as fast as the vehicle sinks."""
+    """Report the last links that may not be down from the highest step in the time, or with the charge, that they have.
+
+    A return climbs before it can be broken off, so its height counts too.
+    """
     policy = ground.prepared.policy
+    vehicle, speeds = policy.vehicle, policy.vehicle.speeds
+    assert speeds is not None  # the compiler writes them
     heights = [one.invocation.plan.altitude for one in invocations]
-    highest = max(heights)
-    needed = highest * _SECOND_US // policy.vehicle.climb
     chains = [policy.contingency, *(one.invocation.contract.fallback for one in invocations)]
+    returns = any(policy.contracts[link.skill].motion.kind == MotionKind.HOME for chain in chains for link in chain)
+    highest = max(*heights, vehicle.return_altitude if returns else 0)
+    needed = BEGINS + SETTLES + landing_us(speeds, highest)
     for skill, link in {chain[-1].skill: chain[-1] for chain in chains if chain}.items():
         contract = policy.contracts[skill]
-        if not 0 < contract.duration_us < needed:
+        declared = ground.context.symbols.skills[contract.name]
+        takes = f"from {display(highest, Dimension.ALTITUDE)} the last link `{contract.name}` takes up to "
+        if 0 < contract.duration_us < needed:
+            assert declared.duration is not None
+            words = (
+                f"{takes}{display(-(-needed // _SECOND_US) * _SECOND_US, Dimension.DURATION)} to come down, and it "
+                f"lasts at most {display(contract.duration_us, Dimension.DURATION)}"
+            )
+            help, written = "let it last longer, or stay lower", declared.duration.span
+        elif charge(speeds, needed) > contract.energy:
+            assert declared.energy is not None
+            words = (
+                f"{takes}{_percent(-(-charge(speeds, needed) // 10) * 10)} of a full charge to come down, and it takes "
+                f"at most {_percent(contract.energy)}"
+            )
+            help, written = "let it take more, or stay lower", declared.energy.span
+        else:
             continue
-        declared = ground.context.symbols.skills[contract.name].duration
-        assert declared is not None
-        _report(
-            ground,
-            steps[heights.index(highest)].span,
-            f"from {display(highest, Dimension.ALTITUDE)} the last link `{contract.name}` takes at least "
-            f"{display(needed // _SECOND_US * _SECOND_US, Dimension.DURATION)} to come down, and it lasts at most "
-            f"{display(contract.duration_us, Dimension.DURATION)}",
-            "let it last longer, or stay lower",
-            [(declared.span, "declared here"), (ground.span(link), "the last link of a chain")],
-        )
+        labels = [(written, "declared here"), (ground.span(link), "the last link of a chain")]
+        _report(ground, steps[heights.index(max(heights))].span, words, help, labels)
 
 
 def _report(ground: Ground, span: Span, words: str, help: str, labels: list[tuple[Span, str]]) -> None:

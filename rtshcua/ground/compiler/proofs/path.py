@@ -1,4 +1,4 @@
-"""E0508, E0614, E0616, E0804: where a step goes from where its predecessor ended, it may go, and can in time.
+"""E0508, E0614, E0616: where a step goes from where its predecessor ended, it may go, and has the charge for.
 
 The leg to a step's path is part of it, from wherever the vehicle may be then (`places`), and whenever it may come
 (`period`).
@@ -7,7 +7,6 @@ The leg to a step's path is part of it, from wherever the vehicle may be then (`
 from collections.abc import Sequence
 from functools import partial
 
-from rtshcua.decision.contracts import Energy
 from rtshcua.decision.evaluate import Condition, Environment
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.safety import ranging
@@ -20,18 +19,12 @@ from rtshcua.ground.analysis.words import clock
 from rtshcua.ground.compiler.mission import argument_span
 from rtshcua.ground.compiler.proofs.leaving import breach, path_legs
 from rtshcua.ground.compiler.proofs.period import Period, at_moment, keeps, zone_span
-from rtshcua.ground.compiler.proofs.places import Place, end, from_home, from_where, planned
+from rtshcua.ground.compiler.proofs.places import Place, from_home, from_where, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.ground.compiler.shapes import Point
-from rtshcua.ground.compiler.ways import path_length
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
-
-SECOND_US = 1_000_000
-MILLISECOND_US = 1_000
 
 
 def prove(
@@ -57,12 +50,7 @@ def prove(
         skipped = [] if start is starts[0] else [each for each in before if each.on_inadmissible == "skip"]
         _volume(ground, step, invocation, period, start, skipped)
 
-    able = from_where(ground, invocation, starts, flies)
-    for start in able:
-        _duration(ground, step, invocation, start)
-        if len(report.found) > already:
-            return ()
-    return able
+    return from_where(ground, invocation, starts, flies)
 
 
 def _speed(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
@@ -100,7 +88,7 @@ def _volume(
     if broken is not None:
         _never(ground, step, *broken, labels)
         return
-    needed = Energy(invocation.invocation.contract, ground.prepared.policy.vehicle).needed(volume.farthest[1])
+    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
     if needed > FULL:
         ground.context.report.add(
             codes.BEYOND_VEHICLE,
@@ -197,37 +185,4 @@ def _never(ground: Ground, step: Step, clause: Clause, moment: int | None, label
         help="change the step's arguments, or where it begins"
         + (": a step before it may be skipped, and then it begins elsewhere" if labels else ""),
         labels=[(ground.span(clause), "the contract asks for this"), *labels],
-    )
-
-
-def _duration(ground: Ground, step: Step, invocation: PreparedInvocation, start: Place) -> None:
-    """The planned path can be flown in the time that the skill may last; speeding up and turning are not counted."""
-    flat, vehicle = invocation.invocation, ground.prepared.policy.vehicle
-    allowed = flat.contract.duration_us
-    if not allowed:
-        return
-    points: list[Point] = [(start.x, start.y), *zip(flat.plan.path[::2], flat.plan.path[1::2], strict=True)]
-    speed = flat.plan.speed or vehicle.speed
-    there = end(invocation, start)
-    needed = path_length(points) * SECOND_US // speed
-    climbing = abs(there.height - start.height) * SECOND_US // vehicle.climb
-    total = needed + climbing if flat.plan.kind == MotionKind.HOME else max(needed, climbing)
-    if flat.contract.motion.time >= 0:
-        total = flat.arguments[flat.contract.motion.time]
-    if total <= allowed:
-        return
-    skill = ground.context.symbols.skills[step.skill.text]
-    own = None if step.overrides is None else step.overrides.duration
-    limit = own or skill.duration
-    assert limit is not None
-    lasts = f"`{skill.name.text}` lasts at most {display(allowed, Dimension.DURATION)}"
-    over = -(-(total - allowed) // MILLISECOND_US) * MILLISECOND_US
-    ground.context.report.add(
-        codes.PLAN_TOO_LONG,
-        step.span,
-        f"the step takes at least {display(total // SECOND_US * SECOND_US, Dimension.DURATION)}, and {lasts}"
-        if total - allowed >= SECOND_US
-        else f"{lasts}, and the step takes up to {display(over, Dimension.DURATION)} longer",
-        help="fly a shorter path, or faster" if flat.plan.path else None,
-        labels=[(limit.span, "declared here")],
     )

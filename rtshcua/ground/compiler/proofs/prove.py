@@ -24,6 +24,7 @@ from rtshcua.ground.compiler.proofs import (
     some_time,
     timing,
 )
+from rtshcua.ground.compiler.proofs.durations import StepBound
 from rtshcua.ground.compiler.proofs.line import still
 from rtshcua.ground.compiler.proofs.period import periods
 from rtshcua.ground.compiler.proofs.situation import Ground
@@ -54,20 +55,20 @@ def _asked(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
     return prepared if isinstance(prepared, Refusal) else (prepared, Questions(prepared))
 
 
-def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> None:
-    """The proofs of a mission under a policy."""
+def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> tuple[StepBound, ...]:
+    """The proofs of a mission under a policy; what each step takes at most, as far as the mission can be flown."""
     prepared: list[PreparedInvocation] = []
     for invocation in mission.invocations:
         found = ground.prepare(invocation, mission.phases)
         if isinstance(found, Refusal):
             refused(ground.context, ground.lowered, found)
-            return
+            return ()
         prepared.append(found)
     steps = [step for phase in declared.phases for step in phase.steps]
     permitted = [authority.prove(ground, declared, step, one) for step, one in zip(steps, prepared, strict=True)]
     before = len(ground.context.report.found)
     comes = periods(ground, prepared)
-    flight.prove(ground, declared, steps, prepared, comes, permitted)
+    flown = flight.prove(ground, declared, steps, prepared, comes, permitted)
     if len(ground.context.report.found) == before:
         for step, one, good in zip(steps, prepared, permitted, strict=True):
             if good:
@@ -81,6 +82,7 @@ def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> No
         observation.prove_step(ground, step, one)
     timing.prove(ground, steps, prepared)
     deferral.prove_mission(ground, steps, prepared)
+    return flown
 
 
 def refused(context: Context, lowered: LoweredPolicy, malformed: Refusal) -> None:

@@ -16,7 +16,7 @@ from rtshcua.ground.handbook.words.vocabulary import listed, name, named
 from rtshcua.ground.versions.differences import Difference
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import CHOICE, QUANTITY, Contract, Link, MotionKind, Parameter, TimingClass
-from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind, WithoutEvidence
+from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind, Speeds, WithoutEvidence
 from rtshcua.model.flat.signal import ENUMERATION, Signal
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, unproject
 from rtshcua.model.quantity import Dimension, display
@@ -107,7 +107,25 @@ def _vehicle(policy: Policy) -> Mapping[str, Callable[[], str]]:
             else ""
         ),
         "return": lambda: f"at {_length(vehicle.return_altitude)} above home" if vehicle.return_altitude else "",
+        "speeds": lambda: _speeds(vehicle.speeds),
     }
+
+
+def _speeds(speeds: Speeds | None) -> str:
+    if speeds is None:
+        return ""
+    names = {
+        "cruise": speeds.cruise,
+        "climb": speeds.climb,
+        "descent": speeds.descent,
+        "landing": speeds.landing,
+        "return": speeds.homeward,
+        "air": speeds.air,
+        "wind at most": speeds.wind,
+        "gained in a second": speeds.acceleration,
+    }
+    told = ", ".join(f"{what} {display(value, Dimension.SPEED)}" for what, value in names.items())
+    return f"{told}, slow below {_length(speeds.landing_below)}, {_time(speeds.flight_us)} of flight"
 
 
 def _zone(zone: Zone, policy: Policy) -> Mapping[str, Callable[[], str]]:

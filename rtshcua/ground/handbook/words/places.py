@@ -114,7 +114,8 @@ def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     yield "Speed", f"at most {quantity(vehicle.speed)}"
     yield "Climb", f"at most {quantity(vehicle.climb)}"
     yield "Position error", f"at most {quantity(vehicle.position_error)}; every planned path is widened by this"
-    yield "Full charge", f"{quantity(vehicle.endurance)} of hovering"
+    flight = "" if vehicle.flight is None else f", {quantity(vehicle.flight)} of flight at the worst"
+    yield "Full charge", f"{quantity(vehicle.endurance)} of hovering{flight}"
     yield "Reserve", f"{quantity(vehicle.reserve)} of a full charge must be left after landing at home"
     if vehicle.braking is not None:
         braking = vehicle.braking
@@ -123,6 +124,17 @@ def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
         yield "Braking", f"from {quantity(braking.speed)} to a stand in {time}, after a delay of {reaction}; {limits}"
     if vehicle.return_altitude is not None:
         yield "Return", f"it climbs to {quantity(vehicle.return_altitude)} before it flies home, if it is lower"
+    if vehicle.speeds:
+        kept = ", ".join(
+            f"{each.name.text} {quantity(each.speed)}" + (f" below {quantity(each.below)}" if each.below else "")
+            for each in vehicle.speeds
+        )
+        yield "Speeds", f"at least {kept}; how long a step takes is proved by these"
+    if vehicle.acceleration is not None:
+        gains = vehicle.acceleration
+        yield "Acceleration", f"to {quantity(gains.speed)} in {quantity(gains.time)}"
+    if vehicle.wind is not None:
+        yield "Wind", f"it is flown in at most {quantity(vehicle.wind)}"
     if vehicle.elevation is not None:
         within = "" if vehicle.elevation_within is None else f", true to {quantity(vehicle.elevation_within)}"
         yield "Elevation of home", f"{quantity(vehicle.elevation)}{within}"

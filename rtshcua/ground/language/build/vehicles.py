@@ -7,7 +7,7 @@ from rtshcua.ground.language.build.zones import Zones
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.places import Braking, VehicleDecl
+from rtshcua.model.ir.places import Acceleration, Braking, NamedSpeed, VehicleDecl
 from rtshcua.model.quantity import UNITS, Dimension
 
 FULL = 100 * UNITS["%"].numerator
@@ -41,8 +41,8 @@ class Vehicles(Zones):
         """`position error 3 m`."""
         return Part("position error", span, error)
 
-    def endurance(self, span: Span, charge: Quantity, hover: Quantity) -> Part:
-        """`energy 100 % = 18 min hover`."""
+    def endurance(self, span: Span, charge: Quantity, hover: Quantity, flight: Quantity | None) -> Part:
+        """`energy 100 % = 18 min hover`, `energy 100 % = 18 min hover, 14 min flight`."""
         if charge.dimension is not Dimension.RATIO or charge.value != FULL:
             written = short(self._source.slice(charge.span))
             self.report(
@@ -51,7 +51,7 @@ class Vehicles(Zones):
                 charge.span,
                 "write it as in `energy 100 % = 18 min hover`",
             )
-        return Part("energy", span, hover)
+        return Part("energy", span, (hover, flight))
 
     def reserve(self, span: Span, charge: Quantity) -> Part:
         """`reserve 15 %`."""
@@ -74,6 +74,22 @@ class Vehicles(Zones):
         """`brakes from 12 m/s in 6 s after 500 ms`."""
         return Part("brakes", span, Braking(span=span, speed=speed, time=time, reaction=reaction))
 
+    def speeds(self, span: Span, *speeds: NamedSpeed) -> Part:
+        """`speeds cruise 5 m/s, climb 1.5 m/s, landing 0.5 m/s below 10 m`."""
+        return Part("speeds", span, speeds)
+
+    def named_speed(self, span: Span, name: Name, speed: Quantity, below: Quantity | None) -> NamedSpeed:
+        """`climb 1.5 m/s`."""
+        return NamedSpeed(span=span, name=name, speed=speed, below=below)
+
+    def accelerates(self, span: Span, speed: Quantity, time: Quantity) -> Part:
+        """`accelerates to 5 m/s in 5 s`."""
+        return Part("accelerates", span, Acceleration(span=span, speed=speed, time=time))
+
+    def wind(self, span: Span, most: Quantity) -> Part:
+        """`wind at most 8 m/s`."""
+        return Part("wind", span, most)
+
     def not_fitted(self, span: Span, names: tuple[Name, ...]) -> Part:
         """`without obstacle.distance, link.quality`."""
         return Part("without", span, names)
@@ -89,6 +105,7 @@ class Vehicles(Zones):
 
     def _finish_vehicle(self, span: Span, name: Name, found: dict[str, Part]) -> None:
         home, within = found["home"].value
+        hover, flight = found["energy"].value
         elevation, elevation_within = found["elevation"].value if "elevation" in found else (None, None)
         self.declare(
             VehicleDecl(
@@ -100,7 +117,7 @@ class Vehicles(Zones):
                 speed=found["speed"].value,
                 climb=found["climb"].value,
                 position_error=found["position error"].value,
-                endurance=found["energy"].value,
+                endurance=hover,
                 reserve=found["reserve"].value,
                 utc_offset=found["clock"].value if "clock" in found else None,
                 elevation=elevation,
@@ -108,6 +125,10 @@ class Vehicles(Zones):
                 return_altitude=found["return"].value if "return" in found else None,
                 braking=found["brakes"].value if "brakes" in found else None,
                 without=found["without"].value if "without" in found else (),
+                speeds=found["speeds"].value if "speeds" in found else (),
+                acceleration=found["accelerates"].value if "accelerates" in found else None,
+                wind=found["wind"].value if "wind" in found else None,
+                flight=flight,
             ),
             name,
         )

@@ -214,7 +214,7 @@ def _charge(part: Part, scene: Scene) -> Iterator[Limit]:
     """The charge that is needed from where the vehicle is."""
     invocation, slot = scene.invocation, scene.invocation.policy.policy.vehicle.battery
     volume = invocation.planner.volume(scene.environment().slots, invocation.policy.tables.known)
-    needed = invocation.energy.needed(volume.farthest[1])
+    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
     found = None if slot == -1 else tried(part, scene, Variable(False, slot), needed - 1, needed)
     if found is not None:
         yield found

@@ -193,9 +193,10 @@ class _Made:
 
     def energy(self, contract: Contract) -> Item:
         """The charge that a skill needs: none is too little where it needs none."""
-        energy = Energy(contract, self._prepared.policy.vehicle)
+        vehicle = self._prepared.policy.vehicle
+        energy = Energy(contract, vehicle)
         possible = {Goal.TRUE, Goal.FALSE, Goal.UNKNOWN}
-        if energy.needed(0) > FULL:
+        if energy.needed(0, (vehicle.return_altitude, 0)) > FULL:
             possible.discard(Goal.TRUE)
         if not energy.stays and energy.needed(0) <= 0:
             possible.discard(Goal.FALSE)

@@ -217,7 +217,7 @@ skill look(top: altitude in 5 m .. 20 m) {{
   lasts    at most 1 min
   {}
   fallback return_home, emergency_land
-  energy   at most 5 %
+  energy   at most 9 %
 }}
 """
 

@@ -30,3 +30,48 @@ vehicle glider {
 )
 def test_a_vehicle(old: str, new: str, codes: list[str]) -> None:
     assert [code for code, _ in found(VEHICLE.replace(f"{old} ", f"{new} ").replace(f"{old}\n", f"{new}\n"))] == codes
+
+
+@rows(
+    ("parts", "codes"),
+    [
+        ("speeds cruise 12 m/s, climb 3 m/s, descent 9 m/s, landing 0.5 m/s below 0 m, return 12 m/s, air 20 m/s", []),
+        ("speeds cruise 13 m/s", ["E1003"]),
+        ("speeds return 13 m/s", ["E1003"]),
+        ("speeds climb 4 m/s", ["E1003"]),
+        ("speeds cruise 0 m/s", ["E0319"]),
+        ("speeds cruise 5 m", ["E0310"]),
+        ("speeds landing 0.5 m/s below 5 s", ["E0310"]),
+        ("speeds cruise 5 m/s below 10 m", ["E0101"]),
+        ("speeds cruise 5 m/s, cruise 6 m/s", ["E0106"]),
+        ("speeds crusie 5 m/s", ["E0201"]),
+        ("accelerates to 5 m/s in 5 s", []),
+        ("accelerates to 5 m/s in 0 s", ["E0319"]),
+        ("accelerates to 5 m in 5 s", ["E0310"]),
+        ("accelerates to 0.001 m/s in 5 s", ["E1003"]),
+        ("wind at most 11.9 m/s", []),
+        ("wind at most 0 m/s", []),
+        ("wind at most 12 m/s", ["E1003"]),
+        ("wind at most 12 m/s  speeds air 13 m/s", []),
+        ("wind at most 12 s", ["E0310"]),
+    ],
+)
+def test_what_a_vehicle_keeps_at_least(parts: str, codes: list[str]) -> None:
+    assert [code for code, _ in found(VEHICLE.replace("reserve", f"{parts}  reserve"))] == codes
+
+
+def test_a_misspelt_speed_is_corrected() -> None:
+    [(_, message)] = found(VEHICLE.replace("reserve", "speeds crusie 5 m/s  reserve"))
+    assert message == "a vehicle has no speed `crusie`"
+
+
+@rows(
+    ("hover", "codes"),
+    [
+        ("18 min hover, 15 min flight", []),
+        ("18 min hover, 15 m flight", ["E0310"]),
+        ("18 min hover, 0 min flight", ["E0319"]),
+    ],
+)
+def test_how_long_it_flies(hover: str, codes: list[str]) -> None:
+    assert [code for code, _ in found(VEHICLE.replace("18 min hover", hover))] == codes

@@ -76,7 +76,7 @@ def test_a_zone_to_stay_out_of_is_there_whenever_it_may_be(active: str, issued: 
         (OLD_DATES, EIGHT, ["E0508"]),
         (OLD_DATES, 0, []),
         ("active 07:00 .. 16:00", EIGHT, []),
-        ("active 07:00 .. 08:06", EIGHT, ["E0514", "E0508"]),
+        ("active 07:00 .. 08:07", EIGHT, ["E0514", "E0508"]),
         ("active 09:00 .. 16:00", EIGHT, ["E0508"]),
         ("active 09:00 .. 16:00", 0, []),
         ("active 09:00 .. 09:05", 0, ["E0718"]),

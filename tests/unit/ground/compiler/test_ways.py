@@ -134,7 +134,7 @@ def test_the_less_is_known_of_home_the_more_is_found(within: int) -> None:
     if within < 26:  # with 3 m of position error, and a corner of the polygon around the disc
         assert findings == []
     else:
-        [(code, message)] = findings
+        code, message = next(each for each in findings if each[0] != "E0804")  # so far is not flown in time either
         assert (code, message.split(",")[0]) == (
             "E0508",
             f"home may lie up to {within} m from where it is declared",

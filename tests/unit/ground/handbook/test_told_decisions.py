@@ -144,7 +144,7 @@ def test_a_test_stands_under_its_own_policy_and_those_of_imports_nowhere() -> No
 
 
 def test_a_case_says_what_was_decided_and_whether_that_was_asked() -> None:
-    tests = 'test "t" { when hover(10 s) table battery { 80 % expect allow\n 20 % expect deny } }\n'
+    tests = 'test "t" { when hover(10 s) table battery { 80 % expect allow\n 60 % expect deny } }\n'
     made = book(b=ASKED + tests, a=IMPORTED)
     (lax,) = [each for each in made.chapters if each.name == "lax"]
     assert [case.met for case in lax.cases] == [True, False]

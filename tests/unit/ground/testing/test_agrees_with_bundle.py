@@ -65,7 +65,7 @@ FLIGHTS = (
                 ("return_home()", 2),
             ),
         )
-        for up, bridge, top, pattern in ((20, "bridge_b", 20, "perimeter"), (12, "bridge_a", 8, "grid"))
+        for up, bridge, top, pattern in ((20, "bridge_b", 20, "perimeter"), (12, "bridge_a", 8, "perimeter"))
     ),
     Flight(
         "training_field", 2, (("takeoff(altitude = 10 m)", 0), ("hover(5 s)", 1), ("return_home()", 2)),

@@ -76,12 +76,10 @@ def named(of: Generated) -> set[tuple[str, str]]:
 def test_what_is_not_reached_is_named_and_nothing_else(arms: Generated) -> None:
     assert named(arms) == {
         ("permit", "the ceiling of `grow(bridge_a, 7 m)`, which counts for no place on the ground"),
-        ("energy", "the charge that is needed"),  # `require` asks for more
         ("airspace", "the ceiling of `city`"),  # forbidden before that is looked at, as is the next
         ("maintain", "`height`"),
         ("assume", "`speed`"),  # the room for it is there in every scene: its limit is that of `obstacle.distance`
     }
-    assert {each.role for each in arms.unreached if each.turned} >= {"energy"}
 
 
 def test_what_no_situation_reaches_is_named_where_the_tests_are_read() -> None:

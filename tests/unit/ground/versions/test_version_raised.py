@@ -157,7 +157,7 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
         ),
         ("reserve 15 %", "reserve 16 %", "the vehicle (reserve)"),
         ("position error 3 m energy 100 % = 18 min", "position error 4 m energy 100 % = 19 min",
-         "the vehicle (position error, energy)"),
+         "the vehicle (position error, energy, speeds)"),
         ("47.39774 N, 8.54559 E within", "47.39775 N, 8.54559 E within", "the vehicle (home)"),
         ("E, 40 m) ceiling 60 m", "E, 41 m) ceiling 61 m", "the zone `roof` (shape, ceiling)"),
         ("ceiling 60 m\n", "ceiling 60 m active 08:00 .. 18:00\n", "the zone `roof` (active)"),

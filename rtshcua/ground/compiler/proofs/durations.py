@@ -1,0 +1,300 @@
+"""E0804, E0814: each step, and each link of its chains, is done in the time and with the charge that its skill allows.
+
+Durations are those of `decision.flying`: the speeds that the vehicle declares, against the most wind that it is flown
+in, and no more than what the step assumes of the wind. Of a return, the speed of the slowest step before it counts too,
+for an autopilot may go on with a speed that it was told (PX4). Charge is that of the time in the air.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from math import isqrt
+from typing import Final, NamedTuple
+
+from rtshcua.decision.contracts import first_cell
+from rtshcua.decision.flying import (
+    BEGINS,
+    LIFTS,
+    SETTLES,
+    charge,
+    home_us,
+    landing_us,
+    leg_us,
+    over_ground,
+    rising_us,
+    sinking_us,
+)
+from rtshcua.decision.prepare import PreparedInvocation, PreparedLink
+from rtshcua.decision.values import TRUE, interval
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.compiler.mission import argument_span
+from rtshcua.ground.compiler.proofs.places import Place, planned
+from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.compiler.shapes import Point
+from rtshcua.ground.compiler.ways import length
+from rtshcua.model.flat.contract import PLACE, Contract, MotionKind
+from rtshcua.model.flat.limits import FULL, MAX_SPEED
+from rtshcua.model.flat.policy import Speeds
+from rtshcua.model.ir.missions import Step
+from rtshcua.model.quantity import Dimension, display
+
+_SECOND: Final = 1_000_000
+_MILLISECOND: Final = 1_000
+_METRE: Final = 1_000  # mm
+#: where to write what, and what that is
+_Fix = tuple[Span, str, str]
+#: where autopilots report the wind
+_WIND: Final = ("WIND_COV", "WIND")
+
+
+class StepBound(NamedTuple):
+    """What a step is proved to take at most: us from its dispatch to its end, and 1/10000 of a full charge."""
+
+    skill: str
+    time_us: int
+    energy: int
+
+
+class Slowest(NamedTuple):
+    """The slowest speed that a step asked for so far, mm/s; 0: none did."""
+
+    speed: int = 0
+
+    def after(self, speed: int) -> "Slowest":
+        """With one more step, that asks for this speed, 0 for none."""
+        return Slowest(min(self.speed or speed, speed or self.speed))
+
+
+def prove(
+    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: Slowest
+) -> StepBound | None:
+    """What a step takes at most that may begin at `starts`, `slowest` being that of it and those before; None after a
+    finding.
+    """
+    before = len(ground.context.report.found)
+    speeds, contract = _speeds(ground), invocation.invocation.contract
+    wind = _wind(ground, invocation)
+
+    def takes(height: int) -> int:
+        """What it takes if it leads to a height."""
+        return max(_step_us(ground, invocation, start, height, slowest.speed, wind) for start in starts)
+
+    time_us, fits = takes(invocation.invocation.plan.altitude), _energy_us(speeds, contract.energy)
+    if 0 < contract.duration_us < time_us:
+        skill = ground.context.symbols.skills[step.skill.text]
+        own = None if step.overrides is None else step.overrides.duration
+        limit = own or skill.duration
+        assert limit is not None
+        nearer = _nearer(ground, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
+        _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer)
+    energy = charge(speeds, time_us)
+    # of a return the mission's bound counts the way home, if that is more
+    home = invocation.invocation.plan.kind == MotionKind.HOME
+    if len(ground.context.report.found) == before and energy > contract.energy and not home:
+        fits = min(fits, contract.duration_us or fits)
+        nearer = _nearer(ground, step, invocation, starts[0].height, takes, fits)
+        _too_much(ground, step, "the step", contract, energy, nearer)
+    if len(ground.context.report.found) == before:
+        _links(ground, step, invocation, starts, slowest.speed)
+    if len(ground.context.report.found) > before:
+        return None
+    return StepBound(contract.name, time_us, energy)
+
+
+def _energy_us(speeds: Speeds, energy: int) -> int:
+    """How long a part of a full charge flies."""
+    return energy * speeds.flight_us // FULL
+
+
+def _nearer(
+    ground: Ground, step: Step, invocation: PreparedInvocation, here: int, takes: Callable[[int], int], fits: int
+) -> _Fix | None:
+    """The height nearest to what the step asks for, towards where it begins, to which it takes no longer than `fits`;
+    None where its height is no argument, or none does.
+    """
+    contract, asked = invocation.invocation.contract, invocation.invocation.plan.altitude
+    cell = contract.motion.altitude
+    parameter = next((each for each in contract.parameters if 0 <= each.cell == cell), None)
+    span = None if parameter is None else argument_span(ground.context, step, parameter.name)
+    if parameter is None or span is None or span == step.span or not parameter.low <= here <= parameter.high:
+        return None
+    sign = 1 if here > asked else -1
+    least, most = 0, abs(here - asked) // _METRE
+    if takes(asked + sign * most * _METRE) > fits:
+        return None
+    while least < most:  # the fewest metres nearer that are enough
+        middle = (least + most) // 2
+        least, most = (least, middle) if takes(asked + sign * middle * _METRE) <= fits else (middle + 1, most)
+    height = display(asked + sign * least * _METRE, Dimension.ALTITUDE)
+    return span, height, f"write `{height}`"
+
+
+def _speeds(ground: Ground) -> Speeds:
+    speeds = ground.prepared.policy.vehicle.speeds
+    assert speeds is not None  # the compiler writes them
+    return speeds
+
+
+def _wind(ground: Ground, invocation: PreparedInvocation) -> int:
+    """The most wind in which a step goes on: what the vehicle is flown in, and what `assume` and `degrade` leave."""
+    policy, most = ground.prepared.policy, _speeds(ground).wind
+    slots = [
+        signal.slot
+        for signal in policy.signals
+        if signal.dimension == Dimension.SPEED.value and all(each.message in _WIND for each in signal.sources)
+    ]
+    at = ground.case(invocation).at
+
+    def goes_on(slot: int, wind: int) -> bool:
+        values = list(at.slots)
+        values[slot] = interval(wind, MAX_SPEED)
+        there = at.over(values, None, 0)
+        return all(condition(there) & TRUE for _, condition in invocation.assume) and not any(
+            rule.condition(there) == TRUE for rule in invocation.candidates.degrades
+        )
+
+    for slot in slots:
+        low, high = 0, most + 1
+        while low < high:  # the least wind from which on it never goes on
+            middle = (low + high) // 2
+            low, high = (middle + 1, high) if goes_on(slot, middle) else (low, middle)
+        most = min(most, low)
+    return most
+
+
+def _step_us(
+    ground: Ground, invocation: PreparedInvocation, start: Place, altitude: int, slowest: int, wind: int
+) -> int:
+    """How long a step takes at most from where it begins to where it is done, which is at a height."""
+    flat, vehicle, speeds = invocation.invocation, ground.prepared.policy.vehicle, _speeds(ground)
+    plan = flat.plan
+    height = sinking_us(speeds, start.height - altitude) + rising_us(speeds, altitude - start.height)
+    match plan.kind:
+        case MotionKind.HOLD:
+            cell = flat.contract.motion.time
+            return BEGINS + SETTLES + flat.arguments[cell] if cell >= 0 else flat.contract.duration_us
+        case MotionKind.CLIMB:
+            return BEGINS + (SETTLES if start.aloft else LIFTS) + height
+        case MotionKind.HOME:
+            distance = isqrt(start.x * start.x + start.y * start.y) + 1
+            return home_us(vehicle, speeds, distance, (start.height, start.height), slowest)
+        case MotionKind.LAND:
+            return BEGINS + SETTLES + landing_us(speeds, start.height)
+    points: list[Point] = [(start.x, start.y), *zip(plan.path[::2], plan.path[1::2], strict=True)]
+    speed = over_ground(speeds, plan.speed or min(speeds.cruise, slowest or speeds.cruise), wind)
+    return BEGINS + sum(leg_us(speeds, length(a, b) + 1, speed) for a, b in pairwise(points)) + height + SETTLES
+
+
+def _links(ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: int) -> None:
+    """Report the first link that may take longer, or more, than it may, wherever in the step it begins."""
+    if invocation.invocation.plan.kind in (MotionKind.HOME, MotionKind.LAND):
+        return  # what follows it lands
+    volumes = [planned(ground, invocation, start)[1] for start in starts]
+    distance = max(volume.farthest[1] for volume in volumes)
+    low = min(volume.height[0] for volume in volumes)
+    high = max(volume.height[1] for volume in volumes)
+    degrades = [rule.target for rule in invocation.candidates.degrades]
+    for chain in (degrades, invocation.chain, ground.prepared.contingency):
+        reach = (distance, low, high)
+        for link in chain:
+            reach, time_us = _link_us(ground, link, *reach, slowest)
+            contract = ground.prepared.policy.contracts[link.link.skill]
+            allowed = link.link.limit_us or contract.duration_us
+            name = f"`{contract.name}`, a link of this step's chains,"
+            if link is not chain[-1] and 0 < allowed < time_us:
+                declared = ground.context.symbols.skills[contract.name].duration
+                limit = ground.span(link.link) if link.link.limit_us or declared is None else declared.span
+                _too_long(ground, step, name, contract, time_us, allowed, limit)
+                return
+
+
+def _link_us(
+    ground: Ground, link: PreparedLink, distance: int, low: int, high: int, slowest: int
+) -> tuple[tuple[int, int, int], int]:
+    """From how far and between which heights later links begin, and how long a link takes at most; 0: it is cut."""
+    vehicle, speeds = ground.prepared.policy.vehicle, _speeds(ground)
+    contract, arguments = ground.prepared.policy.contracts[link.link.skill], link.link.arguments
+    reach = (distance, low, high)
+    match link.motion:
+        case MotionKind.HOME:
+            return reach, home_us(vehicle, speeds, distance, (low, high), slowest)
+        case MotionKind.LAND:
+            return reach, BEGINS + SETTLES + landing_us(speeds, high)
+        case MotionKind.HOLD:
+            return reach, 0
+    altitude = arguments[contract.motion.altitude]
+    height = rising_us(speeds, altitude - low) + sinking_us(speeds, high - altitude)
+    there = (distance, min(low, altitude), max(high, altitude))
+    if link.motion == MotionKind.CLIMB:
+        return there, BEGINS + SETTLES + height
+    place = first_cell(contract, PLACE)
+    x, y = arguments[place : place + 2]
+    away = isqrt(x * x + y * y) + 1
+    cell, cruise = contract.motion.speed, min(speeds.cruise, slowest or speeds.cruise)
+    asked = arguments[cell] if cell >= 0 else cruise
+    way = leg_us(speeds, distance + away, over_ground(speeds, asked))
+    return (max(distance, away), *there[1:]), BEGINS + way + height + SETTLES
+
+
+def _too_long(
+    ground: Ground,
+    step: Step,
+    what: str,
+    contract: Contract,
+    time_us: int,
+    allowed: int,
+    limit: Span,
+    nearer: _Fix | None = None,
+) -> None:
+    lasts = f"`{contract.name}` lasts at most {display(allowed, Dimension.DURATION)}"
+    over = time_us - allowed
+    ground.context.report.add(
+        codes.PLAN_TOO_LONG,
+        step.span if nearer is None else nearer[0],
+        f"{what} takes up to {display(-(-time_us // _SECOND) * _SECOND, Dimension.DURATION)}, and {lasts}"
+        if over >= _SECOND
+        else f"{lasts}, and {what} takes up to "
+        f"{display(-(-over // _MILLISECOND) * _MILLISECOND, Dimension.DURATION)} longer",
+        help=f"fly a shorter path, or faster, or let it last longer; {_counted(ground)}",
+        labels=[(limit, "declared here"), *_declared(ground)],
+        fix=nearer,
+    )
+
+
+def _too_much(
+    ground: Ground, step: Step, what: str, contract: Contract, energy: int, nearer: _Fix | None = None
+) -> None:
+    skill = ground.context.symbols.skills[step.skill.text]
+    own = None if step.overrides is None else step.overrides.energy
+    declared = own or skill.energy
+    assert declared is not None
+    needed = -(-energy // 10) * 10  # to a tenth of a percent
+    ground.context.report.add(
+        codes.STEP_ENERGY,
+        step.span if nearer is None else nearer[0],
+        f"{what} takes up to {display(needed, Dimension.RATIO)} of a full charge, and `{contract.name}` takes at most "
+        f"{display(contract.energy, Dimension.RATIO)}",
+        help=f"write `energy at most {display(needed, Dimension.RATIO)}`, or fly a shorter path, or faster; "
+        f"{_counted(ground)}",
+        labels=[(declared.span, "declared here"), *_declared(ground)],
+        fix=nearer,
+    )
+
+
+def _declared(ground: Ground) -> Iterator[tuple[Span, str]]:
+    """Where the vehicle says how fast it is."""
+    speeds = ground.lowered.vehicle.speeds
+    if speeds:
+        first, last = speeds[0].span, speeds[-1].span
+        yield Span(first.file, first.start, last.end), "the speeds that are counted with"
+
+
+def _counted(ground: Ground) -> str:
+    """By which speeds it was counted, in words."""
+    speeds, vehicle = _speeds(ground), ground.prepared.policy.vehicle
+    names = {"cruise": speeds.cruise, "climb": speeds.climb, "descent": speeds.descent, "landing": speeds.landing}
+    told = ", ".join(f"{name} {display(value, Dimension.SPEED)}" for name, value in names.items())
+    against = f"against {display(speeds.wind, Dimension.SPEED)} of wind" if speeds.wind else "without wind"
+    if ground.lowered.vehicle.speeds:
+        return f"counted with the speeds of `{vehicle.name}`, {against}"
+    return f"`{vehicle.name}` declares no `speeds`: counted with {told}, {against}"

@@ -1,0 +1,100 @@
+"""What is proved of a mission holds in flight: no step takes longer, more charge or more height than its bounds."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import pytest
+
+from reference.bounded_flights import Drawn, bounds, compiled, draw, simulated
+from rtshcua.ground.compiler.program import Compiled
+from rtshcua.onboard.ports import Ending
+from virtual import case
+from virtual.flight import Flight, Flown
+
+#: what the tick of these flights adds to a step
+TICKS_US = 100_000
+POSITION_ERROR_MM = 3_000
+
+
+class Sample(NamedTuple):
+    """What was so at a time, whatever was reported."""
+
+    at_us: int
+    battery: int
+    up_mm: int
+
+
+def accepted(seeds: Iterator[int], count: int) -> Iterator[tuple[int, Drawn, Compiled]]:
+    """So many missions that are accepted, of those that seeds give."""
+    for seed in seeds:
+        drawn = draw(seed)
+        made = compiled(drawn)
+        if made.mission is not None:
+            yield seed, drawn, made
+            count -= 1
+            if not count:
+                return
+
+
+def flown(drawn: Drawn, made: Compiled, flavour: str) -> tuple[Flown, list[Sample]]:
+    """A flight of it, and what really was so at each turn."""
+    assert made.mission is not None
+    samples = []
+
+    def look(flight: Flight) -> tuple[()]:
+        truth = flight.vehicle.simulation.truth()
+        samples.append(Sample(flight.clock.now().monotonic_us, truth.battery, truth.up_mm))
+        return ()
+
+    flight = Flight(case.seal(made.mission, made.policy), simulated(drawn, made, flavour))
+    return flight.fly(look), samples
+
+
+def exceeded(drawn: Drawn, made: Compiled, flavour: str) -> Iterator[str]:
+    """Which bounds a flight of it exceeds."""
+    flight, samples = flown(drawn, made, flavour)
+    proven = bounds(made)
+    if flight.ending is not Ending.COMPLETED:
+        yield f"{flight.ending}, after {flight.dispatched()}: {[each['event'] for each in flight.effects('violated')]}"
+        return
+    begun = flight.effects("dispatched")
+    ended = {each["step"]: each["at_us"] for each in flight.effects("succeeded")}
+
+    def battery(at_us: int) -> int:
+        return next((each.battery for each in samples if each.at_us >= at_us), samples[-1].battery)
+
+    for step, bound in zip(begun, proven.steps, strict=True):
+        start, end = step["at_us"], ended[step["step"]]
+        if end - start > bound.time_us + TICKS_US:
+            yield f"{bound.skill} took {(end - start) / 1e6:.1f} s of {bound.time_us / 1e6:.1f} s"
+        taken = battery(start) - battery(end)
+        if taken > bound.energy + 1:  # both are rounded
+            yield f"{bound.skill} took {taken} of {bound.energy}"
+    whole = max(ended.values()) - begun[0]["at_us"]
+    if whole > proven.time_us:
+        yield f"all took {whole / 1e6:.1f} s of {proven.time_us / 1e6:.1f} s"
+    if samples[0].battery - samples[-1].battery > proven.energy:
+        yield f"all took {samples[0].battery - samples[-1].battery} of {proven.energy}"
+    highest = max(each.up_mm for each in samples)
+    if highest > 1_000 * drawn.highest + POSITION_ERROR_MM:
+        yield f"it came {highest / 1_000} m high, and {drawn.highest} m is planned"
+
+
+def wrong(seeds: range, flavour: str) -> list[str]:
+    """What is wrong about the accepted missions of some seeds."""
+    found = accepted(iter(seeds), len(seeds))
+    return [f"seed {seed}: {what}" for seed, *mission in found for what in exceeded(*mission, flavour)]
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_no_bound_is_exceeded_in_flight(flavour: str) -> None:
+    missions = list(accepted(iter(range(20)), 3))
+    assert len(missions) == 3
+    assert [what for _, *mission in missions for what in exceeded(*mission, flavour)] == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("ten", range(50))
+def test_no_bound_of_many_is_exceeded_in_flight(ten: int, flavour: str) -> None:
+    assert wrong(range(100 + 10 * ten, 110 + 10 * ten), flavour) == []

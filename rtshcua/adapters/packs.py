@@ -61,6 +61,7 @@ def packs_of(sources: Iterable[str]) -> frozenset[str]:
     return frozenset(match[1] for source in sources if (match := _NAME.match(source)))
 
 
+@cache  # what is installed is read of some hundred packages, which takes longer than all else that begins a flight
 def manoeuvres(packs: frozenset[str]) -> Mapping[str, Stages]:
     """How to fly, by flavour (`px4`) and by flavour and skill (`px4.spray_area`), from what ships and these packs.
 

@@ -1,7 +1,7 @@
 """Packs of skills: found by entry points, imported by name, flown by their own code where the policy names them."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -15,12 +15,12 @@ Install = Callable[[str, str, str], None]
 
 
 @pytest.fixture
-def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     """Installs a package of a name, with entry points and the source of its one module, for this test."""
     site = tmp_path / "site"
     site.mkdir()
     monkeypatch.syspath_prepend(str(site))
-    packs.folder.cache_clear()
+    forget()
     for module in ("acme_code", "evil_code"):
         monkeypatch.delitem(sys.modules, module, raising=False)
 
@@ -33,7 +33,14 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
         (site / name / "skills").mkdir(parents=True)
         (site / name / "skills" / "spray.rts").write_text("zone z = circle(47 N, 8 E, 50 m)\n", encoding="utf-8")
 
-    return install
+    yield install
+    forget()
+
+
+def forget() -> None:
+    """What a process keeps of the packs that it found."""
+    packs.folder.cache_clear()
+    packs.manoeuvres.cache_clear()
 
 
 SKILLS = "[rtshcua.skills]\n{0} = {0}_code:folder\n"

@@ -219,7 +219,7 @@ def test_a_bundle_that_was_cut_is_malformed_for_everybody(
 def listening() -> Iterator[Path]:
     """A flight's socket that accepts the first document and refuses the others, the next as for another mission."""
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
-        agents = AgentSocket(Path(name) / "s", lambda: b'{"type":"hello"}\n')
+        agents = AgentSocket(Path(name) / "s", lambda: b'{"type":"hello","flight":"' + b"00" * 16 + b'"}\n')
         over = threading.Event()
 
         def serve() -> None:

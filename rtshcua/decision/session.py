@@ -85,6 +85,8 @@ class InForce:
         )
         #: of the mission that was opened, and of all that replaced it since
         self._digests: tuple[bytes, ...] = (bundle.mission_digest,)
+        #: the steps that were in force, and are not any more
+        self._replaced: tuple[Invocation, ...] = ()
         #: the ids of all steps that ever were in force
         self._seen = frozenset(each.invocation_id for each in bundle.mission.invocations)
 
@@ -142,8 +144,9 @@ class InForce:
     def _approval(self, document: bytes, now: Now, decided: int) -> Receipt:
         policy = self.bundle.policy
         answered = open_approval(
-            document, root=self._root, vehicle=self._vehicle, flight=self.flight, bundle=self.bundle, now=now
-        )
+            document, root=self._root, vehicle=self._vehicle, flight=self.flight, bundle=self.bundle, now=now,
+            missions=self._digests, replaced=self._replaced,
+        )  # fmt: skip
         step = answered.about.step
         if step < decided:
             raise DocumentError("already-decided", f"step {step} was decided before")
@@ -200,6 +203,7 @@ class InForce:
             raise DocumentError("id-seen", "a new step has the id of one that this flight knew before")
         prepared = self._prepared(found.mission) if ahead is None else ahead.prepared
         self._seen |= new
+        self._replaced = (*self._replaced, *self.bundle.mission.invocations[found.kept :])
         self.bundle = after
         self.invocations = (*self.invocations[: found.kept], *prepared[found.kept :])
         self._received_us = (*self._received_us[: found.kept], *[now.monotonic_us] * (len(prepared) - found.kept))

@@ -5,6 +5,7 @@ nothing for any other. The key must have duty `approval`, and the root must let 
 vehicle.
 """
 
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from rtshcua.model.flat.mission import Invocation
@@ -59,9 +60,20 @@ def sign_approval(approval: ApprovalDocument, key: SigningKey) -> bytes:
 
 
 def open_approval(
-    document: bytes, *, root: TrustRoot, vehicle: str, flight: bytes, bundle: Bundle, now: Now
+    document: bytes,
+    *,
+    root: TrustRoot,
+    vehicle: str,
+    flight: bytes,
+    bundle: Bundle,
+    now: Now,
+    missions: Collection[bytes] = (),
+    replaced: Sequence[Invocation] = (),
 ) -> Answered:
     """What a signed approval answers, if it is to be trusted here and now, about a step of the mission in force.
+
+    A refusal may be about a step of any of the flight's `missions`, `replaced` or not: it is of what that asked for, so
+    nobody outruns it by replacing. It counts for a step in force that asks for the same.
 
     Raises `DocumentError`: its own slugs are `wrong-vehicle`, `other-flight`, `other-mission`, `unknown-invocation`,
     `binding-mismatch`, `not-asked`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
@@ -73,19 +85,27 @@ def open_approval(
     check_person(opened.key, said.role, vehicle, now)
     check_times(said.issued_at_us, said.expires_at_us, now)
     check_flight(said.flight, flight)
-    if said.mission != bundle.mission_digest:
+    if said.mission != bundle.mission_digest and (said.granted or said.mission not in missions):
         raise DocumentError("other-mission", "it is about a step of another mission than the one in force")
-    policy = bundle.policy
-    invocation = next((each for each in bundle.mission.invocations if each.invocation_id == said.invocation_id), None)
-    if invocation is None:
+    policy, steps = bundle.policy, bundle.mission.invocations
+    meant = steps if said.granted else (*steps, *replaced)
+    named = next((each for each in meant if each.invocation_id == said.invocation_id), None)
+    # the last one that asks for the same: those before it may be decided
+    invocation = named if named in steps else next((each for each in reversed(steps) if _alike(each, named)), None)
+    if named is None or invocation is None:
         raise DocumentError("unknown-invocation", "it is about no step of the mission in force")
-    if invocation.binding != said.binding:
-        raise DocumentError("binding-mismatch", f"it was made for another step {invocation.step} than the one in force")
+    if named.binding != said.binding:
+        raise DocumentError("binding-mismatch", f"it was made for another step {named.step} than the one in force")
     role = policy.roles.index(said.role) if said.role in policy.roles else -1
     if role < 0 or not confirms(policy, invocation, role):
         text = f"no `confirm` of the policy asks role `{said.role[:80]}` about step {invocation.step}"
         raise DocumentError("not-asked", text)
     return Answered(invocation, role, root.person(opened.key), said.granted, now.monotonic_us, said.expires_at_us)
+
+
+def _alike(a: Invocation, b: Invocation | None) -> bool:
+    """Whether two steps ask for the same: the skill with its arguments."""
+    return b is not None and (a.skill, a.arguments) == (b.skill, b.arguments)
 
 
 def confirms(policy: Policy, invocation: Invocation, role: int) -> tuple[int, ...]:

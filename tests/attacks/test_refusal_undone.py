@@ -97,6 +97,34 @@ def test_a_refusal_stays_with_what_was_refused_wherever_it_stands_now(kept: int)
     assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
 
 
+@pytest.mark.parametrize("kept", [0, ASKED, ASKED + 1])
+def test_nobody_outruns_a_refusal_by_replacing(kept: int) -> None:
+    """A person said yes, and now no. Meanwhile the mission is replaced by itself: the yes would outlive it."""
+    of = flown_to_the_inspection() if kept else renewed(OF)
+    grant, refusal = approval(of), approval(of, granted=0)
+    assert presented(of, grant).accepted
+    for _ in range(2):
+        assert presented(of, replacement(of, kept, of.bundle.mission)).accepted
+    assert presented(of, grant).slug == "other-mission", "no yes is for another mission than the one in force"
+    said = presented(of, refusal)
+    assert (said.slug, said.step, said.granted) == ("accepted", ASKED, 0)
+    assert presented(of, approval(of)).slug in ("accepted", "already-answered")
+    for step in range(ASKED if kept == 0 else 0):
+        answer_to(of, request_for(of, step=step))
+    assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
+
+
+def test_a_refusal_of_what_nothing_asks_for_any_more_is_told_so() -> None:
+    of = renewed(OF)
+    refusal, other = approval(of, granted=0), approval(of, granted=0, binding=bytes(32))
+    assert presented(of, replacement(of)).accepted
+    assert presented(of, refusal).slug == "unknown-invocation"
+    of = renewed(OF)
+    assert presented(of, replacement(of, 0, of.bundle.mission)).accepted
+    assert presented(of, other).slug == "binding-mismatch"
+    assert presented(of, approval(of, granted=0, mission=bytes(32))).slug == "other-mission"
+
+
 def test_the_step_behind_another_stays_refused() -> None:
     """It has another index now."""
     of = flown_to_the_inspection()

@@ -145,6 +145,20 @@ def test_an_approval_of_a_step_that_was_decided_is_refused() -> None:
     assert take(flight(), approval(OF), decided=ASKED + 1).slug == "already-decided"
 
 
+def test_a_refusal_reaches_what_replaced_the_step_that_it_names_if_that_asks_for_the_same() -> None:
+    again = sign_replacement(OF.bundle.mission, over=OF.bundle, flight=FLIGHT, kept=ASKED, key=MISSION_KEY)
+    of = flight()
+    assert take(of, again).accepted
+    assert take(of, approval(OF)).slug == "other-mission"
+    receipt = take(of, approval(OF, granted=0), decided=ASKED)
+    assert (receipt.accepted, receipt.step, receipt.granted) == (True, ASKED, 0)
+    assert {each.granted for each in of.approvals(of.bundle.mission.invocations[ASKED], START)} == {0}
+    of = flight()
+    assert take(of, replacement(OF)).accepted
+    assert take(of, approval(OF, granted=0)).slug == "unknown-invocation"
+    assert take(of, approval(OF, granted=0, mission=bytes(32))).slug == "other-mission"
+
+
 def test_after_a_recall_nothing_else_is_accepted() -> None:
     of = flight()
     assert take(of, recall(OF)).accepted

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from rtshcua.cli.faults import distrust, fail
-from rtshcua.cli.showing.bundle import claimed, replaced
+from rtshcua.cli.showing.bundle import claimed, over, recorded_replacement
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -39,15 +39,22 @@ def prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
     ready = prepare(policy)
     invocations = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
     if isinstance(ready, Refusal) or isinstance(invocations, Refusal):
-        what = ready.text if isinstance(ready, Refusal) else ""
-        return fail(ExitCode.INPUT, f"this would be refused on board: {what}")
+        wrong = ready if isinstance(ready, Refusal) else invocations
+        assert isinstance(wrong, Refusal)
+        return fail(ExitCode.INPUT, f"this would be refused on board: {wrong.text}")
     return Subject(ready, mission, invocations)
 
 
 def after(subject: Subject, detail: str) -> Subject | ExitCode:
-    """The mission after a recorded replacement; the steps that stay keep their bindings."""
+    """The mission after a recorded replacement. The steps that stay are those that were made ready first, as on board:
+    they may mean something in phases that the new mission does not have.
+    """
     try:
-        mission = replaced(detail, subject.mission)
+        said = recorded_replacement(detail)
     except Untrusted as error:
         return fail(ExitCode.INPUT, f"a replacement in the log: {error}")
-    return prepared(subject.policy.policy, mission)
+    newer = prepared(subject.policy.policy, said.mission)
+    if isinstance(newer, ExitCode):
+        return newer
+    steps = (*subject.invocations[: said.kept], *newer.invocations[said.kept :])
+    return Subject(subject.policy, over(said, subject.mission), steps)

@@ -45,15 +45,25 @@ def claimed(data: bytes) -> Claimed:
     return Claimed(policy, mission, digest(BUNDLE, data), policy_digest(first.payload), first.kid, second.kid)
 
 
-def replaced(detail: str, mission: Mission) -> Mission:
-    """The mission after a recorded replacement, which is not verified here. Raises `Untrusted`."""
+def recorded_replacement(detail: str) -> ReplacementDocument:
+    """A replacement that a record holds, which is not verified here. Raises `Untrusted`."""
     try:
         document = b64decode(detail, validate=True)
     except ValueError:
         raise Untrusted("malformed", "a recorded document is not base64") from None
     said = parse(names.REPLACEMENT, cose.unverified(document).payload, ReplacementDocument)
-    kept = max(said.kept, 0)
-    return replace(said.mission, invocations=(*mission.invocations[:kept], *said.mission.invocations[kept:]))
+    return replace(said, kept=max(said.kept, 0))
+
+
+def replaced(detail: str, mission: Mission) -> Mission:
+    """The mission after a recorded replacement, which is not verified here. Raises `Untrusted`."""
+    return over(recorded_replacement(detail), mission)
+
+
+def over(said: ReplacementDocument, mission: Mission) -> Mission:
+    """The mission after a replacement: the steps that stay, then the new ones."""
+    steps = (*mission.invocations[: said.kept], *said.mission.invocations[said.kept :])
+    return replace(said.mission, invocations=steps)
 
 
 def show_bundle(page: Page, data: bytes, now_us: int) -> dict[str, object]:

@@ -5,15 +5,18 @@ import re
 import tempfile
 import threading
 import time
+from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import AgentSocket
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.app import main
+from rtshcua.cli.subject import Subject, after, prepared, unpacked
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
@@ -103,6 +106,26 @@ def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.Captur
     for words in (["--policy"], []):
         assert main(["recall", "low.bundle", *words, "-o", "home", *FLIGHT]) == ExitCode.OK
     assert presented(of, here / "home").slug == "accepted"
+
+
+def test_a_replacement_that_drops_a_phase_is_followed_in_a_log(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A step that stays may have meant something in that phase too: it flies, and a log of it is explained."""
+    two = LOW.replace("  }\n  phase recovery {", "   ").replace(
+        "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)", ""
+    )
+    (here / "two.rts").write_text(two)
+    assert main(["compile", "two.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT]) == ExitCode.OK
+    of, replacement = in_force(here / "low.bundle"), here / "two.replacement"
+    assert presented(of, replacement).slug == "accepted"
+    before = unpacked((here / "low.bundle").read_bytes(), "low.bundle")
+    assert isinstance(before, Subject)
+    found = after(before, b64encode(replacement.read_bytes()).decode())
+    assert isinstance(found, Subject), capsys.readouterr().err
+    assert found.mission == of.bundle.mission
+    assert [each.invocation for each in found.invocations] == [*of.bundle.mission.invocations]
+    wrong = replace(before.mission, name="")
+    assert prepared(before.policy.policy, wrong) == ExitCode.INPUT
+    assert "refused on board: the name of the mission is no name" in capsys.readouterr().err
 
 
 def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

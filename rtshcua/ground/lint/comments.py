@@ -12,6 +12,8 @@ from rtshcua.diagnostics.span import Source, Span
 
 #: what a comment may ask for: about a line, or about the whole file
 LINE, FILE = "ignore", "ignore-file"
+#: what a comment holds that asks for anything
+ASKING = "rtshcua:"
 
 _TOKEN = re.compile(
     r'(?P<text>"(?:[^"\\\n]++|\\[^\n])*+"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)', re.DOTALL
@@ -41,20 +43,21 @@ def asked(inside: str) -> "re.Match[str] | None":
 
 def ignores_line(comment: str) -> bool:
     """Whether a comment, with its marks, ignores findings by the line."""
-    if "rtshcua:" not in comment:
+    if ASKING not in comment:
         return False
     found = asked(_inside(comment))
     return found is not None and found["word"] == LINE
 
 
-def comments(source: Source) -> Iterator[Comment]:
-    """All comments of a text, in order."""
+def comments(source: Source, holding: str = "") -> Iterator[Comment]:
+    """The comments of a text that hold another, in order: there may be millions, and few that ask for anything."""
     found: list[tuple[int, int, bool]] = []
     taken: list[int] = []  # lines that have something else
     begun = False
     for match in _TOKEN.finditer(source.text):
         if match["comment"] is not None:
-            found.append((*match.span(), begun))
+            if holding in match["comment"]:
+                found.append((*match.span(), begun))
             continue
         begun = True
         line = source.position(match.start()).line  # what is no comment stays on one line

@@ -18,7 +18,7 @@ from rtshcua.diagnostics.codes import REGISTRY, Code, Severity, can_be_ignored, 
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.lint.comments import FILE, LINE, Comment, asked, comments
+from rtshcua.ground.lint.comments import ASKING, FILE, LINE, Comment, asked, comments
 from rtshcua.ground.project.reasons import says_why
 
 _REASON = re.compile(r"(?:^|(?<=[\s,]))because(?!\S)")
@@ -51,11 +51,11 @@ class Ignores(NamedTuple):
 
 def ignores(source: Source) -> Ignores:
     """The ignores of a text."""
-    if "rtshcua:" not in source.text:
+    if ASKING not in source.text:
         return Ignores((), ())
     faults: list[Diagnostic] = []
     given: list[Ignore] = []
-    for comment in comments(source):
+    for comment in comments(source, ASKING):
         found = asked(comment.inside)
         if found is not None:
             given += _read(source, comment, found, faults)
@@ -110,8 +110,10 @@ def _unknown(name: str, code: Code | None, span: Span, *, guess: bool) -> Diagno
         if code.severity is not Severity.ERROR:
             why = "is about ignores themselves, and cannot be ignored"
         return Diagnostic(codes.UNKNOWN_IGNORE, f"`{name}` {why}", span, "remove it, and correct what it is about")
-    can = [code for code in REGISTRY.values() if can_be_ignored(code)]
-    near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)]) if guess else None
+    near = None
+    if guess:
+        can = [code for code in REGISTRY.values() if can_be_ignored(code)]
+        near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)])
     help = "codes are written as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
     fixes = () if near is None else (Fix(span, near, f"write `{near}`"),)
     return Diagnostic(codes.UNKNOWN_IGNORE, f"there is no code `{name}`", span, help, fixes=fixes)

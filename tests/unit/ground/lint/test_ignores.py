@@ -40,6 +40,8 @@ def test_what_stands_in_comments(text: str) -> None:
     found = [(each.inside.rstrip("\r"), each.alone, not each.begun) for each in comments(Source("x", text))]
     naive = [(each.text.rstrip("\r"), each.alone, each.at_top) for each in ignoring.remarks(text)]
     assert found == naive
+    holding = [each for each in comments(Source("x", text)) if "rtshcua:" in each.inside]
+    assert list(comments(Source("x", text), "rtshcua:")) == holding
 
 
 @given(TEXTS)

@@ -8,7 +8,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
-from rtshcua.adapters.store.writing import replace
+from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.cli.bounds import bounds_dict, bounds_told
 from rtshcua.cli.faults import untrusted
 from rtshcua.cli.findings import Findings, exit_code
@@ -113,7 +113,7 @@ def compile(
         check_trusted(store, signers[1], compiled.policy, compiled.mission)
     except Untrusted as error:
         return findings.end(untrusted(error))
-    replace(target, data)
+    replace_inside(target, data)
     if not as_json:
         out(_told(compiled.policy, compiled.mission, target))
         if compiled.bounds is not None:

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from rtshcua import __version__
-from rtshcua.adapters.store.writing import replace
+from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.cli.asked import unfolded
 from rtshcua.cli.earlier import Earlier, earlier_policies
 from rtshcua.cli.faults import say
@@ -126,7 +126,7 @@ def docs(
     if target is None:
         out_rendered(text, end="")
         return ExitCode.OK
-    replace(target, text.encode("utf-8"))
+    replace_inside(target, text.encode("utf-8"))
     for chapter in book.chapters:
         out(f"{chapter.name}: version {chapter.version}, digest {chapter.digest}")
     out(f"{len(book.chapters)} {'policies' if len(book.chapters) > 1 else 'policy'}, written to {target}")

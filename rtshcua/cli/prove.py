@@ -12,7 +12,7 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.logs import begins_as_log, lines, read_anchors
 from rtshcua.adapters.files.runs import LOG
 from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
-from rtshcua.adapters.store.writing import replace
+from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.stdout import out, out_json
@@ -109,7 +109,7 @@ def prove(
         if at is None and not is_anchored(made):
             made = _nearest(read, record, since, notes) or made
     target = output or Path(name)
-    replace(target, made)
+    replace_inside(target, made)
     if as_json:
         out_json(json.dumps({"proof": str(target), "log": str(path), "octets": len(made), "exit_code": 0}))
     else:

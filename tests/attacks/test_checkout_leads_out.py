@@ -11,7 +11,8 @@ from lsprotocol import types as lsp
 
 from rtshcua import library
 from rtshcua.adapters.language_server.session import Session
-from rtshcua.adapters.store.checkout import checkout_of
+from rtshcua.adapters.store import writing
+from rtshcua.adapters.store.checkout import checkout_of, expect_inside
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -124,6 +125,54 @@ def test_a_report_is_not_written_out_of_the_checkout(
     assert (tmp_path / "reports/out.xml").read_text() == "mine"
     assert app.main(["lint", "--format", "junit", "-o", str(tmp_path / "typed.xml"), "good.rts"]) == ExitCode.OK
     assert (tmp_path / "typed.xml").exists()
+
+
+def test_a_page_is_not_written_out_of_the_checkout(
+    here: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "home").mkdir()
+    (here / "pages").symlink_to(tmp_path / "home")
+    (here / "good.rts").write_text('import "lib:policies/site.rts"\nimport "lib:policies/training_field.rts"\n')
+    code, text = said(["docs", "good.rts", "-o", "pages/page.html"], capsys)
+    assert (code, "symbolic links lead out of" in text) == (ExitCode.FULL, True), text
+    assert list((tmp_path / "home").iterdir()) == []
+    (here / "page.html").symlink_to(tmp_path / "mine.rts")
+    assert said(["docs", "good.rts", "-o", "page.html"], capsys)[0] == ExitCode.OK
+    assert not (here / "page.html").is_symlink()
+    assert (tmp_path / "mine.rts").read_text() == SECRET
+
+
+def test_a_report_is_not_written_to_a_device_nor_to_a_pipe(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "good.rts").write_text('import "lib:policies/site.rts"\n')
+    (here / "device.xml").symlink_to("/dev/null")
+    os.mkfifo(here / "pipe.xml")
+    for target, why in (("device.xml", "symbolic links lead out of"), ("pipe.xml", "nobody reads this pipe")):
+        for words in (["lint", "--format", "junit", "-o"], ["test", "--junit"]):
+            code, text = said([*words, target, "good.rts"], capsys)
+            assert (code, why in text.lower()) == (ExitCode.FULL, True), text
+
+
+@pytest.mark.parametrize("change", ["rewrite", "write_out", "replace_inside"])
+def test_a_link_that_comes_after_the_question_is_not_followed(
+    here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    (tmp_path / "home").mkdir()
+    (here / "folder").mkdir()
+    for place in (tmp_path / "home", here / "folder"):
+        (place / "a.rts").write_text("before")
+
+    def asked(path: Path) -> tuple[Path, Path | None]:
+        found = expect_inside(path)
+        (here / "folder").rename(here / "gone")
+        (here / "folder").symlink_to(tmp_path / "home")
+        return found
+
+    monkeypatch.setattr(writing, "expect_inside", asked)
+    words = (b"before", b"after") if change == "rewrite" else (b"after",)
+    with pytest.raises(OSError, match=r"folder/a\.rts"):
+        getattr(writing, change)(Path("folder/a.rts"), *words)
+    assert (tmp_path / "home/a.rts").read_text() == "before"
+    assert (here / "gone/a.rts").read_text() == "before"
 
 
 @pytest.mark.parametrize("name", ["../mine.rts", "/etc/passwd", "link.rts"])

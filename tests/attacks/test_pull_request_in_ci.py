@@ -59,6 +59,22 @@ def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_
     assert ended.printed.count("::stop-commands::") == 2
 
 
+def test_a_path_is_no_option_and_a_name_is_one_output(hostile: Path, tmp_path: Path) -> None:
+    (hostile / "--fix.rts").write_text("zone  a = circle(47 N, 8 E, 10 m)\n", encoding="utf-8")
+    ended = runner(tmp_path)(hostile, paths="--fix.rts", format="false", sarif="a\nsecret=b.sarif", junit="c\nd=e.xml")
+    assert "nothing found in 1 file" in ended.printed
+    assert "error" not in ended.printed
+    assert ended.outputs == {"sarif": "", "junit": ""}
+
+
+def test_a_report_that_was_not_written_is_no_output(hostile: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.json").write_text('{"runs": [{"results": [{"suppressions": [1]}]}]}', encoding="utf-8")
+    (hostile / "rtshcua.sarif").symlink_to(tmp_path / "mine.json")
+    ended = runner(tmp_path)(hostile, tests="false", format="false")
+    assert ended.outputs == {"sarif": "", "junit": ""}
+    assert '"suppressions": [1]' in (tmp_path / "mine.json").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("file", FILES, ids=lambda each: each.name)
 def test_python_is_isolated_and_actions_are_pinned(file: Path) -> None:
     text = file.read_text(encoding="utf-8")

@@ -29,9 +29,12 @@ def checkout_of(path: str | Path) -> str | None:
     return project
 
 
-def expect_inside(path: Path) -> Path:
-    """Where a file is to be written, free of links. Raises `Outside` where links lead out of its project, or, if it
-    lies in none, out of the working folder: what is named otherwise is its writer's own business.
+def expect_inside(path: Path) -> tuple[Path, Path | None]:
+    """Where a file is to be written, free of links, and the folder below which that is. Who writes opens it from there
+    without following links: one may be put in its way after this was asked.
+
+    Raises `Outside` where links lead out of its project, or, if it lies in none, out of the working folder: what is
+    named otherwise is its writer's own business (None).
     """
     real = os.path.realpath(path)
     here = Path.cwd()
@@ -39,9 +42,12 @@ def expect_inside(path: Path) -> Path:
     edge = next((each for each in _above(path) if any(os.path.lexists(f"{each}/{name}") for name in marks)), None)
     if edge is None and Path(os.path.abspath(path)).is_relative_to(here):  # noqa: PTH100  without following links
         edge = str(here)
-    if edge is not None and not lies_in(real, os.path.realpath(edge)):
+    if edge is None:
+        return Path(real), None
+    root = os.path.realpath(edge)
+    if not lies_in(real, root):
         raise Outside(EACCES, f"symbolic links lead out of `{edge}`; name the place itself", str(path))
-    return Path(real)
+    return Path(real), Path(root)
 
 
 def lies_in(real: str, folder: str) -> bool:

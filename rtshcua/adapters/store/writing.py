@@ -106,29 +106,50 @@ def rewrite(path: Path, before: bytes, data: bytes) -> None:
     it no longer says `before`, and OSError for what else the system refuses.
     """
     with naming(path):
-        real = expect_inside(path)
-        known = real.stat()
+        real, root = expect_inside(path)
+        with open_regular(real, root) as file:
+            known = os.fstat(file.fileno())
         if not known.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH) or not os.access(real, os.W_OK):
             raise PermissionError(errno.EACCES, "the file is read-only")
-        with replacing(real, mode=PRIVATE_FILE) as handle:
+        with replacing(real, mode=PRIVATE_FILE, root=root) as handle:
             write_all(handle, data)
             with suppress(OSError):  # not ours to give away
                 os.fchown(handle, known.st_uid, known.st_gid)
             os.fchmod(handle, stat.S_IMODE(known.st_mode))  # after that: giving it away takes set-id bits
-            if read_regular(real, len(before)) != before:
+            if read_regular(real, len(before), root) != before:
                 raise Changed(errno.EBUSY, "it was changed meanwhile")
 
 
 def write_out(path: Path, data: bytes, *, mode: int = COMMON_FILE) -> None:
     """Puts what somebody asked for into the file that they named, in one step, where a link leads too, unless it leads
     out of their checkout; but for what is no file to be replaced, it is written to: `/dev/stdout`, even where that
-    leads to a file. Raises NotWritten, and OSError.
+    leads to a file. A pipe that nobody reads is not waited for. Raises NotWritten, and OSError.
     """
     with naming(path):
+        real, root = expect_inside(path)
         if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
-            path.write_bytes(data)
+            try:
+                handle = os.open(path, os.O_WRONLY | os.O_TRUNC | UNAWAITED)
+            except OSError as error:
+                if error.errno != errno.ENXIO:
+                    raise
+                raise PermissionError(errno.EACCES, "nobody reads this pipe") from None
+            try:
+                os.set_blocking(handle, True)
+                write_all(handle, data)
+            finally:
+                os.close(handle)
         else:
-            replace(expect_inside(path), data, mode=mode)
+            replace(real, data, mode=mode, root=root)
+
+
+def replace_inside(path: Path, data: bytes) -> None:
+    """Puts a file in place of whatever was there, a link too, in a folder to which no links lead out of the checkout of
+    whoever named it. Raises NotWritten, and OSError.
+    """
+    with naming(path):
+        folder, root = expect_inside(path.parent)
+        replace(folder / path.name, data, root=root)
 
 
 def publish(fresh: Path, place: Path, root: Path | None = None) -> None:

@@ -43,6 +43,14 @@ def test_every_theorem_has_its_row() -> None:
     assert found <= set(FILES)
 
 
+def test_every_predicate_names_the_test_that_carries_it() -> None:
+    part = PAGE.partition("## Predicates and functions")[2].partition("\n## ")[0]
+    lines = [line for line in part.splitlines() if line.startswith("| ")][1:]
+    assert len(lines) >= 13
+    for line in lines:
+        assert re.search(r"\| `rtshcua/[\w/]+\.py` \| `tests/[\w/]+\.py` \|$", line), line
+
+
 @rows(
     "what",
     ["valid_T", "valid_S", "admissible", "Q_onboard", "enforce", "h_intent", "h_agent", "r_eta", "r_time", "act"],

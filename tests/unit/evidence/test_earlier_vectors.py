@@ -11,7 +11,7 @@ from rtshcua.ground.auditor.audit import audit
 FOLDER = Path(__file__).parents[2] / "vectors"
 
 
-@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_a_log_of_an_earlier_version_is_refused_by_name(version: int) -> None:
     folder = FOLDER / f"log-{version}"
     lines = (folder / "closed.jsonl").read_bytes().splitlines(keepends=True)

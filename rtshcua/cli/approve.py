@@ -21,6 +21,7 @@ from rtshcua.cli.documents import (
     Person,
     SignedRoot,
     deliver,
+    expect_sense,
     flight_id,
     subject,
 )
@@ -83,6 +84,8 @@ def approve(
     now_us = time.time_ns() // 1000
     try:
         flying = subject(bundle, replacement or [], root, now_us, stops=refused)
+        if refused:  # a yes is held to it already; a no is told in our words too, which nonsense has not
+            expect_sense(flying.policy, [flying.mission])
         steps = flying.mission.invocations
         if not 0 <= step < len(steps):
             return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 0 to {len(steps) - 1}")

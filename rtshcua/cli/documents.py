@@ -81,11 +81,11 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
         found = fit_replacement(newer, found, released=0)
         missions.append(newer.mission)
     if not stops:
-        _expect_sense(found.policy, missions)
+        expect_sense(found.policy, missions)
     return found
 
 
-def _expect_sense(policy: Policy, missions: Sequence[Mission]) -> None:
+def expect_sense(policy: Policy, missions: Sequence[Mission]) -> None:
     """What a vehicle would not take is not signed for it: whoever signed a mission may say there what does not fly.
 
     Raises `BundleError`.

@@ -112,6 +112,7 @@ def test_what_the_vehicle_would_refuse_to_load_is_not_approved(sign: Sign, capsy
     """Whoever signs what makes no sense gets no traceback out of it, and no yes."""
     for change in (unknown_skill, lambda one, _: replace(one, plan=replace(one.plan, altitude=50_000))):
         sign(change)
-        assert main([*APPROVE]) == ExitCode.INPUT
-        assert "would be refused on board" in capsys.readouterr().err
+        for words in ((), ("--refuse",)):
+            assert main([*APPROVE, *words]) == ExitCode.INPUT
+            assert "would be refused on board" in capsys.readouterr().err
     assert not Path("yes").exists()

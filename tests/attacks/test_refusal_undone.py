@@ -4,12 +4,16 @@ The attacker holds the runtime and a mission key, signs byte by byte, keeps back
 person signed before.
 """
 
+from base64 import b64encode
+
 import pytest
 from msgspec.structs import replace
 
 from reference.documents import ASKED, approval, hand, low, low_mission, presented, replacement
+from reference.forgery import edit, expect, read, signed
 from reference.world import (
     FLIGHT,
+    LOG_KEY,
     MISSION_KEY,
     POLICY_KEY,
     ROOT,
@@ -201,3 +205,20 @@ def test_the_audit_finds_a_refusal_undone(monkeypatch: pytest.MonkeyPatch) -> No
     failure = audit([*run.lines, close], ROOT_KEY.public).report.failure
     assert failure is not None
     assert failure.slug == "decision/approvals"
+
+
+def test_the_audit_computes_ids_again() -> None:
+    """A boundary that took a bundle, and one that took a replacement, with ids of somebody's own making."""
+    run = Run(renewed(OF)).until_flies("goto")
+    assert hand(run, same_again(run.loaded)) == "accepted"
+    run.until_over()
+    lines = [*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]
+    payload = bundles.policy_payload(OF.bundle.policy)
+    chosen = bundles.mission_payload(with_ids(OF.bundle.mission, {ASKED: bytes(16)}))
+    data = bundles.seal(payload, chosen, policy_key=POLICY_KEY, mission_key=MISSION_KEY)
+    begun = edit(lines[0], bundle=b64encode(data).decode())
+    assert expect(signed([begun, *lines[1:]], LOG_KEY), ROOT_KEY.public) == ("trust/bundle-id-mismatch", 0)
+    at = next(number for number, line in enumerate(lines) if read(line).get("event") == "replacement")
+    forged = edit(lines[at], detail=b64encode(same_again(OF, ids=old_ids(OF))).decode())
+    again = signed([*lines[:at], forged, *lines[at + 1 :]], LOG_KEY)
+    assert expect(again, ROOT_KEY.public) == ("document/id-mismatch", at)

@@ -230,7 +230,7 @@ def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected:
     assert all(each.labels for each in about_steps)
 
 
-@pytest.mark.parametrize(("window", "expected"), [("40 s", []), ("41 s", ["E0717"])])
+@pytest.mark.parametrize(("window", "expected"), [("70 s", []), ("71 s", ["E0717"])])
 def test_a_permit_of_a_later_step_is_known_by_its_release(window: str, expected: list[str]) -> None:
     goto = f"permit goto by role operator through agent when {LONG.format(window)}"
     text = (

@@ -31,14 +31,14 @@ def breach(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg], low:
         found = _vertical(policy, zone, low, high)
         if found is not None:
             return found
-        place = next((each for each in _places(legs) if zone.along(each, box) != TRUE), None)
+        place = next((each for each in places_along(legs) if zone.along(each, box) != TRUE), None)
         if place is not None:
             exact = zone.along(place, _NO_BOX) == TRUE
             return (f"come within {_length(error)} of the edge of" if exact else "leave") + _at(policy, zone, place)
     for zone in airspace.outside:
         if zone.between(low, high) == FALSE:
             continue
-        near = [each for each in _places(legs) if zone.along(each, box) != FALSE]
+        near = [each for each in places_along(legs) if zone.along(each, box) != FALSE]
         if near:
             entered = next((each for each in near if zone.along(each, _NO_BOX) != FALSE), None)
             return (f"come within {_length(error)} of" if entered is None else "enter") + _at(
@@ -67,7 +67,8 @@ def _vertical(policy: Policy, zone: PreparedZone, low: int, high: int) -> str | 
     return None
 
 
-def _places(legs: Sequence[Leg]) -> Iterator[Point]:
+def places_along(legs: Sequence[Leg]) -> Iterator[Point]:
+    """Places on some legs, their ends among them, near enough to each other to say where something is."""
     for (x0, y0), (x1, y1) in legs:
         count = min(isqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) // _EVERY + 1, _MOST)
         for at in range(count + 1):

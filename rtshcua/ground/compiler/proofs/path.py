@@ -4,8 +4,9 @@ The leg to a step's path is part of it, from wherever the vehicle may be then (`
 (`period`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Condition, Environment
 from rtshcua.decision.prepare import PreparedInvocation
@@ -13,14 +14,17 @@ from rtshcua.decision.safety import ranging
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.values import Span as Utc
 from rtshcua.decision.volume import Volume
+from rtshcua.decision.zones import Place as Places
+from rtshcua.decision.zones import Sweep
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.words import clock
 from rtshcua.ground.compiler.mission import argument_span
-from rtshcua.ground.compiler.proofs.leaving import breach, path_legs
+from rtshcua.ground.compiler.proofs.leaving import Leg, breach, path_legs, places_along, position
 from rtshcua.ground.compiler.proofs.period import Period, at_moment, keeps, zone_span
 from rtshcua.ground.compiler.proofs.places import Place, from_home, from_where, planned
-from rtshcua.ground.compiler.proofs.situation import Ground
+from rtshcua.ground.compiler.proofs.situation import EVER, Ground
+from rtshcua.ground.compiler.shapes import Point
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.missions import Step
@@ -84,9 +88,11 @@ def _volume(
     labels = [(each.span, "this step may be skipped") for each in skipped[-1:]]
     if not _airspace(ground, step, invocation, period, start, volume, labels):
         return
-    broken = _broken(ground, invocation, period, at, volume)
+    path = invocation.invocation.plan.path
+    legs = path_legs([(start.x, start.y), *zip(path[::2], path[1::2], strict=True)])
+    broken = _broken(ground, invocation, period, at, volume, legs)
     if broken is not None:
-        _never(ground, step, *broken, labels)
+        _never(ground, step, broken, labels)
         return
     needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
     if needed > FULL:
@@ -145,12 +151,25 @@ def _airspace(
     return True
 
 
-def _broken(
-    ground: Ground, invocation: PreparedInvocation, period: Period, at: Environment, volume: Volume
-) -> tuple[Clause, int | None] | None:
-    """A clause of the contract that cannot hold, over the planned volume or at the start, and the moment of UTC at
-    which it cannot, where that matters.
+class Broken(NamedTuple):
+    """A clause of the contract that cannot hold, the moment of UTC at which it cannot, and near where; None where these
+    do not matter.
     """
+
+    clause: Clause
+    moment: int | None = None
+    place: Point | None = None
+
+
+def _broken(
+    ground: Ground,
+    invocation: PreparedInvocation,
+    period: Period,
+    at: Environment,
+    volume: Volume,
+    legs: Sequence[Leg],
+) -> Broken | None:
+    """A clause of the contract that cannot hold over the planned volume, which leads along `legs`, or at the start."""
     over = ranging(at, volume, ground.prepared.tables.known.height, invocation.lasts_us)
     arguments, contract = invocation.invocation.arguments, invocation.invocation.contract
     anywhere = ground.case(invocation).at
@@ -164,24 +183,58 @@ def _broken(
         maintained = partial(can, condition, ground.best(clause, contract), over)
         fails, moment = period.fails(clause, arguments, invocation.lasts_us, maintained)
         if fails:
-            return clause, moment
+            then = (0, EVER) if moment is None else (moment, moment)
+
+            def holds(
+                there: Environment, condition: Condition = condition, clause: Clause = clause, then: Utc = then
+            ) -> bool:
+                return can(condition, ground.best(clause, contract), there, then)
+
+            return Broken(clause, moment, _near(ground, invocation, at, volume, legs, holds))
     for clause, condition in (*invocation.require, *invocation.assume):
         # where the step begins, only if the time matters too: else E0619 says so
         for there in (anywhere, at) if period.timed(clause, arguments) else (anywhere,):
             fails, moment = period.fails(clause, arguments, 0, partial(can, condition, None, there))
             if fails:
-                return clause, moment
+                return Broken(clause, moment)
     return None
 
 
-def _never(ground: Ground, step: Step, clause: Clause, moment: int | None, labels: list[tuple[Span, str]]) -> None:
-    at = ""
-    if moment is not None:
-        at = f" at {clock(moment, ground.prepared.policy.vehicle.utc_offset_us)}, local time, when it may begin"
+def _near(
+    ground: Ground,
+    invocation: PreparedInvocation,
+    at: Environment,
+    volume: Volume,
+    legs: Sequence[Leg],
+    holds: Callable[[Environment], bool],
+) -> Point | None:
+    """The first place on the way at which a clause cannot hold; None where that is so everywhere, or nowhere alone."""
+    error = ground.prepared.policy.vehicle.position_error
+    box = (-error, -error, error, error)
+    first, elsewhere = None, False
+    for place in places_along(legs):
+        there = Places(((Sweep(place, box), *volume.height[:2]),), 0)
+        here = ranging(at, volume._replace(place=there), ground.prepared.tables.known.height, invocation.lasts_us)
+        if holds(here):
+            elsewhere = True
+        elif first is None:
+            first = place
+        if first is not None and elsewhere:
+            return first
+    return None
+
+
+def _never(ground: Ground, step: Step, broken: Broken, labels: list[tuple[Span, str]]) -> None:
+    clause, policy = broken.clause, ground.prepared.policy
+    at = where = ""
+    if broken.moment is not None:
+        at = f" at {clock(broken.moment, policy.vehicle.utc_offset_us)}, local time, when it may begin"
+    if broken.place is not None:
+        where = f": it fails near {position(policy, broken.place)}"
     ground.context.report.add(
         codes.NEVER_HOLDS,
         step.span,
-        f"`{clause.text}` cannot hold all along this step{at}",
+        f"`{clause.text}` cannot hold all along this step{at}{where}",
         help="change the step's arguments, or where it begins"
         + (": a step before it may be skipped, and then it begins elsewhere" if labels else ""),
         labels=[(ground.span(clause), "the contract asks for this"), *labels],

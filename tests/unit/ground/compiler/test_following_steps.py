@@ -55,6 +55,23 @@ def test_clauses_over_what_motions_determine_must_be_able_to_hold(clause: str, e
     assert codes(UP, "probe()", HOME, skills=skill("probe()", **{kind: clause})) == expected
 
 
+@rows(
+    ("clause", "where"),
+    [
+        ("position outside school", ": it fails near 47.39746 N, 8.54690 E"),  # 64 m from its middle, on the way
+        ("position inside city and position outside school", ": it fails near 47.39746 N, 8.54690 E"),
+        ("position inside school", ": it fails near 47.39774 N, 8.54559 E"),  # where it begins
+        ("height < 15 m", ""),  # it fails wherever the vehicle is
+    ],
+)
+def test_a_clause_that_cannot_hold_all_along_says_near_where(clause: str, where: str) -> None:
+    top = "top: altitude in 5 m .. 30 m"
+    over = skill(f"over(aim: position, {top})", motion="fly to aim at top", maintain=clause, lasts="at most 3 min")
+    [(code, message), *_] = found(program(over, policy(), mission(UP, "over(47.39729 N, 8.54771 E, 20 m)", HOME)))
+    assert code == "E0616"
+    assert message.partition("along this step")[2] == where
+
+
 def test_the_message_tells_what_may_be_skipped() -> None:
     higher = f"goto(47.39799 N, 8.54559 E, 30 m){SKIP}"
     probe = skill("probe()", require="height > 25 m")

@@ -108,6 +108,10 @@ def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, refus
             quoted = words.quoted(loaded.bundle.policy, invocation, decision.clause)
             clause = f": {quoted}" if quoted else ""
             page.row("because", f"{decision.reason.value}{clause}", indent=7, width=10)
+            if each.observing:
+                page.row(
+                    "waits", "until it was observed for as long as it looks back, from the run on", indent=7, width=10
+                )
             page.rows("would pass", [would_pass(one) for one in each.nearest], indent=7, width=10)
     page.text("")
     waits = sum(each.hopeful and each.decision.outcome is not Outcome.ALLOW for each in found)
@@ -134,6 +138,7 @@ def _object(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, cod
                 "target": None if decision.target is None else decision.target.text,
                 "nearest": [one._asdict() for one in each.nearest],
                 "hopeful": each.hopeful,
+                "observing": each.observing,
             }
         )
     return {

@@ -21,10 +21,11 @@ from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.cli.subject import Subject, prepared, unpacked
 from rtshcua.cli.why_log import from_log
 from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.temporal import lasting
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.why.given import given, settings
-from rtshcua.ground.why.nominal import lasting, nominal
+from rtshcua.ground.why.nominal import nominal
 from rtshcua.ground.why.trace import trace
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.situation import Approval, Context, Now

@@ -77,6 +77,15 @@ def observe(memory: Memory, policy: PreparedPolicy, state: State, now: Now) -> t
     return Memory(at_us, tuple(conditions)), tuple(truths)
 
 
+def lasting(state: State, policy: PreparedPolicy, now: Now) -> State:
+    """The state with what conditions over time say when it has been so for longer than any of them looks back."""
+    memory, monitors = initial(policy), state.monitors
+    looked_back = sum(monitor.window_us for monitor in policy.monitors)  # one may look at what another looks back at
+    for at_us in range(0, looked_back + 3 * MAX_GAP, MAX_GAP) if policy.monitors else ():
+        memory, monitors = observe(memory, policy, state, Now(at_us, now.utc_us, now.utc_error_us))
+    return State(state.values, state.ages, monitors)
+
+
 def _observed(before: Remembered, truth: Truth, last_us: int | None, at_us: int) -> Remembered:
     """The time line up to and with an observation: what lies since the last one, then what is so now."""
     _, true_us, false_us, unknown_us = before

@@ -5,6 +5,9 @@ now. A later one is decided as if those before it had flown: position and height
 else is as it is now. Each is taken to be released at this moment, in its own phase, under the conservative `L_rem`,
 with no approval given.
 
+What a condition over time says is unknown until it was observed for as long as it looks back, and observation begins
+with the run. A step that waits for that is decided once more, as if the state had been the same for so long.
+
 `unheard` are the signals that cannot come on a link, and `stranded` the steps that a mission would wait at for ever for
 want of them, or break off at.
 """
@@ -14,7 +17,9 @@ from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import decide
 from rtshcua.decision.nearest import Nearest, nearest
+from rtshcua.decision.temporal import lasting
 from rtshcua.decision.tree import slots_read
+from rtshcua.decision.values import UNKNOWN
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
@@ -31,12 +36,16 @@ _COMES_LATER: Final = _COMES | {Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN}
 
 
 class Rehearsed(NamedTuple):
-    """One step, what is decided on it, and what would have passed. `hopeful`: admitted, or waits for what will come."""
+    """One step, what is decided on it, and what would have passed. `hopeful`: admitted, or waits for what will come.
+
+    `observing`: it waits until something was observed for long enough.
+    """
 
     step: int
     decision: Decision
     nearest: tuple[Nearest, ...]
     hopeful: bool
+    observing: bool = False
 
 
 def rehearse(loaded: Loaded, state: State, now: Now, unheard: frozenset[int] = frozenset()) -> tuple[Rehearsed, ...]:
@@ -62,11 +71,19 @@ def rehearse(loaded: Loaded, state: State, now: Now, unheard: frozenset[int] = f
         decision = decide(prepared, state, policy, context, now)
         would = () if decision.outcome is Outcome.ALLOW else nearest(decision, prepared, state, policy, now)
         comes = _COMES_LATER if invocation.step else _COMES
-        waits = decision.outcome is Outcome.DEFER and decision.reason in comes and invocation.step not in vain
-        hopeful = decision.outcome is Outcome.ALLOW or waits
-        found.append(Rehearsed(invocation.step, decision, would, hopeful))
+        hopeful = _flies(decision, comes) and invocation.step not in vain
+        observing = False
+        if not hopeful and UNKNOWN in state.monitors and (invocation.step or decision.outcome is Outcome.DEFER):
+            then = decide(prepared, lasting(state, policy, now), policy, context, now)
+            hopeful = observing = _flies(then, comes) and invocation.step not in vain
+        found.append(Rehearsed(invocation.step, decision, would, hopeful, observing))
         state = flown(state, invocation.plan, policy.policy.vehicle)
     return tuple(found)
+
+
+def _flies(decision: Decision, comes: Container[Reason]) -> bool:
+    """Whether a step is admitted, or waits for what comes by itself."""
+    return decision.outcome is Outcome.ALLOW or (decision.outcome is Outcome.DEFER and decision.reason in comes)
 
 
 def flown(state: State, plan: Plan, vehicle: Vehicle) -> State:

@@ -41,6 +41,7 @@ def _sentence(what: Happening) -> str:
     if what.outcome != "allow":
         why = f"  because {what.reason}{f': `{what.clause}`' if what.clause else ''}"
         why += f"; instead {what.target}" if what.target else ""
+        why += f"; {what.waits}" if what.waits else ""
     return f"{what.outcome:<11}  {subject}{why}"
 
 

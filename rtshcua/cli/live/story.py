@@ -43,7 +43,10 @@ class Snapshot(msgspec.Struct, frozen=True, tag="view", tag_field="event"):
 
 
 class Happening(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One record of the log, in brief: a decision (`event` is `decision`) or an effect. `t_us` is since the start."""
+    """One record of the log, in brief: a decision (`event` is `decision`) or an effect. `t_us` is since the start.
+
+    `waits` says of a deferral what it waits for, where that is to have been observed for long enough.
+    """
 
     event: str
     t_us: int
@@ -54,6 +57,7 @@ class Happening(msgspec.Struct, frozen=True, omit_defaults=True):
     clause: str = ""
     target: str = ""
     detail: str = ""
+    waits: str = ""
 
 
 class Happened(msgspec.Struct, frozen=True, tag="happened", tag_field="event"):

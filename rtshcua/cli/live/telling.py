@@ -1,11 +1,14 @@
 """From evidence lines and the loaded bundle to what the view is told, and to the counts of the summary."""
 
+from collections.abc import Iterator
+
 import msgspec
 
 from rtshcua.cli.live.story import Happening, Plan, Signal, Step
 from rtshcua.cli.showing.log import detail_of
-from rtshcua.cli.showing.words import call
+from rtshcua.cli.showing.words import call, duration
 from rtshcua.cli.unconfirmed import is_unconfirmed
+from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -87,9 +90,11 @@ class Teller:
             clause, target = record.clause or "", record.target or ""
             if target and not self._flown:
                 target = NOTHING_FLIES
+            waits = self._waits(clause, t_us) if record.outcome == "defer" else ""
             return Happening(
-                "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail
-            )
+                "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail,
+                waits,
+            )  # fmt: skip
         if record.type != "effect":
             return None
         self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
@@ -101,6 +106,25 @@ class Teller:
             return Happening(record.event, t_us, record.step, detail=f"from step {record.step} on")
         detail = detail_of(record.event, record.detail)
         return Happening(record.event, t_us, record.step, subject, detail=detail)
+
+    def _waits(self, text: str, t_us: int) -> str:
+        """What is said of a clause over time, by its text, that was not observed for as long as it looks back."""
+        window_us = max((self._looks_back(code) for code in self._codes(text)), default=0)
+        if window_us <= t_us:
+            return ""
+        return f"it looks back {duration(window_us)}, and observation began with the run"
+
+    def _codes(self, text: str) -> Iterator[tuple[int, ...]]:
+        """The codes of the rules and clauses of the policy and the mission that are written so."""
+        contracts = (*self._policy.contracts, *(each.contract for each in self._mission.invocations))
+        clauses = (each for one in contracts for each in (*one.require, *one.assume, *one.maintain))
+        yield from (each.code for each in clauses if each.text == text)
+        yield from (each.when.code for each in self._policy.rules if each.when is not None and each.text == text)
+
+    def _looks_back(self, code: tuple[int, ...]) -> int:
+        """How far, in us, with what it looks at in turn."""
+        monitors = [self._policy.monitors[a] for op, a in zip(code[::3], code[1::3], strict=True) if op == Op.MONITOR]
+        return max((each.window_us + self._looks_back(each.when.code) for each in monitors), default=0)
 
     def _subject(self, record: _Line) -> str:
         """The step or link that a record is about, as it was written."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from rtshcua.decision.temporal import lasting
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
@@ -12,7 +13,6 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.testing.case import Tested
 from rtshcua.ground.testing.monitored import monitored
-from rtshcua.ground.why.nominal import lasting
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.flat.signal import POSITION, Signal
 from rtshcua.model.flat.situation import Approval, Now, State

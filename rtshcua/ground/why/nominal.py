@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from rtshcua.decision.case import environment, situation
 from rtshcua.decision.nearest import Changes, nearest_in
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.temporal import initial, observe
+from rtshcua.decision.temporal import lasting
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.limits import FULL, MAX_GAP
+from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Now, State
@@ -30,15 +30,6 @@ def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: Prepar
         for clause in _clauses(invocation):
             _content(clause, invocation, policy, now, values, fixed)
     return lasting(_state(values), policy, now)
-
-
-def lasting(state: State, policy: PreparedPolicy, now: Now) -> State:
-    """The state with what conditions over time say when it has been so for longer than any of them looks back."""
-    memory, monitors = initial(policy), state.monitors
-    looked_back = sum(monitor.window_us for monitor in policy.monitors)  # one may look at what another looks back at
-    for at_us in range(0, looked_back + 3 * MAX_GAP, MAX_GAP) if policy.monitors else ():
-        memory, monitors = observe(memory, policy, state, Now(at_us, now.utc_us, now.utc_error_us))
-    return State(state.values, state.ages, monitors)
 
 
 def place_before(invocations: Sequence[PreparedInvocation], step: int) -> tuple[int, int, int]:

@@ -17,7 +17,7 @@ from reference.naive_code import Leg, World, truths
 from reference.naive_temporal import History, says
 from rtshcua.decision.case import situation
 from rtshcua.decision.prepare import PreparedPolicy
-from rtshcua.decision.temporal import initial, observe
+from rtshcua.decision.temporal import initial, lasting, observe
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP, MAX_MONITORS, MAX_WINDOW
 from rtshcua.model.flat.policy import Monitor, MonitorKind
@@ -183,3 +183,12 @@ def naive(code: tuple[int, ...], state: State, moment: Now, policy: PreparedPoli
     about = (policy.policy, known, (), moment.utc_us, moment.utc_error_us, legs)
     (letter,) = truths(code, World(*about, monitors=monitors))
     return letter
+
+
+@rows(("wind", "expected"), [(4 * M, (1, 1)), (9 * M, (2, 2)), (None, (4, 4))])
+def test_what_lasts_is_known_however_far_it_is_looked_back(wind: int | None, expected: tuple[int, ...]) -> None:
+    policy = policy_of(Monitor(FOR, 20 * S, CALM), Monitor(WITHIN, 30 * S, asks(0)))
+    state = State(tuple(wind if slot == WIND else None for slot in range(policy.policy.slots)), (0,) * 32, (4, 4))
+    state = replace(state, ages=state.ages[: policy.policy.slots])
+    assert lasting(state, policy, Now(7, 8, 9)).monitors == expected
+    assert lasting(replace(state, monitors=()), policy_of(), Now(7, 8, 9)).monitors == ()

@@ -12,10 +12,10 @@ from rtshcua.decision import tree
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import Environment, Tables, build, total
 from rtshcua.decision.nearest import Changes, nearest_in
+from rtshcua.decision.temporal import lasting
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.ground.testing.boundaries.parts import Part, truth
 from rtshcua.ground.testing.boundaries.scene import Made, Scene, Value, Variable
-from rtshcua.ground.why.nominal import lasting
 from rtshcua.model.outcome import Outcome, Reason
 
 

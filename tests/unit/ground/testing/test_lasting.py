@@ -1,8 +1,7 @@
 """What conditions over time say of a state that has lasted, however they are stacked."""
 
 from reference.deciding import made
-from rtshcua.decision.temporal import initial, observe
-from rtshcua.ground.why.nominal import lasting
+from rtshcua.decision.temporal import initial, lasting, observe
 from rtshcua.model.flat.limits import MAX_GAP, MAX_WINDOW
 from rtshcua.model.flat.situation import Now, State
 

@@ -26,6 +26,10 @@ def check(
     map_: Annotated[
         Path | None, typer.Option("--map", metavar="FILE.html", help="draw the missions: zones, way, where it fails")
     ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="as if the missions were issued then, UTC: the dates of zones count"),
+    ] = None,
     deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors; notes are not")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
@@ -35,11 +39,20 @@ def check(
     mission specification takes all other sources as its policy's. What is worth a second look besides, and how to
     ignore, fix and report it in CI: `rtshcua lint`.
 
+    Without --at, hours count and the dates of zones do not, so that no check fails because of another day; where such a
+    zone exists now, it is told what would be refused now.
+
     With --map the missions are drawn as one HTML page, whether or not they are refused, as far as their way is planned.
 
     Ends with 0 where there are no errors, 1 where there are, 2 where the command line is wrong, 3 where a file cannot
     be read, 4 where --since names a bundle of a version that is not known here.
     """
     return check_sources(
-        paths or [Path()], since=since, with_=with_ or (), map_=map_, deny_warnings=deny_warnings, as_json=as_json
+        paths or [Path()],
+        since=since,
+        with_=with_ or (),
+        map_=map_,
+        at=at,
+        deny_warnings=deny_warnings,
+        as_json=as_json,
     )

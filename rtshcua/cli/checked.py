@@ -1,17 +1,20 @@
 """What `rtshcua check` does, however its command line was read."""
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from rtshcua.cli.asked import SPECIFICATION, unfolded
 from rtshcua.cli.bounds import bounds_dict, bounds_told, steps_told
-from rtshcua.cli.checking import Mission, check_all
+from rtshcua.cli.checking import Found, Mission, check_all
 from rtshcua.cli.earlier import Earlier, earlier_policies
 from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
+from rtshcua.cli.moments import moment
 from rtshcua.cli.overwriting import refusal
 from rtshcua.cli.programs import Asked, programs
 from rtshcua.cli.progress import watched
+from rtshcua.cli.shown import utc
 from rtshcua.cli.sources import examine
 from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.codes import UNKNOWN_NAME
@@ -25,11 +28,15 @@ def check_sources(
     since: Path | None = None,
     with_: Sequence[Path] = (),
     map_: Path | None = None,
+    at: str | None = None,
     deny_warnings: bool = False,
     as_json: bool = False,
 ) -> ExitCode:
     """Report everything that is wrong with sources; see `rtshcua.cli.check`."""
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
+    issued_at_us = 0 if at is None else moment(at)
+    if issued_at_us is None:
+        return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
     files = unfolded(paths)
     if isinstance(files, Refusal):
         return findings.end(files)
@@ -40,28 +47,19 @@ def check_sources(
     if isinstance(earlier, Refusal):
         return findings.end(earlier)
     asked = programs(files, tuple(with_))
-    found = check_all(watched(asked), earlier)
+    now_us = time.time_ns() // 1_000
+    found = check_all(watched(asked), earlier, issued_at_us, now_us)
     code = exit_code(found.diagnostics) if findings.report(found.diagnostics, found.sources) else ExitCode.OK
     alone = len(files) == 1 and not with_ and files[0].suffix.lower() == SPECIFICATION
     if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
         say(" help: what a specification speaks of stands in its policy's sources: `--with FILE` names them")
     if code is ExitCode.OK and not as_json:
-        out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
-        for mission in found.missions:
-            out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
-            for line in steps_told(mission.bounds):
-                out(line)
-        for left_out in found.left_out:
-            out(left_out.told())
-        for each in found.versions:
-            out(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
-        if since is not None and not found.versions:
-            out(f"nothing in {since} is an earlier version of a policy here")
+        _tell(found, since, now_us)
     if map_ is not None:
         imported = refusal(map_, found.sources, "a page")
         if imported is not None:
             return findings.end(imported)
-        drawn = _draw(asked, map_)
+        drawn = _draw(asked, map_, issued_at_us)
         if not as_json:
             out(drawn)
     return findings.finish(
@@ -69,7 +67,28 @@ def check_sources(
         missions=[{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
         versions=[{"policy": each.name, "version": each.version, "earlier": each.earlier} for each in found.versions],
         left_out=[each._asdict() for each in found.left_out],
+        issued_now=[{"code": each.code.id, "message": each.message} for each in found.now],
     )
+
+
+def _tell(found: Found, since: Path | None, now_us: int) -> None:
+    """What is said of sources in which nothing is wrong."""
+    out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
+    for mission in found.missions:
+        out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
+        for line in steps_told(mission.bounds):
+            out(line)
+    for left_out in found.left_out:
+        out(left_out.told())
+    for refused in found.now:
+        out(f"issued now, it would be refused: {refused.code.id}, {refused.message}")
+    if found.now:
+        at = utc(now_us).replace(" ", "T")
+        out(f"the dates of zones count from the time of issue: `rtshcua check --at {at}` shows where")
+    for each in found.versions:
+        out(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
+    if since is not None and not found.versions:
+        out(f"nothing in {since} is an earlier version of a policy here")
 
 
 def _unfit(target: Path, files: Sequence[Path]) -> Refusal | None:
@@ -81,12 +100,12 @@ def _unfit(target: Path, files: Sequence[Path]) -> Refusal | None:
     return refusal(target, files, "a page")
 
 
-def _draw(asked: Sequence[Asked], target: Path) -> str:
+def _draw(asked: Sequence[Asked], target: Path, issued_at_us: int) -> str:
     """Write the page of the programs that were asked for; what to say of it."""
     from rtshcua.adapters.store.writing import replace
     from rtshcua.ground.handbook.checked import Checking, checked_page
 
-    checked = [(each.reading.program, examine(each.reading)) for each in asked]
+    checked = [(each.reading.program, examine(each.reading, issued_at_us)) for each in asked]
     checkings = [Checking(program, one.planned, one.diagnostics) for program, one in checked]
     replace(target, checked_page(checkings).encode("utf-8"))
     missions = sum(len(one.planned) for _, one in checked)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from rtshcua.cli.earlier import Earlier
 from rtshcua.cli.programs import Asked
 from rtshcua.cli.sources import examine
+from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.bounds import Bounds
@@ -42,17 +43,26 @@ class LeftOut(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Everything that was found, each thing once; of what has no errors its bounds, its versions, what is left out."""
+    """Everything that was found, each thing once; of what has no errors its bounds, its versions, what is left out.
+
+    `now` are the errors that missions without any would have if they were issued now, where a zone exists on dates.
+    """
 
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
     missions: tuple[Mission, ...]
     versions: tuple[Compared, ...]
     left_out: tuple[LeftOut, ...]
+    now: tuple[Diagnostic, ...]
 
 
-def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
-    """Check programs, one after the other, and hold their policies against earlier ones."""
+def check_all(asked: Iterable[Asked], earlier: Earlier, issued_at_us: int = 0, now_us: int = 0) -> Found:
+    """Check programs, one after the other, and hold their policies against earlier ones.
+
+    Without a time of issue the dates of zones are not looked at; where one of them is in force, it is told what would
+    be found now.
+    """
+    now: dict[tuple[object, ...], Diagnostic] = {}
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
     missions: dict[tuple[str, str], Mission] = {}
@@ -60,7 +70,7 @@ def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
     left_out: dict[LeftOut, None] = {}
     for each in asked:
         program = each.reading.program
-        checked = examine(each.reading)
+        checked = examine(each.reading, issued_at_us)
         sources |= program.sources
         compared = compare(checked.policies, earlier.policies, earlier.name, program.sources)
         versions |= dict.fromkeys(compared)
@@ -68,10 +78,25 @@ def check_all(asked: Iterable[Asked], earlier: Earlier) -> Found:
         wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
         for diagnostic in wrong:  # a file that two programs share has its findings once
             found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        if not issued_at_us and checked.bounds and any(_dated(one.policy, now_us) for one in checked.policies):
+            wrong = [one for one in examine(each.reading, now_us).diagnostics if one.code.severity is Severity.ERROR]
+            now |= {(one.code, one.span, one.message): one for one in wrong}
         files = {mission.name.text: unit.file for unit in program.units for mission in unit.missions}
         for name, bounds in checked.bounds.items():
             missions.setdefault((files[name], name), Mission(name, files[name], bounds))
-    return Found(tuple(found.values()), sources, tuple(missions.values()), tuple(versions), tuple(left_out))
+    return Found(
+        tuple(found.values()),
+        sources,
+        tuple(missions.values()),
+        tuple(versions),
+        tuple(left_out),
+        tuple(one for key, one in now.items() if key not in found),
+    )
+
+
+def _dated(policy: Policy, now_us: int) -> bool:
+    """Whether a zone exists now, on its dates."""
+    return any(zone.dates and zone.dates[0] <= now_us <= zone.dates[1] for zone in policy.zones)
 
 
 def _left_out(policy: Policy) -> LeftOut:

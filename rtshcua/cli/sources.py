@@ -83,7 +83,7 @@ def compile_sources(
     return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics)), compiled.sources
 
 
-def examine(reading: Reading) -> Checked:
+def examine(reading: Reading, issued_at_us: int = 0) -> Checked:
     """Everything that is wrong with a program, and what its missions take at most."""
-    checked = examine_program(reading.program, dialect.load())
+    checked = examine_program(reading.program, dialect.load(), issued_at_us)
     return replace(checked, diagnostics=reading.pointed(checked.diagnostics))

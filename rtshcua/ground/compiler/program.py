@@ -118,9 +118,9 @@ def check_declared(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]
     return run.diagnostics()
 
 
-def examine_program(program: Program, dialect: Dialect) -> Checked:
-    """All findings on a program, and the bounds of its missions."""
-    run = Compilation(program, dialect, 0)
+def examine_program(program: Program, dialect: Dialect, issued_at_us: int = 0) -> Checked:
+    """All findings on a program, and the bounds of its missions; as if they were issued at a time, if one is given."""
+    run = Compilation(program, dialect, issued_at_us)
     run.check()
     run.lowered(None)
     run.cases()

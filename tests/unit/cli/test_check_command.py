@@ -98,7 +98,8 @@ def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest
     assert code == ExitCode.OK
     assert [each["file"] for each in answered["missions"]] == ["b/two.rts", "a/deep/er.rts", "a/one.rts"]
     assert {each["mission"] for each in answered["missions"]} == {"look"}
-    assert set(answered) == {"format", "version", "diagnostics", "exit", "missions", "versions", "left_out"}
+    told = {"missions", "versions", "left_out", "issued_now"}
+    assert set(answered) == {"format", "version", "diagnostics", "exit", *told}
 
 
 def test_without_a_path_it_is_this_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -279,3 +280,49 @@ def test_a_specification_without_its_policy_says_how_to_name_it(
     Path("policy.rts").write_text('import "lib:policies/bridge_inspection.rts"\n', encoding="utf-8")
     assert main(["check", "alone.json", "--with", "policy.rts"]) == ExitCode.OK
     assert "names them" not in capsys.readouterr().err
+
+
+DATED = """import "policy.rts"
+import "lib:skills/goto.rts"
+
+zone works = circle(47.39774 N, 8.54559 E, 100 m) {}
+policy dated version 1 {{
+  permit takeoff by role operator through agent
+  permit hover, return_home, emergency_land by any
+  airspace inside meadow outside works
+  contingency return_home, emergency_land
+}}
+mission look under dated@1 on quad {{
+  proposed by agent openclaw for role operator
+  phase departure  {{ takeoff(altitude = 10 m) }}
+  phase recovery   {{ return_home() }}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("active", "now", "then"),
+    [
+        ('active "2020-01-01T00:00Z" .. "2039-01-01T00:00Z"', True, True),
+        ('active "2020-01-01T00:00Z" .. "2021-01-01T00:00Z"', False, False),
+        ('active "2025-01-01T00:00Z" .. "2026-02-28T00:00Z"', False, True),
+    ],
+)
+def test_a_zone_that_exists_on_dates_counts_for_the_time_that_is_given(
+    active: str, now: bool, then: bool, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put({"dated.rts": DATED.format(active)})
+    assert main(["check", "dated.rts"]) == ExitCode.OK, "no check fails because of another day"
+    told = capsys.readouterr().out
+    assert ("issued now, it would be refused: E0508" in told) is now
+    assert ("`rtshcua check --at 2" in told) is now
+    assert main(["check", "dated.rts", "--json"]) == ExitCode.OK
+    said = json.loads(capsys.readouterr().out)["issued_now"]
+    assert {each["code"] for each in said} == ({"E0508"} if now else set())
+    assert main(["check", "dated.rts", *AT]) == (ExitCode.DIAGNOSTICS if then else ExitCode.OK)
+    assert ("E0508" in capsys.readouterr().err) is then
+
+
+def test_a_time_that_is_none(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "policy.rts", "--at", "noon"]) == ExitCode.USAGE
+    assert "`noon` is not a UTC time" in capsys.readouterr().err

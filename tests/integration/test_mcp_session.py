@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 
 pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
+import anyio
 import httpx
 from mcp import ClientSession, McpError, StdioServerParameters, types
 from mcp.client.stdio import stdio_client
@@ -488,3 +489,31 @@ def test_a_token_that_others_may_read_serves_nobody(ground: Any, base: str, plac
     run = ground.start(*words, "--http", "0")
     _, err = run.process.communicate()
     assert run.process.returncode == 2, err
+
+
+@pytest.mark.clients
+def test_a_host_that_dies_in_flight_leaves_a_flight_that_ends_by_itself(ground: Any, base: str, place: Path) -> None:
+    """It calls a hundred tools at once, breaks off in the middle, and nobody follows the flight any more."""
+    run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
+    run.until("waiting")
+
+    async def flood(session: ClientSession) -> None:
+        async with anyio.create_task_group() as calls:
+            for number in range(100):
+                name = ("describe_vehicle", "explain_decision", "read_evidence", "cancel ")[number % 4]
+                calls.start_soon(session.call_tool, name, {})
+
+    async def work(session: ClientSession) -> None:
+        while not ((await call(session, "describe_vehicle"))["untrusted"]["state"] or {}).get("ready"):
+            await asyncio.sleep(0.2)
+        ticket = (await call(session, "propose_mission", mission=PROPOSAL, idempotency_key="one"))["ticket"]
+        while "dispatched" not in [each.get("event") for each in await evidence(session)]:
+            assert not (await call(session, "mission_status", ticket=ticket, wait_s=5))["over"]
+        with anyio.move_on_after(0.3):
+            await flood(session)
+
+    session_of(ground, base, place, work)
+    assert run.end().code == 0, run.stderr
+    assert run.dispatched() == ["takeoff", "goto", "inspect_area", "return_home"]
+    verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
+    assert verified.code == 0, verified.events

@@ -512,7 +512,10 @@ def test_a_host_that_dies_in_flight_leaves_a_flight_that_ends_by_itself(ground: 
         with anyio.move_on_after(0.3):
             await flood(session)
 
-    session_of(ground, base, place, work)
+    try:
+        session_of(ground, base, place, work)
+    except* anyio.BrokenResourceError:
+        pass  # in the SDK's client, by answers that came once nobody waited for them
     assert run.end().code == 0, run.stderr
     assert run.dispatched() == ["takeoff", "goto", "inspect_area", "return_home"]
     verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()

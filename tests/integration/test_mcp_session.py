@@ -6,6 +6,7 @@ import json
 import re
 import select
 import socket
+import subprocess
 import sys
 import tempfile
 import time
@@ -520,3 +521,27 @@ def test_a_host_that_dies_in_flight_leaves_a_flight_that_ends_by_itself(ground: 
     assert run.dispatched() == ["takeoff", "goto", "inspect_area", "return_home"]
     verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
     assert verified.code == 0, verified.events
+
+
+@pytest.mark.clients
+def test_the_scripted_host_flies_by_the_plug_in_that_was_made(ground: Any, base: str, place: Path) -> None:
+    """As the README has it, without a model."""
+    made = ground.start("agent-bundle", "plug", "--bundle", base, "--to", str(place), "--with", str(POLICY)).process
+    out, err = made.communicate()
+    assert made.returncode == 0, (out, err)
+    config = ground.folder / "plug/.mcp.json"
+    server = json.loads(config.read_text())
+    server["mcpServers"]["rtshcua"]["env"]["PYTHONPATH"] = str(CHECKOUT)  # this checkout, whatever is installed
+    config.write_text(json.dumps(server))
+    run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
+    run.until("waiting")
+    words = [
+        sys.executable,
+        str(CHECKOUT / "examples/agent/scripted_host.py"),
+        "plug",
+        str(CHECKOUT / "missions/proposal.json"),
+    ]
+    host = subprocess.run(words, cwd=ground.folder, capture_output=True, text=True, timeout=200, check=False)
+    assert host.returncode == 0, host
+    assert host.stdout.endswith("it ended as completed\n")
+    assert run.end().code == 0, run.stderr

@@ -4,7 +4,7 @@ Statement. Let the executor be the only way to the vehicle (assumption 1) and `e
 (assumption 2), both behind a boundary that shares no key with anyone (assumption 4). Then each step that is dispatched
 was admissible when its permit was made: valid_T and valid_S and L_rem <= ddl - t, with authority, and an approval where
 a rule asks for one. It is the command that was signed, sent once, within its deadline and validity, and not after a
-recall.
+recall or a cancellation.
 
 Attacker: a runtime that is wholly taken over. It asks for whatever it likes, in any order, with any state, time,
 release and phase; it keeps and alters every permit; it hands in documents that people signed, that strangers signed,
@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference import worlds
-from reference.documents import MIN, approval, low_mission, recall, replacement
+from reference.documents import MIN, approval, cancellation, low_mission, recall, replacement
 from reference.flat_case import (
     BATTERY,
     HEIGHT,
@@ -54,7 +54,7 @@ from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire import permit as permits
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.permit import Permit
-from rtshcua.wire.receipt import APPROVAL, RECALL, Receipt
+from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, encode
 from rtshcua.wire.response import Answer, decode
@@ -185,7 +185,8 @@ class TakenOver:
         of, now, steps = self.of, self.now, len(self.loaded.bundle.mission.invocations)
         match of.randrange(8):
             case 0:
-                return recall(self.loaded, now=now, expires_at_us=now.utc_us + MIN) if of.random() < 0.2 else b""
+                called_off = of.choice([recall, cancellation])
+                return called_off(self.loaded, now=now, expires_at_us=now.utc_us + MIN) if of.random() < 0.2 else b""
             case 1:
                 kept = min(2, steps - 1)
                 return replacement(self.loaded, kept) if steps == 4 and of.random() < 0.3 else b""
@@ -207,7 +208,7 @@ class TakenOver:
         assert isinstance(receipt, Receipt)
         if receipt.accepted and receipt.kind == APPROVAL and receipt.granted:
             self.confirmed.add(before[receipt.step].invocation_id)
-        self.recalled = self.recalled or (receipt.accepted and receipt.kind == RECALL)
+        self.recalled = self.recalled or (receipt.accepted and receipt.kind in (RECALL, CANCELLATION))
 
     # ------------------------------------------------------------------------------------------- what must hold of it
 
@@ -240,7 +241,7 @@ class TakenOver:
         signed = (meant.contract.name, plan.kind, plan.path, plan.altitude, plan.speed)
         self.hold(told == signed, "another command than the one that was signed")
         self.hold(self.now.monotonic_us <= until_us, "sent after its deadline or validity")
-        self.hold(not self.recalled, "a step was sent after a recall")
+        self.hold(not self.recalled, "a step was sent after a recall or a cancellation")
         self.hold(meant.step != 2 or plan.altitude != 8 * M or meant.invocation_id in self.confirmed, "unconfirmed")
 
     def hold(self, truth: bool, what: str) -> None:

@@ -5,7 +5,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from reference.documents import MIN, approval, hand, low, recall, replacement
+from reference.documents import MIN, approval, cancellation, hand, low, recall, replacement
 from reference.flat_case import GOTO, INSPECTION, OBSTACLE, M, S, invocation
 from reference.world import APPROVAL_KEY, Run, assert_audited, assert_covered, renewed
 from rtshcua.model.flat.contract import MotionKind
@@ -56,6 +56,8 @@ class Hands:
                 lengthen(self, of, number)
             case "recall":
                 self.paper(recall(of, now=now, expires_at_us=now.utc_us + MIN))
+            case "cancel":
+                self.paper(cancellation(of, now=now))
             case "again" if self.papers:
                 hand(run, self.papers[number % len(self.papers)])
             case "damaged" if self.papers:
@@ -92,8 +94,8 @@ def lengthen(hands: Hands, of: Loaded, number: int) -> None:
 
 
 ACTS = st.sampled_from(
-    ["approve", "approve", "approve briefly", "refuse", "replace", "replace", "replace late", "recall", "again",
-     "again", "damaged", "blind", "see", "lose", "find", "stop"]
+    ["approve", "approve", "approve briefly", "refuse", "replace", "replace", "replace late", "recall", "cancel",
+     "again", "again", "damaged", "blind", "see", "lose", "find", "stop"]
 )  # fmt: skip
 
 

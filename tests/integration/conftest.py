@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,27 +21,25 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.wire.keys import Duty
 from virtual import case
+from virtual.forked import Forked, Started
 
 PATIENCE_S = 240.0
 #: Faster, and what must leave within 1.5 s of flight must leave within less than a busy machine may hold a process up.
 SPEED = 5
-COMMAND = [sys.executable, "-m", "rtshcua.cli.app"]
+AFRESH = (sys.executable, "-m", "rtshcua.cli.app")
 
 
 class Run:
     """One `rtshcua run --json`, or another command that says what happens in JSON lines, under way in `folder`."""
 
-    def __init__(self, folder: Path, command: Sequence[str], environment: Mapping[str, str]) -> None:
+    def __init__(self, folder: Path, process: "subprocess.Popen[bytes] | Started") -> None:
         self.cwd = folder
         self.until_s = time.monotonic() + PATIENCE_S
         self.events: list[dict[str, Any]] = []
         self.code: int | None = None
         self.stderr = ""
         self._rest = b""
-        self.process = subprocess.Popen(
-            command, cwd=folder, env=environment,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
+        self.process = process
 
     def until(self, event: str, **fields: Any) -> dict[str, Any]:
         """Wait for an event with these fields."""
@@ -106,9 +104,15 @@ class Run:
 
 
 class Ground:
-    """A user's machine: keys, bundles, and what was started on it."""
+    """A user's machine: keys, bundles, and what was started on it.
 
-    def __init__(self, folder: Path, data: Path, **witnesses: int) -> None:
+    Where `command` is None, what is started comes from `commands`, which has loaded it already; `afresh` is for those
+    where the start counts too: some test starts each command that goes on for a while so.
+    """
+
+    afresh = AFRESH
+
+    def __init__(self, folder: Path, data: Path, commands: Forked, **witnesses: int) -> None:
         self.folder = folder
         self.environment = os.environ | {"RTSHCUA_DATA_DIR": str(data), "TZ": "UTC"}
         self.store = KeyStore(data)
@@ -117,7 +121,8 @@ class Ground:
             lambda: os.urandom(32), development=True, passphrase=None, now_us=now_us, expires_us=now_us + case.YEAR_US,
             **witnesses,
         )  # fmt: skip
-        self.command, self.speed = COMMAND, SPEED
+        self._commands, self.speed = commands, SPEED
+        self.command: Sequence[str] | None = None
         self.started: list[Run] = []
 
     def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight", return_mm: int = case.LOW) -> str:
@@ -131,24 +136,34 @@ class Ground:
         return f"{name}.bundle"
 
     def start(self, *words: str) -> Run:
-        self.started.append(Run(self.folder, [*self.command, *words], self.environment))
+        if self.command is not None:
+            return self._begun([*self.command, *words])
+        self.started.append(Run(self.folder, self._commands.start(words, self.folder, self.environment)))
+        return self.started[-1]
+
+    def _begun(self, command: Sequence[str]) -> Run:
+        process = subprocess.Popen(
+            command, cwd=self.folder, env=self.environment,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        self.started.append(Run(self.folder, process))
         return self.started[-1]
 
     def vehicle(self, port: int, speed: int = SPEED, *words: str) -> Run:
         """A simulated vehicle for a run that does not start its own; it is ready."""
         command = [sys.executable, "-m", "rtshcua.simulation", "--port", str(port), "--speed", str(speed)]
         returning = ["--return-at", str(case.LOW // case.M)]
-        self.started.append(Run(self.folder, [*command, *returning, *words], self.environment))
-        self.started[-1].until("ready")
-        return self.started[-1]
+        started = self._begun([*command, *returning, *words])
+        started.until("ready")
+        return started
 
     def run(self, bundle: str, *words: str, speed: int = SPEED) -> Run:
         return self.start("run", bundle, "--json", "--speed", str(speed), *words)
 
 
 @contextmanager
-def a_ground(folder: Path, data: Path, **witnesses: int) -> Iterator[Ground]:
-    made = Ground(folder, data, **witnesses)
+def a_ground(folder: Path, data: Path, commands: Forked, **witnesses: int) -> Iterator[Ground]:
+    made = Ground(folder, data, commands, **witnesses)
     try:
         yield made
     finally:
@@ -161,15 +176,15 @@ def a_ground(folder: Path, data: Path, **witnesses: int) -> Iterator[Ground]:
 
 
 @pytest.fixture
-def ground(tmp_path: Path, own_world: None) -> Iterator[Ground]:
-    with a_ground(tmp_path, Path(os.environ["RTSHCUA_DATA_DIR"])) as made:
+def ground(tmp_path: Path, own_world: None, commands: Forked) -> Iterator[Ground]:
+    with a_ground(tmp_path, Path(os.environ["RTSHCUA_DATA_DIR"]), commands) as made:
         yield made
 
 
 @pytest.fixture(scope="session")
-def grounds() -> Callable[..., AbstractContextManager[Ground]]:
+def grounds(commands: Forked) -> Callable[..., AbstractContextManager[Ground]]:
     """Makes what outlives a test, so that several look at one flight: folder, data folder, numbers of witnesses."""
-    return a_ground
+    return lambda folder, data, **witnesses: a_ground(folder, data, commands, **witnesses)
 
 
 @pytest.fixture(scope="session")

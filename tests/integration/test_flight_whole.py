@@ -49,6 +49,7 @@ def watched(grounds: Any, free_port: Any, tmp_path_factory: pytest.TempPathFacto
     """A PX4, and its two witnesses, both of whom must have cosigned; `others` is the dry run."""
     top = tmp_path_factory.mktemp("watched")
     with grounds(top, top / "data", witnesses=2, witness_threshold=2) as ground:
+        ground.command = ground.afresh
         bundle = ground.bundle()
         rehearsal = ground.run(bundle, "--dry-run").end()
         ports = (free_port(), free_port())
@@ -80,7 +81,9 @@ def signed(grounds: Any, free_port: Any, tmp_path_factory: pytest.TempPathFactor
         port, key = free_port(), ["--signing-key", str(top / "link.key")]
         write_link_key(top / "link.key", bytes(range(32)))
         words = ["--connect", f"udpout:127.0.0.1:{port}", "--flavour", "ardupilot", "--speed", str(ground.speed), *key]
+        ground.command = ground.afresh
         vehicle = ground.start("sim", *words, "--json")
+        ground.command = None
         ready = vehicle.until("ready")
         assert (ready["flavour"], ready["peer"]) == ("ardupilot", port)
         link = ["--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", *key, "--unsigned-radio"]

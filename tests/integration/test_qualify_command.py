@@ -36,14 +36,16 @@ def doctor(ground: Any, link: list[str]) -> dict[str, Any]:
 def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_path: Path) -> None:
     link = ["--connect", f"udpin:127.0.0.1:{port}"]
     as_quad = [*link, "--vehicle", "quad-07", "--speed", str(SPEED), "--json"]
-    words = [*ground.command, "compile", SHORT, "-o", "short.bundle"]
+    words = [*ground.afresh, "compile", SHORT, "-o", "short.bundle"]
     subprocess.run(words, cwd=tmp_path, env=ground.environment, check=True, capture_output=True)
     vehicle = simulated(ground, port, 30)
 
     rehearsal = ground.start("run", "short.bundle", "--dry-run", *as_quad).end()
     assert any("is not qualified: there is no record" in text for text in notes(rehearsal)), rehearsal.events
 
+    ground.command = ground.afresh
     flown = ground.start("qualify", SHORT, "--sitl", "--only", "climb", *as_quad).end()
+    ground.command = None
     said = flown.events[-1]
     checks = {each["slug"]: each for each in said["checks"]}
     assert flown.code == said["exit_code"] == ExitCode.OK, (flown.stderr, said)

@@ -8,6 +8,7 @@ the same octets with the same meaning. How many records there are is counted aga
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Final, get_args
@@ -62,12 +63,21 @@ _ROWS: Final = {
 }  # fmt: skip
 
 
+@cache
+def _engine() -> duckdb.DuckDBPyConnection:
+    """For what is small, which takes less time than to make an engine; what is made in a cursor of it goes with that.
+
+    It keeps nothing of the files that it read: the catalogue is replaced under one name.
+    """
+    return duckdb.connect(config={"enable_external_file_cache": "false"})
+
+
 def read_catalogue(folder: Folder) -> dict[str, Entry]:
     """The rows by log. Raises `Untrusted` (`archive-index`) where one would lead to what is not in the archive."""
     if not folder.catalogue.exists():
         return {}
     names = ", ".join(Entry.__struct_fields__)
-    with duckdb.connect() as engine:
+    with _engine().cursor() as engine:
         rows = engine.execute(f"SELECT {names} FROM read_parquet(?)", [str(folder.catalogue)]).fetchall()
     entries = {row[0]: Entry(*row) for row in rows}
     for each in entries.values():
@@ -89,7 +99,7 @@ def misleading(folder: Folder) -> Untrusted:
 def write_catalogue(folder: Folder, entries: Iterable[Entry]) -> None:
     """Puts these rows in the place of all that were there, in one step."""
     fresh = folder.scratch / "logs.parquet"
-    with duckdb.connect() as engine:
+    with _engine().cursor() as engine:
         _load(engine, "logs", Entry, entries, folder.scratch)
         engine.execute(f"COPY (SELECT * FROM logs ORDER BY begun_us, log) TO {quoted(fresh)} (FORMAT parquet)")
     publish(fresh, folder.catalogue, folder.path)
@@ -130,7 +140,7 @@ def lay_out(folder: Folder) -> None:
     """A part without rows, so that every table has its columns before there is anything in it."""
     if all((folder.table(table) / f"{NOTHING}.parquet").exists() for table in TABLES):
         return
-    with duckdb.connect() as engine:
+    with _engine().cursor() as engine:
         _load(engine, "entries", Entry, (), folder.scratch)
         _load(engine, "steps", Step, (), folder.scratch)
         types = ", ".join(f"{name} {kind}" for name, kind in _KINDS.items())

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
@@ -195,7 +196,7 @@ def launch(order: Launch) -> ExitCode:
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
             told = trust.settle(resumed=resumed)
-            run = RunFolder(order.runs, name=order.bundle.stem, bundle=bundle, utc_us=clock.now().utc_us)
+            run, elsewhere = _run_folder(order, bundle, clock, resumed=resumed)
             feed = view.enter_context(Feed(order.style))
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
@@ -211,7 +212,7 @@ def launch(order: Launch) -> ExitCode:
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
             unsure = [UTC_NOTE] if utc.waits else []
-            for note in (*signing.notes, *filter(None, [told, past.note]), *unsure):
+            for note in (*signing.notes, *filter(None, [told, elsewhere, past.note]), *unsure):
                 feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
@@ -227,6 +228,20 @@ def launch(order: Launch) -> ExitCode:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _run_folder(order: Launch, bundle: bytes, clock: LinkClock, *, resumed: bool) -> tuple[RunFolder, str]:
+    """Where the evidence of this run lies, and what there is to tell of it. What comes down keeps it in a temporary
+    folder where it cannot lie among the others. Raises OSError.
+    """
+    name, utc_us = order.bundle.stem, clock.now().utc_us
+    try:
+        return RunFolder(order.runs, name=name, bundle=bundle, utc_us=utc_us), ""
+    except OSError as error:
+        if not resumed:
+            raise
+        other = RunFolder(Path(mkdtemp(prefix="rtshcua-runs-")), name=name, bundle=bundle, utc_us=utc_us)
+        return other, f"`{order.runs}` takes no run ({error.strerror or error}): the log is in `{other.path}`"
 
 
 def _opened(

@@ -273,6 +273,22 @@ def test_what_flies_comes_down_where_something_else_is_in_the_state_folders_plac
     assert grounded.value.code == ExitCode.INPUT
 
 
+def test_what_comes_down_keeps_its_evidence_elsewhere_where_no_run_can_lie(
+    fleet: KeyStore, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    Path("runs").touch()
+    with pytest.raises(OSError, match="directory"):
+        launch._run_folder(order(), b"bundle", SystemClock(), resumed=False)
+    run, told = launch._run_folder(order(), b"bundle", SystemClock(), resumed=True)
+    assert (run.path / "mission.bundle").read_bytes() == b"bundle"
+    assert run.path.is_relative_to(tmp_path)
+    assert str(run.path) in told
+    Path("runs").unlink()
+    run, told = launch._run_folder(order(), b"bundle", SystemClock(), resumed=True)
+    assert (run.path.parent, told) == (Path("runs"), "")
+
+
 class Late(SystemClock):
     """By this clock it is two years later."""
 

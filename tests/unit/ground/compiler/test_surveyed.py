@@ -25,28 +25,28 @@ AREAS = {
 }
 SHIPPED = {name: (CHECKOUT / name).read_text(encoding="utf-8") for name in
            ("skills/inspect_area.rts", "policies/bridge_inspection.rts")}  # fmt: skip
-#: a skill that covers without a choice of pattern, beside the one that ships
-SWEEP = (
+#: the skill that ships with more time and charge, as the areas here are large; and one without a choice of pattern
+LOOK = (
     SHIPPED["skills/inspect_area.rts"]
-    .replace("skill inspect_area", "skill sweep")
+    .replace("skill inspect_area", "skill look")
+    .replace("lasts    at most 2 min", "lasts    at most 5 min")
+    .replace("energy   at most 13 %", "energy   at most 35 %")
+)
+SWEEP = (
+    LOOK.replace("skill look", "skill sweep")
     .replace("  pattern:  one of grid, perimeter, orbit = grid,\n", "")
     .replace(" pattern pattern", "")
+    .replace('import "', '// "')
 )
 PERMITS = "".join(
     f"permit {skill} by role operator through agent when area inside {zone}\n"
-    for skill in ("inspect_area", "sweep")
+    for skill in ("look", "sweep")
     for zone in AREAS
 )
 CALLS = [
-    *(
-        f"inspect_area(round, altitude = 20 m, pattern = {each}, speed = 8 m/s)"
-        for each in ("grid", "perimeter", "orbit")
-    ),
-    *(
-        f"inspect_area(square, altitude = 20 m, pattern = {each}, speed = 8 m/s)"
-        for each in ("grid", "perimeter", "orbit")
-    ),
-    "inspect_area(holed, altitude = 20 m, speed = 6 m/s)",
+    *(f"look(round, altitude = 20 m, pattern = {each}, speed = 8 m/s)" for each in ("grid", "perimeter", "orbit")),
+    *(f"look(square, altitude = 20 m, pattern = {each}, speed = 8 m/s)" for each in ("grid", "perimeter", "orbit")),
+    "look(holed, altitude = 20 m, speed = 6 m/s)",
     "sweep(square, altitude = 20 m, speed = 8 m/s)",
     "sweep(round, altitude = 20 m)",
 ]
@@ -68,7 +68,7 @@ mission m under bridge_inspection@7 on quad {{
   phase recovery {{ return_home() }}
 }}
 """
-    files = {"/nowhere/m.rts": "\n".join([SWEEP, rules, zones, mission])}
+    files = {"/nowhere/m.rts": "\n".join([LOOK, SWEEP, rules, zones, mission])}
     program = load(
         ["/nowhere/m.rts"],
         lambda name: files[name].encode() if name in files else Path(name).read_bytes(),

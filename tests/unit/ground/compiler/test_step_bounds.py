@@ -1,0 +1,104 @@
+"""E0804, E0814: what each step is proved to take, by which speeds, against which wind, and what follows it."""
+
+from pathlib import Path
+
+import pytest
+
+from reference.sources import LIBRARY, findings, found, mission, policy, program, skill
+from rtshcua.ground.compiler.program import compile_program
+from rtshcua.ground.compiler.proofs.durations import StepBound
+from rtshcua.ground.language.load import load
+from rtshcua.mavlink import dialect
+from virtual.rows import rows
+
+UP, HOME = "takeoff(altitude = 20 m)", "return_home()"
+#: 200 m north of home
+NORTH = "47.39954 N, 8.54559 E"
+LONG = {"lasts": "at most 5 min", "energy": "at most 30 %"}
+EAST = "aim: position, top: altitude in 5 m .. 50 m"
+
+
+def bounds(*parts: str) -> tuple[StepBound, ...]:
+    """What the steps of a program are proved to take."""
+
+    def read(path: str) -> bytes:
+        return program(*parts).encode() if path == "probe.rts" else Path(path).read_bytes()
+
+    made = compile_program(load(["probe.rts"], read, LIBRARY), dialect.load(), mission=None, issued_at_us=1)
+    assert made.bounds is not None, made.diagnostics
+    return made.bounds.steps
+
+
+def seconds(clauses: dict[str, str], *rules: str, speed: str = "12 m/s") -> int:
+    """How long 200 m take at most, in seconds rounded down, beyond the commands."""
+    fast = skill(
+        f"fast({EAST}, pace: speed in 1 m/s .. 12 m/s)", motion="fly to aim at top speed pace", **LONG, **clauses
+    )
+    steps = bounds(fast, policy(*rules), mission(UP, f"fast({NORTH}, 20 m, {speed})", HOME))
+    return steps[1].time_us // 1_000_000 - 5
+
+
+@rows(
+    ("clauses", "rules", "expected"),
+    [
+        ({}, [], 33),  # at 8 m/s, for it flies 16 m/s against 8 m/s of wind, and 8 s to come to speed and to stop
+        ({"assume": "wind.speed < 4 m/s"}, [], 28),  # at 12 m/s
+        ({"assume": "wind.speed < 13 m/s"}, [], 33),  # more than it is flown in
+        ({}, ["degrade fast when wind.speed > 4 m/s to return_home"], 28),
+        ({}, ["degrade hover when wind.speed > 4 m/s to return_home"], 33),
+    ],
+)
+def test_wind_counts_as_far_as_the_step_goes_on_in_it(clauses: dict[str, str], rules: list[str], expected: int) -> None:
+    assert seconds(clauses, *rules) == expected
+
+
+def test_a_step_is_no_faster_than_it_asks_for() -> None:
+    assert seconds({}, speed="2 m/s") == 102
+
+
+def test_a_return_counts_the_slowest_speed_that_was_asked_for() -> None:
+    """A PX4 goes on with it."""
+    goto = "goto(47.39819 N, 8.54559 E, 20 m, speed = {} m/s)"
+    quick = bounds(policy(), mission(UP, goto.format(5), HOME))[-1]
+    slow = bounds(policy(), mission(UP, goto.format(2), HOME))[-1]
+    # 50 m, and 50 m that home may lie away: at 5 m/s 20 s and 5 s, at 2 m/s 50 s and 2 s
+    assert 26_000_000 < slow.time_us - quick.time_us < 28_000_000
+    assert slow.energy > quick.energy
+
+
+@rows(
+    ("link", "expected"),
+    [
+        ("goto(47.39999 N, 8.54559 E, altitude = 20 m)", []),
+        ("goto(47.39799 N, 8.54559 E, altitude = 60 m)", []),
+        (
+            "goto(47.39999 N, 8.54559 E, altitude = 20 m, speed = 2 m/s)",
+            ["`goto`, a link of this step's chains, takes up to 233 s, and `goto` lasts at most 2 min"],
+        ),
+        ("rise(45 m)", []),
+        (
+            "rise(50 m)",
+            ["`rise`, a link of this step's chains, takes up to 27 s, and `rise` lasts at most 24 s"],
+        ),
+    ],
+)
+def test_a_link_is_proved_from_the_farthest_place_of_the_step(link: str, expected: list[str]) -> None:
+    rise = skill("rise(to: altitude in 5 m .. 60 m)", motion="climb to to", lasts="at most 24 s")
+    away = skill(f"away({EAST})", motion="fly to aim at top", fallback=f"{link}, return_home, emergency_land", **LONG)
+    text = program(rise, away, policy(), mission(UP, f"away({NORTH}, 20 m)", HOME))
+    assert [message for code, message in found(text) if code == "E0804"] == expected
+
+
+@pytest.mark.parametrize("top", ["6 m", "45 m"])
+def test_the_nearest_height_that_is_in_time_is_named(top: str) -> None:
+    """100 m north of home, and down or up at 1 m/s or 1.5 m/s from 20 m."""
+    near = skill(f"near({EAST})", motion="fly to aim at top", lasts="at most 37 s", energy="at most 9 %")
+    text = program(near, policy(), mission(UP, f"near(47.39864 N, 8.54559 E, {top})", HOME))
+    [late] = [each for each in findings(text) if each.code.id == "E0804"]
+    [fix] = late.fixes
+    assert text[late.span.start : late.span.end] == top
+    fixed = text[: fix.span.start] + fix.replacement + text[fix.span.end :]
+    assert [code for code, _ in found(fixed) if code == "E0804"] == []
+    further = int(fix.replacement.split()[0]) + (1 if top == "45 m" else -1)
+    again = text[: fix.span.start] + f"{further} m" + text[fix.span.end :]
+    assert [code for code, _ in found(again) if code == "E0804"] == ["E0804"]

@@ -24,6 +24,10 @@ from rtshcua.ground.editor.positions import Change, Encoding
 
 GRACE = 5.0
 """Seconds from the end of the editor's stream until the process ends, whatever still runs in it."""
+LARGEST = 64 << 20
+"""Bytes of a message: a source of 8 MiB has six times as many where each character is escaped."""
+LONGEST = 64 << 10
+"""Bytes of a line before a message."""
 _WATCHED = "**/*.{rts,geojson,json,toml}"
 
 
@@ -76,6 +80,8 @@ def serve(library: str, port: int | None = None, host: str = "127.0.0.1") -> Non
     What goes wrong is written to the standard error, nothing but messages to the standard output.
     """
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    for each in logging.getLogger().handlers:
+        each.setFormatter(OneLine("%(levelname)s %(name)s: %(message)s"))
     logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_a_fault)
     gc.set_threshold(50_000, 20, 100)  # syntax trees come by thousands, and live long
     server, session = make(library)
@@ -99,6 +105,18 @@ def _over(server: LanguageServer, host: str, port: int) -> None:
             server.start_io(Watched(incoming), outgoing)  # type: ignore[arg-type]
         except ConnectionError as error:
             logging.getLogger("rtshcua.lsp").warning("the editor is gone: %s", error)
+
+
+class OneLine(logging.Formatter):
+    """What went wrong in a line, for what an editor sends is no fault of ours; all of it with RTSHCUA_DEBUG=1."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """What is logged."""
+        if os.environ.get("RTSHCUA_DEBUG") == "1":
+            return super().format(record)
+        line = f"{record.levelname} {record.name}: {record.getMessage().partition(chr(10))[0]}"
+        kind, error, _ = record.exc_info or (None, None, None)
+        return line if kind is None else f"{line}: {kind.__name__}: {error}".partition("\n")[0]
 
 
 def _is_a_fault(record: logging.LogRecord) -> bool:
@@ -165,13 +183,15 @@ class Watched:
         self._stream = stream
 
     def readline(self) -> bytes:
-        """One line; a part of one, or nothing, at the end."""
-        data = self._stream.readline()
+        """One line; a part of one, or nothing, at the end. A line that no header is as long as is the end."""
+        data = self._stream.readline(LONGEST)
         return self._seen(data, ended=not data.endswith(b"\n"))
 
     def read(self, size: int) -> bytes:
-        """So many bytes; fewer at the end."""
-        data = self._stream.read(size)
+        """So many bytes; fewer at the end. More than any message has are not waited for: that is the end."""
+        if size > LARGEST:
+            logging.getLogger("rtshcua.lsp").warning("a message of %d bytes is not read", size)
+        data = self._stream.read(size) if size <= LARGEST else b""
         return self._seen(data, ended=len(data) < size)
 
     def _seen(self, data: bytes, *, ended: bool) -> bytes:

@@ -6,7 +6,7 @@ from io import BytesIO
 import pytest
 
 from rtshcua.adapters.language_server import server
-from rtshcua.adapters.language_server.server import GRACE, Watched
+from rtshcua.adapters.language_server.server import GRACE, LARGEST, LONGEST, Watched
 
 
 class Forced:
@@ -46,4 +46,18 @@ def test_stream_that_ends_before_or_within_a_line_ends_the_process(left: bytes, 
 def test_stream_that_ends_before_or_within_a_body_ends_the_process(left: bytes, started: list[float]) -> None:
     """A body that is cut off cannot be answered where nobody listens: then nothing is read after it."""
     assert Watched(BytesIO(left)).read(999) == left
+    assert started == [GRACE]
+
+
+@pytest.mark.parametrize("size", [LARGEST + 1, 10**30])
+def test_a_message_of_more_bytes_than_any_has_ends_the_process(size: int, started: list[float]) -> None:
+    """`Content-Length` says so much: nobody waits for it, nor makes room."""
+    stream = BytesIO(b"{}")
+    assert Watched(stream).read(size) == b""
+    assert stream.tell() == 0
+    assert started == [GRACE]
+
+
+def test_a_line_that_does_not_end_ends_the_process(started: list[float]) -> None:
+    assert len(Watched(BytesIO(b"X" * 2 * LONGEST)).readline()) == LONGEST
     assert started == [GRACE]

@@ -1,6 +1,8 @@
 """What an editor may send that is no message of the protocol: a request is answered, whatever it holds."""
 
 import json
+import logging
+import sys
 from typing import Any
 
 import pytest
@@ -9,7 +11,7 @@ from virtual.rows import rows
 
 pytest.importorskip("pygls")
 
-from rtshcua.adapters.language_server.server import make
+from rtshcua.adapters.language_server.server import OneLine, make
 from rtshcua.library import root
 
 PLACE = {"line": 0, "character": 0}
@@ -68,3 +70,23 @@ def test_a_request_without_parameters_is_answered() -> None:
 def test_a_request_that_is_well_formed_is_handled() -> None:
     (answer,) = _said({"id": 1, "method": "textDocument/nonsense", "params": {}})
     assert answer["error"]["code"] == -32601
+
+
+@rows("debug", ["", "1"])
+def test_what_cannot_be_read_is_logged_in_a_line(debug: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RTSHCUA_DEBUG", debug)
+    try:
+        json.loads("[")
+    except ValueError:
+        fault = sys.exc_info()
+    formatter = OneLine("%(levelname)s %(name)s: %(message)s")
+    told = [
+        formatter.format(logging.LogRecord("pygls", logging.ERROR, "", 0, "unread\n%s", ("Traceback",), each))
+        for each in (None, fault)
+    ]
+    if debug:
+        assert all("Traceback" in each for each in told)
+    else:
+        assert told[0] == "ERROR pygls: unread"
+        assert told[1].startswith("ERROR pygls: unread: JSONDecodeError: Expecting value")
+        assert len(told[1].splitlines()) == 1

@@ -5,6 +5,7 @@ import http.client
 import json
 import re
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -419,7 +420,7 @@ def served(ground: Any, base: str, place: Path) -> Iterator[tuple[int, str]]:
     try:
         yield int(found[1]), token.read_text().strip()
     finally:
-        run.process.terminate()
+        run.signal(signal.SIGTERM)
         run.process.wait(20)
 
 
